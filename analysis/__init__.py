@@ -1,0 +1,1 @@
+"""The statistics: within-subject ANOVA, pairs, tables, figures and reports."""

@@ -1,0 +1,27 @@
+"""One way to refuse bad input: say what was expected, what came, and what to do."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
+    """Input a person gave cannot be used. The message is one line, meant for that person.
+
+    Command lines print it without a traceback and exit with code 2; the server answers with a 4xx.
+    """
+
+
+def nearest(word: str, candidates: Iterable[str]) -> str | None:
+    """Return the candidate most like `word`, or None where nothing is near."""
+    choices = {candidate.casefold(): candidate for candidate in candidates}
+    found = get_close_matches(word.casefold(), list(choices), n=1, cutoff=0.5)
+    return choices[found[0]] if found else None
+
+
+def did_you_mean(word: str, candidates: Iterable[str]) -> str:
+    """Return `; did you mean 'x'?` or the list of what is allowed, ready to end an error line."""
+    allowed = list(candidates)
+    near = nearest(word, allowed)
+    if near is not None:
+        return f"; did you mean '{near}'?"
+    return f"; expected one of: {', '.join(allowed)}" if allowed else ""

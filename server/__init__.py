@@ -1,0 +1,1 @@
+"""The web server: studies, participants, trials, monitor and export."""
