@@ -1,0 +1,84 @@
+"""From a declared experiment to its cells, clips and blocks: pure functions, no randomness."""
+
+from dataclasses import dataclass
+from itertools import product
+
+from experiments.definition import Experiment
+from experiments.rendering import RenderSettings
+
+
+@dataclass(frozen=True)
+class ClipSpec:
+    """One clip of the factorial set: a level of every factor, and which exemplar of that cell (from 1)."""
+
+    levels: tuple[tuple[str, str], ...]
+    exemplar: int
+
+    @property
+    def cell(self) -> str:
+        """The level names joined by slashes, in factor order."""
+        return "/".join(level for _, level in self.levels)
+
+    def level(self, factor: str) -> str:
+        """Return the level this clip has of `factor`."""
+        return dict(self.levels)[factor]
+
+
+@dataclass(frozen=True)
+class BlockSpec:
+    """One block as declared: its label (a level of the split factor, or `all`) and its clips."""
+
+    label: str
+    clips: tuple[ClipSpec, ...]
+
+
+def cells(experiment: Experiment) -> list[tuple[tuple[str, str], ...]]:
+    """Every combination of levels, last factor fastest."""
+    names = [[(factor.name, level.name) for level in factor.levels] for factor in experiment.factors]
+    return [tuple(combination) for combination in product(*names)]
+
+
+def clips(experiment: Experiment) -> list[ClipSpec]:
+    """Every unique clip: cells times exemplars."""
+    numbers = range(1, experiment.exemplars.per_cell + 1)
+    return [ClipSpec(cell, number) for cell in cells(experiment) for number in numbers]
+
+
+def blocks(experiment: Experiment) -> list[BlockSpec]:
+    """Blocks in declared order, repeats included; a participant's order is drawn by the server."""
+    every = clips(experiment)
+    split = experiment.blocks.split_by
+    if split is None:
+        single = [BlockSpec("all", tuple(every))]
+    else:
+        levels = [level.name for level in experiment.factor(split).levels]
+        single = [BlockSpec(level, tuple(c for c in every if c.level(split) == level)) for level in levels]
+    return single * experiment.blocks.repeats
+
+
+def trials_per_participant(experiment: Experiment) -> int:
+    """Rated trials of one participant, practice and attention checks not counted."""
+    return sum(len(block.clips) for block in blocks(experiment))
+
+
+def expected_minutes(experiment: Experiment) -> float:
+    """Expected length of a visit in minutes: trials times the declared seconds a trial."""
+    seconds = (
+        trials_per_participant(experiment) + experiment.practice.trials
+    ) * experiment.trial.expected_seconds
+    return round(seconds / 60, 1)
+
+
+def render_settings(experiment: Experiment, spec: ClipSpec) -> RenderSettings:
+    """The experiment's render settings with the overrides of this clip's levels, in factor order."""
+    settings = experiment.render
+    for factor_name, level_name in spec.levels:
+        level = next(lv for lv in experiment.factor(factor_name).levels if lv.name == level_name)
+        settings = level.render.applied_to(settings)
+    return settings
+
+
+def exemplar_key(experiment: Experiment, spec: ClipSpec) -> str:
+    """Key of the blink a clip shows: clips with the same key show the same blink (see `Exemplars`)."""
+    own = [level for factor, level in spec.levels if factor in experiment.exemplars.own_per]
+    return "/".join([*own, f"{spec.exemplar:03d}"])

@@ -1,0 +1,98 @@
+"""`manifest.json` beside a folder of clips: what each clip shows, and the hash of its bytes."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, StringConstraints, ValidationError
+
+from experiments.base import Declaration
+from experiments.errors import InputError
+
+MANIFEST_NAME = "manifest.json"
+Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,150}$")]
+
+
+class Clip(Declaration):
+    """One rendered clip.
+
+    Attributes
+    ----------
+    levels, cell, exemplar: its place in the design. profile: identifier of the blink shown.
+    profile_repeated: True where the same recorded eye already stands for another exemplar of this cell.
+    closure: closure at 300 fps over the whole clip (0 open, 1 closed); empty for clips not made here.
+    onset_frame: output frame at which the blink begins. width_mm: shown width at actual size.
+    """
+
+    levels: dict[str, str]
+    cell: str
+    exemplar: Annotated[int, Field(ge=1)]
+    file: FileName
+    sha256: Sha256
+    bytes: Annotated[int, Field(gt=0)]
+    fps: Annotated[float, Field(gt=0)]
+    frames: Annotated[int, Field(gt=0)]
+    width_px: Annotated[int, Field(gt=0)]
+    height_px: Annotated[int, Field(gt=0)]
+    width_mm: Annotated[float, Field(gt=0)] | None = None
+    profile: str = ""
+    profile_repeated: bool = False
+    duration_frames: float | None = None
+    onset_frame: int | None = None
+    closure: tuple[float, ...] = ()
+    closure_other: tuple[float, ...] = ()
+    inputs: dict[str, str] = Field(default_factory=dict)
+    seed: int | None = None
+
+
+class Manifest(Declaration):
+    """All clips of one experiment, and what made them."""
+
+    experiment: str
+    definition_sha256: Sha256
+    program_version: str
+    seed: int
+    inter_ocular_px: float | None = None
+    notes: tuple[str, ...] = ()
+    clips: Annotated[tuple[Clip, ...], Field(min_length=1)]
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Read and validate `folder/manifest.json`; InputError in one line where it cannot be used."""
+    path = folder / MANIFEST_NAME
+    if not path.is_file():
+        raise InputError(
+            f"expected a {MANIFEST_NAME} in {folder}, found none; build the clips with `stimuli build`"
+        )
+    try:
+        return Manifest.model_validate(json.loads(path.read_text(encoding="utf-8")))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not valid JSON ({error}); build the clips again") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: {place}: {first['msg']}; build the clips again") from error
+
+
+def check_files(manifest: Manifest, folder: Path) -> None:
+    """Raise InputError for the first clip that is missing or whose bytes have another hash."""
+    for clip in manifest.clips:
+        path = folder / clip.file
+        if not path.is_file():
+            raise InputError(
+                f"clip {clip.file} ({clip.cell}, exemplar {clip.exemplar}) is missing from {folder}"
+            )
+        found = file_sha256(path)
+        if found != clip.sha256:
+            raise InputError(
+                f"clip {clip.file}: expected sha256 {clip.sha256[:12]}..., got {found[:12]}...; "
+                "the file was changed or damaged, build it again"
+            )
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file's bytes as 64 hexadecimal digits."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
