@@ -62,7 +62,7 @@ RATING_COLUMNS: tuple[Column, ...] = (
     ),
     Column("cell", "text", "Level names in factor order, joined by slashes."),
     Column("exemplar", "integer", "Which exemplar of the cell, from 1."),
-    Column("profile", "text", "Identifier of the blink profile shown, as in the manifest."),
+    Column("profile_id", "text", "Identifier of the blink profile shown, as in the manifest."),
     Column("stimulus", "text", "File name of the clip."),
     Column("clip_sha256", "text", "SHA-256 of the clip's bytes."),
     Column("response", "integer", "The rating, on the declared scale."),

@@ -1,0 +1,136 @@
+"""Read an experiment from TOML: shipped by name, or a file. Problems carry their line and a way out."""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from experiments.definition import Experiment
+from experiments.errors import InputError, did_you_mean
+from experiments.toml_lines import line_of
+
+FOLDER = Path(__file__).parent
+SHIPPED = ("exp1", "exp2", "exp3")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong in a definition: where (line from 1, dotted path) and what to do."""
+
+    line: int | None
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        place = f"line {self.line}: " if self.line else ""
+        return f"{place}{self.path + ': ' if self.path else ''}{self.message}"
+
+
+class DefinitionError(InputError):
+    """A definition cannot be used; `problems` lists every reason, the message is the first."""
+
+    def __init__(self, source: str, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        super().__init__(f"{source}: {problems[0]}{more}")
+
+
+def load_experiment(name_or_path: str) -> Experiment:
+    """Load a shipped experiment by name, or the TOML file at a path."""
+    path = locate(name_or_path)
+    return parse_experiment(path.read_text(encoding="utf-8"), path.name)
+
+
+def locate(name_or_path: str) -> Path:
+    """Return the TOML file of a shipped experiment's name or of a path; InputError where neither exists."""
+    if name_or_path in SHIPPED:
+        return FOLDER / f"{name_or_path}.toml"
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    if path.suffix == ".toml":
+        raise InputError(f"no file {name_or_path}; expected a TOML file or one of {', '.join(SHIPPED)}")
+    raise InputError(f"no experiment '{name_or_path}'{did_you_mean(name_or_path, SHIPPED)}")
+
+
+def parse_experiment(text: str, source: str = "definition") -> Experiment:
+    """Parse and validate TOML text; DefinitionError lists every problem with its line."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        line = getattr(error, "lineno", None) or _line_in(str(error))
+        raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
+    try:
+        return Experiment.model_validate(data)
+    except ValidationError as error:
+        problems = [_problem(detail, text) for detail in error.errors()]
+        raise DefinitionError(source, problems) from error
+
+
+def definition_sha256(experiment: Experiment) -> str:
+    """SHA-256 over the canonical JSON of a definition: equal for equal declarations, however written."""
+    canonical = json.dumps(experiment.model_dump(mode="json"), sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(canonical.encode("utf-8")).hexdigest()
+
+
+def _line_in(message: str) -> int | None:
+    digits = message.partition("at line ")[2].split(",")[0].split(" ")[0]
+    return int(digits) if digits.isdigit() else None
+
+
+def _problem(detail: Any, text: str) -> Problem:
+    location = tuple(part for part in detail["loc"] if not _is_union_tag(part))
+    path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
+    message = str(detail["msg"]).removeprefix("Value error, ")
+    if detail["type"] == "extra_forbidden":
+        word = str(location[-1])
+        message = f"unknown key '{word}'{did_you_mean(word, _keys_at(detail['loc'][:-1]))}"
+    elif detail["type"] == "missing":
+        message = "this key is required and missing"
+    elif "input" in detail and isinstance(detail["input"], str | int | float | bool):
+        message = f"{message}, got {detail['input']!r}"
+    return Problem(line_of(text, location), path, message)
+
+
+_TAGS = frozenset({"clip_rating", "within_anova"})
+
+
+def _is_union_tag(part: object) -> bool:
+    return isinstance(part, str) and part in _TAGS | {tag for tag, _ in _tagged_models()}
+
+
+def _tagged_models() -> Iterator[tuple[str, type[BaseModel]]]:
+    from experiments import forms, rules
+
+    for union in (rules.ExclusionRule, forms.FormField):
+        for model in get_args(get_args(union)[0]):
+            yield model.model_fields["rule" if "rule" in model.model_fields else "type"].default, model
+
+
+def _keys_at(location: Sequence[object]) -> list[str]:
+    """The keys allowed at a place of the declaration, by walking the models' annotations."""
+    model: Any = Experiment  # walked down key by key
+    for part in location:
+        if isinstance(part, int):
+            continue
+        tagged = dict(_tagged_models())
+        if isinstance(part, str) and part in tagged:
+            model = tagged[part]
+        elif part in getattr(model, "model_fields", {}):
+            model = _model_inside(model.model_fields[str(part)].annotation) or model
+    return list(model.model_fields)
+
+
+def _model_inside(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in get_args(annotation):
+        found = _model_inside(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,55 @@
+"""Find the line of a key in TOML text, because the standard parser keeps no positions."""
+
+import re
+from collections.abc import Sequence
+
+_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(r"^\s*([A-Za-z0-9_\-\"'.]+)\s*=")
+
+
+def line_of(text: str, location: Sequence[object]) -> int | None:
+    """Return the line (from 1) of the deepest part of `location` that stands in `text`, or None.
+
+    `location` is a path of keys and list indices, as pydantic reports it. Arrays of tables (`[[a]]`) count
+    their headers; keys inside inline tables are found on the line of the table's own key.
+    """
+    places = _places(text)
+    wanted = list(location)
+    while wanted:
+        if tuple(wanted) in places:
+            return places[tuple(wanted)]
+        wanted.pop()
+    return None
+
+
+def _places(text: str) -> dict[tuple[object, ...], int]:
+    places: dict[tuple[object, ...], int] = {}
+    counts: dict[tuple[object, ...], int] = {}
+    here: tuple[object, ...] = ()
+    for number, line in enumerate(text.splitlines(), start=1):
+        header = _HEADER.match(line)
+        if header is not None:
+            here = _enter(_split(header[2]), header[1] == "[[", counts)
+            places.setdefault(here, number)
+            continue
+        key = _KEY.match(line)
+        if key is not None:
+            places.setdefault((*here, *_split(key[1])), number)
+    return places
+
+
+def _enter(keys: list[str], is_array: bool, counts: dict[tuple[object, ...], int]) -> tuple[object, ...]:
+    """The path of a table header, with the index of the latest element wherever a key is an array."""
+    here: tuple[object, ...] = ()
+    for position, key in enumerate(keys):
+        here = (*here, key)
+        last = position == len(keys) - 1
+        if last and is_array:
+            counts[here] = counts.get(here, -1) + 1
+        if here in counts:
+            here = (*here, counts[here])
+    return here
+
+
+def _split(dotted: str) -> list[str]:
+    return [part.strip().strip("\"'") for part in dotted.split(".")]
