@@ -1,0 +1,7 @@
+"""`stimuli actor`."""
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of the synthetic actor to `app`."""

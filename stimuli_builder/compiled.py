@@ -1,0 +1,16 @@
+"""One decorator for numeric kernels: numba, cached on disk, without the interpreter lock."""
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numba
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+
+def compiled(kernel: Kernel) -> Kernel:
+    """Compile `kernel` with numba; kernels that call one another live in one file.
+
+    The cache on disk notices an edit only in the file that holds the caller.
+    """
+    return cast(Kernel, numba.njit(cache=True, nogil=True, fastmath=True)(kernel))

@@ -1,0 +1,45 @@
+"""Output that is whole or absent: written under a temporary name beside the target, then renamed."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TextIO
+
+from experiments.errors import InputError
+
+
+def temporary_beside(path: Path, suffix: str = "") -> Path:
+    """Return a name beside `path` for unfinished output; the folder must exist and be writable."""
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(f"{path}: the folder {folder} does not exist; make it first")
+    if path.is_dir():
+        raise InputError(f"{path}: expected a file name, this is a folder")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{path}: the folder {folder} cannot be written to")
+    return folder / f".{path.name}.{os.getpid()}.part{suffix}"
+
+
+def remove_quietly(path: Path) -> None:
+    """Remove `path` if it is there."""
+    with suppress(OSError):
+        path.unlink()
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary path; rename it to `path` if the block ends well, remove it if not."""
+    temporary = temporary_beside(path, suffix=path.suffix)
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        remove_quietly(temporary)
+
+
+@contextmanager
+def whole_text(path: Path) -> Iterator[TextIO]:
+    """Open `path` for text (UTF-8, newlines as written) so that it appears whole or not at all."""
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        yield stream
