@@ -1,0 +1,197 @@
+"""`character.toml`: what a folder of pictures must say to be a character. See docs/characters.md."""
+
+import re
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from experiments.errors import InputError
+
+DECLARATION_FILE = "character.toml"
+Closure = Annotated[float, Field(ge=0.0, le=1.0)]
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class _Declared(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Picture(_Declared):
+    """One picture file of the atlas, named relative to the character's folder."""
+
+    file: str
+    sha256: Sha256 | None = None
+
+    @model_validator(mode="after")
+    def _stays_in_folder(self) -> "Picture":
+        if Path(self.file).is_absolute() or ".." in Path(self.file).parts:
+            raise ValueError(f"file '{self.file}' must lie inside the character's folder")
+        return self
+
+
+class Level(Picture):
+    """The crop as it looks at one eyelid closure (0 open, 1 closed)."""
+
+    closure: Closure
+
+
+class LowerLidPose(Picture):
+    """The lower lid's region of the open-eye frame with the lower lid moved.
+
+    `vertical_mm` is up, `horizontal_mm` towards the nose, both of the lid's centre.
+    """
+
+    vertical_mm: float
+    horizontal_mm: float
+
+
+class LowerLid(_Declared):
+    """The lower-lid layer: poses of the open eye and mattes of what covers the lower lid.
+
+    A matte is a grey picture of the layer's region: 1 (white) where upper lid or upper lashes hide the
+    lower lid at that closure. `crop` is x, y, width, height in px of the full frame.
+    """
+
+    crop: tuple[int, int, int, int]
+    poses: tuple[LowerLidPose, ...] = Field(min_length=4)
+    mattes: tuple[Level, ...] = Field(min_length=1)
+
+    @property
+    def vertical_mm(self) -> tuple[float, ...]:
+        """The vertical positions baked, ascending, in mm."""
+        return tuple(sorted({pose.vertical_mm for pose in self.poses}))
+
+    @property
+    def horizontal_mm(self) -> tuple[float, ...]:
+        """The horizontal positions baked, ascending, in mm."""
+        return tuple(sorted({pose.horizontal_mm for pose in self.poses}))
+
+    @model_validator(mode="after")
+    def _full_grid(self) -> "LowerLid":
+        found = sorted((pose.vertical_mm, pose.horizontal_mm) for pose in self.poses)
+        wanted = sorted((v, h) for v in self.vertical_mm for h in self.horizontal_mm)
+        if found != wanted:
+            raise ValueError("lower_lid.poses must hold every pair of vertical_mm and horizontal_mm once")
+        if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
+            raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
+        _require_ascending([matte.closure for matte in self.mattes], "lower_lid.mattes")
+        return self
+
+
+class Declaration(_Declared):
+    """The whole of `character.toml`; lengths in mm on the screen at actual size, positions in px."""
+
+    name: str = Field(pattern="^[a-z0-9][a-z0-9_-]*$")
+    label: str
+    size_px: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
+    px_per_mm: float = Field(gt=0)
+    inter_ocular_mm: float = Field(gt=0)
+    opening_mm: float = Field(gt=0)
+    crop: tuple[int, int, int, int]
+    base: Picture
+    levels: tuple[Level, ...] = Field(min_length=2)
+    lower_lid: LowerLid | None = None
+    provenance: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Declaration":
+        closures = [level.closure for level in self.levels]
+        _require_ascending(closures, "levels")
+        if closures[0] != 0.0 or closures[-1] != 1.0:
+            raise ValueError("levels must run from closure 0 (open) to closure 1 (closed)")
+        _require_inside(self.crop, self.size_px, "crop")
+        if self.lower_lid is not None:
+            _require_inside(self.lower_lid.crop, self.size_px, "lower_lid.crop")
+            _require_nested(self.lower_lid.crop, self.crop)
+        return self
+
+
+def _require_ascending(closures: list[float], where: str) -> None:
+    if any(b <= a for a, b in pairwise(closures)):
+        raise ValueError(f"{where} must be in ascending order of closure, each closure once")
+
+
+def _require_inside(crop: tuple[int, int, int, int], size: tuple[int, int], where: str) -> None:
+    x, y, width, height = crop
+    if min(x, y) < 0 or min(width, height) < 1 or x + width > size[0] or y + height > size[1]:
+        raise ValueError(
+            f"{where} {list(crop)} (x, y, width, height) must lie inside the {list(size)} px frame"
+        )
+
+
+def _require_nested(inner: tuple[int, int, int, int], outer: tuple[int, int, int, int]) -> None:
+    if (
+        inner[0] < outer[0]
+        or inner[1] < outer[1]
+        or inner[0] + inner[2] > outer[0] + outer[2]
+        or inner[1] + inner[3] > outer[1] + outer[3]
+    ):
+        raise ValueError("lower_lid.crop must lie inside crop")
+
+
+def read_declaration(folder: Path) -> Declaration:
+    """Read and check a character folder's declaration.
+
+    Raises
+    ------
+    InputError
+        The folder or its declaration is missing, not TOML, or breaks a rule; the line names the rule.
+    """
+    file = folder / DECLARATION_FILE
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{folder} is no character: cannot read its {DECLARATION_FILE} ({type(error).__name__})"
+        ) from error
+    try:
+        return Declaration.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file} is not TOML: {error}; correct that line") from error
+    except ValidationError as error:
+        raise InputError(f"{file}: {_first_fault(error)}") from error
+
+
+def _first_fault(error: ValidationError) -> str:
+    fault = error.errors()[0]
+    where = ".".join(str(part) for part in fault["loc"])
+    message = re.sub("^Value error, ", "", fault["msg"])
+    return f"{where}: {message}" if where else message
+
+
+def declaration_toml(declaration: Declaration) -> str:
+    """Write a declaration as TOML text; reading it back gives an equal declaration."""
+    content = declaration.model_dump(exclude_none=True)
+    tables = {key: content.pop(key) for key in ("levels", "lower_lid", "provenance") if key in content}
+    lines = [f"{key} = {_toml_value(value)}" for key, value in content.items()]
+    for level in tables["levels"]:
+        lines += ["", "[[levels]]", *_toml_pairs(level)]
+    lower = tables.get("lower_lid")
+    if lower:
+        lines += ["", "[lower_lid]", f"crop = {_toml_value(lower['crop'])}"]
+        for key in ("poses", "mattes"):
+            for item in lower[key]:
+                lines += ["", f"[[lower_lid.{key}]]", *_toml_pairs(item)]
+    if tables.get("provenance"):
+        lines += ["", "[provenance]", *_toml_pairs(tables["provenance"])]
+    return "\n".join(lines) + "\n"
+
+
+def _toml_pairs(table: dict[str, Any]) -> list[str]:
+    return [f"{key} = {_toml_value(value)}" for key, value in table.items()]
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+        return f'"{escaped}"'
+    if isinstance(value, dict):
+        return "{ " + ", ".join(_toml_pairs(value)) + " }"
+    return "[" + ", ".join(_toml_value(item) for item in value) + "]"

@@ -1,0 +1,36 @@
+"""Write a character's folder: pictures first, the declaration last, so a half-written one never loads."""
+
+import hashlib
+import os
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from stimuli_builder.characters.declaration import DECLARATION_FILE, Declaration, Picture, declaration_toml
+
+
+def write_bytes(file: Path, content: bytes) -> None:
+    """Write beside the final name, then rename: the name never holds half a file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    draft = file.with_name(f".{file.name}.part-{os.getpid()}")
+    try:
+        draft.write_bytes(content)
+        draft.replace(file)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def write_picture(folder: Path, file: str, image: NDArray[np.uint8]) -> Picture:
+    """Write (h, w, 3) or (h, w) code values as lossless WebP; return what the declaration says of it."""
+    buffer = BytesIO()
+    Image.fromarray(image).convert("RGB").save(buffer, "WEBP", lossless=True, quality=90, method=4)
+    write_bytes(folder / file, buffer.getvalue())
+    return Picture(file=file, sha256=hashlib.sha256(buffer.getvalue()).hexdigest())
+
+
+def write_declaration(folder: Path, declaration: Declaration) -> None:
+    """Write `character.toml`, which makes the folder a character."""
+    write_bytes(folder / DECLARATION_FILE, declaration_toml(declaration).encode())

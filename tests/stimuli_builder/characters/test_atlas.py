@@ -1,0 +1,120 @@
+"""The atlas: any folder of pictures with a declaration works as a character."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.errors import InputError
+from stimuli_builder.characters.atlas import load_character
+from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
+from stimuli_builder.characters.declaration import declaration_toml, read_declaration
+from stimuli_builder.characters.example import CROP, draw_crop, write_example_character
+
+
+def test_levels_are_the_pictures_in_linear_light(tiny_character: Path) -> None:
+    character = load_character(tiny_character)
+    levels = character.levels_linear()
+    assert levels.shape == (4, CROP[3], CROP[2], 3)
+    assert levels.dtype == np.float32
+    np.testing.assert_array_equal(linear_to_srgb(levels[2]), draw_crop(0.5))
+    np.testing.assert_array_equal(character.base_linear()[character.crop], levels[0])
+
+
+def test_declaration_survives_a_round_trip(tiny_character: Path) -> None:
+    declaration = read_declaration(tiny_character)
+    (tiny_character / "character.toml").write_text(declaration_toml(declaration))
+    assert read_declaration(tiny_character) == declaration
+
+
+def test_every_code_value_survives_linear_light() -> None:
+    codes = np.arange(256, dtype=np.uint8)
+    np.testing.assert_array_equal(linear_to_srgb(srgb_to_linear(codes)), codes)
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=8))
+@settings(deadline=None, max_examples=40)
+def test_weights_rebuild_the_closure(tmp_path_factory: pytest.TempPathFactory, closures: list[float]) -> None:
+    folder = tmp_path_factory.getbasetemp() / "weights"
+    if not folder.exists():
+        write_example_character(folder, lower_lid=False)
+    character = load_character(folder)
+    weights = character.level_weights(closures)
+    np.testing.assert_allclose(weights.sum(1), 1, atol=1e-6)
+    np.testing.assert_allclose(weights @ character.closures, closures, atol=1e-6)
+    assert ((weights > 0).sum(1) <= 2).all()
+    assert (weights >= 0).all()
+
+
+@pytest.mark.parametrize("closure", [float("nan"), -0.01, 1.01, float("inf")])
+def test_closure_outside_its_range_is_refused(tiny_character: Path, closure: float) -> None:
+    with pytest.raises(InputError, match="closure must lie between 0"):
+        load_character(tiny_character).level_weights([0.5, closure])
+
+
+def test_resting_lower_lid_changes_nothing(tiny_character: Path) -> None:
+    assert not load_character(tiny_character).lower_lid_delta(0.3, 0.0, 0.0).any()
+
+
+def test_open_eye_with_raised_lower_lid_is_the_baked_pose(tiny_character: Path) -> None:
+    character = load_character(tiny_character)
+    image = srgb_to_linear(draw_crop(0.0)) + character.lower_lid_delta(0.0, 1.0, 0.0)
+    np.testing.assert_array_equal(linear_to_srgb(image), draw_crop(0.0, 4))
+
+
+def test_closed_upper_lid_hides_the_lower_lid(tiny_character: Path) -> None:
+    assert not load_character(tiny_character).lower_lid_delta(1.0, 1.0, 1.0).any()
+
+
+def test_lower_lid_beyond_its_range_is_refused(tiny_character: Path) -> None:
+    with pytest.raises(InputError, match=r"between 0 and 1 mm; it is 1\.5"):
+        load_character(tiny_character).lower_lid_delta(0.0, 1.5, 0.0)
+
+
+def test_character_without_lower_lid_says_so(tmp_path: Path) -> None:
+    character = load_character(write_example_character(tmp_path / "plain", lower_lid=False))
+    with pytest.raises(InputError, match="has no lower-lid layer"):
+        character.lower_lid_delta(0.0, 0.1, 0.0)
+
+
+def test_missing_level_is_named_on_loading(tiny_character: Path) -> None:
+    (tiny_character / "level_0.50.webp").unlink()
+    with pytest.raises(InputError, match=r"level_0\.50\.webp is missing"):
+        load_character(tiny_character)
+
+
+@pytest.mark.parametrize("damage", [b"", b"not a picture", None])
+def test_damaged_level_is_named(tiny_character: Path, damage: bytes | None) -> None:
+    file = tiny_character / "level_0.50.webp"
+    file.write_bytes(file.read_bytes()[:-7] if damage is None else damage)
+    with pytest.raises(InputError, match=r"atlas level 2 \(closure 0.5\) is damaged"):
+        load_character(tiny_character).check_files()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("closure = 0.25", "closure = 0.75", "ascending"),
+        ("closure = 1.0", "closure = 0.9", "from closure 0"),
+        ("crop = [4, 4, 40, 16]", "crop = [10, 4, 40, 16]", "inside the"),
+        ('name = "tiny"', 'nmae = "tiny"', "name: Field required"),
+        ('file = "level_0.50.webp"', 'file = "../level.webp"', "inside the character's folder"),
+        ("px_per_mm = 1.5", "px_per_mm = ", "is not TOML"),
+        ("horizontal_mm = 1.0", "horizontal_mm = 2.0", "every pair"),
+    ],
+)
+def test_wrong_declaration_is_one_clear_line(tiny_character: Path, old: str, new: str, message: str) -> None:
+    file = tiny_character / "character.toml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=message) as caught:
+        load_character(tiny_character)
+    assert "\n" not in str(caught.value)
+
+
+def test_folder_without_declaration_is_no_character(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is no character"):
+        load_character(tmp_path)
