@@ -1,0 +1,169 @@
+"""From long rows, one a trial, to the participants x cells table of means that the ANOVA takes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.errors import InputError, did_you_mean
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NAMED_CELLS = 5
+"""How many empty cells a one-line message names before it counts the rest."""
+
+
+@dataclass(frozen=True)
+class DroppedParticipant:
+    """A participant left out of the ANOVA because some cells hold no rating, and which cells these are."""
+
+    participant: str
+    missing_cells: tuple[dict[str, str], ...]
+
+
+@dataclass(frozen=True)
+class CellTable:
+    """Unweighted means of every complete participant in every cell.
+
+    `y` and `counts` are (N, a, b, ...), axes in factor order; `counts` are the trials behind each mean.
+    `constant` names participants (kept) who gave one and the same rating throughout.
+    """
+
+    participants: tuple[str, ...]
+    factors: tuple[str, ...]
+    levels: tuple[tuple[str, ...], ...]
+    y: Floats = field(repr=False)
+    counts: Integers = field(repr=False)
+    dropped: tuple[DroppedParticipant, ...] = ()
+    constant: tuple[str, ...] = ()
+
+    @property
+    def cells(self) -> list[dict[str, str]]:
+        """Every cell as a mapping from factor to level, last factor fastest."""
+        return [dict(zip(self.factors, combination, strict=True)) for combination in product(*self.levels)]
+
+
+def natural_order(names: Sequence[str]) -> list[str]:
+    """Sort names: by value where all are numbers, else by text without case; independent of row order."""
+    try:
+        return sorted(names, key=lambda name: (float(name), name))
+    except ValueError:
+        return sorted(names, key=lambda name: (name.casefold(), name))
+
+
+def cell_table(
+    rows: pd.DataFrame,
+    participant: str,
+    rating: str,
+    within: Sequence[str],
+    levels: Mapping[str, Sequence[str]] | None = None,
+) -> CellTable:
+    """Average a participant's trials in each cell; drop and name participants with empty cells.
+
+    Parameters
+    ----------
+    rows : one row a trial; `participant` and `within` columns hold text, `rating` finite numbers.
+    within : factor columns, in the order wanted.
+    levels : declared levels of some or all factors, in order; the levels found, sorted, for the others.
+
+    Raises
+    ------
+    InputError
+        An unknown column or level, a cell that is empty for everyone, or nobody complete.
+    """
+    for name in (participant, rating, *within):
+        if name not in rows.columns:
+            raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
+    if rows.empty:
+        raise InputError("there are no ratings to analyse; the table has a header but no rows")
+    who, people = _codes(rows[participant], None, participant)
+    coded = [_codes(rows[name], (levels or {}).get(name), name) for name in within]
+    shape = tuple(len(names) for _, names in coded)
+    cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape)
+    values = rows[rating].to_numpy(dtype=np.float64)
+    slot, slots = who * int(np.prod(shape)) + cell, len(people) * int(np.prod(shape))
+    counts = np.bincount(slot, minlength=slots).reshape(len(people), *shape)
+    sums = np.bincount(slot, weights=values, minlength=slots).reshape(counts.shape)
+    return _complete(
+        people, list(within), [names for _, names in coded], sums, counts, _constant(who, values)
+    )
+
+
+def _codes(column: pd.Series, declared: Sequence[str] | None, name: str) -> tuple[Integers, list[str]]:
+    """Codes of a column into its sorted (or declared) names."""
+    codes, found = pd.factorize(column)
+    texts = [str(text) for text in found]
+    names = natural_order(texts) if declared is None else [str(level) for level in declared]
+    position = {text: i for i, text in enumerate(names)}
+    for text in texts:
+        if text not in position:
+            raise InputError(f"'{text}' is no level of '{name}'{did_you_mean(text, names)}")
+    lookup = np.array([position[text] for text in texts], dtype=np.int64)
+    return lookup[codes], names
+
+
+def _constant(who: Integers, values: Floats) -> NDArray[np.bool_]:
+    """Which participants gave one and the same rating throughout (and more than one)."""
+    number = np.bincount(who)
+    mean = np.bincount(who, weights=values) / number
+    deviation = np.bincount(who, weights=(values - mean[who]) ** 2)
+    return (deviation <= 1e-20 * np.maximum(mean**2, 1.0)) & (number > 1)
+
+
+def _complete(
+    people: list[str],
+    factors: list[str],
+    levels: list[list[str]],
+    sums: Floats,
+    counts: Integers,
+    constant: NDArray[np.bool_],
+) -> CellTable:
+    _refuse_empty_cells(factors, levels, counts)
+    whole = (counts > 0).reshape(len(people), -1).all(axis=1)
+    dropped = tuple(
+        DroppedParticipant(people[i], _cells_at(factors, levels, counts[i] == 0))
+        for i in np.flatnonzero(~whole)
+    )
+    if not whole.any():
+        first = dropped[0]
+        raise InputError(
+            f"no participant has a rating in every cell (e.g. '{first.participant}' lacks "
+            f"{name_cells(first.missing_cells)}); leave a factor out or collect the missing cells"
+        )
+    return CellTable(
+        participants=tuple(people[i] for i in np.flatnonzero(whole)),
+        factors=tuple(factors),
+        levels=tuple(tuple(names) for names in levels),
+        y=sums[whole] / counts[whole],
+        counts=counts[whole],
+        dropped=dropped,
+        constant=tuple(people[i] for i in np.flatnonzero(whole & constant)),
+    )
+
+
+def _refuse_empty_cells(factors: list[str], levels: list[list[str]], counts: Integers) -> None:
+    empty = _cells_at(factors, levels, counts.sum(axis=0) == 0)
+    if empty:
+        raise InputError(
+            f"nobody rated {name_cells(empty)}: the design is not fully crossed; leave out a factor or level"
+        )
+
+
+def _cells_at(
+    factors: list[str], levels: list[list[str]], where: NDArray[np.bool_]
+) -> tuple[dict[str, str], ...]:
+    return tuple(
+        {factor: levels[axis][i] for axis, (factor, i) in enumerate(zip(factors, index, strict=True))}
+        for index in np.argwhere(where)
+    )
+
+
+def name_cells(cells: Sequence[Mapping[str, str]]) -> str:
+    """Cells in words, e.g. `blur=MB amplitude=NC`, the first few only."""
+    named = "; ".join(" ".join(f"{f}={level}" for f, level in cell.items()) for cell in cells[:NAMED_CELLS])
+    rest = len(cells) - NAMED_CELLS
+    return f"{named} and {rest} more" if rest > 0 else named
