@@ -176,6 +176,7 @@ class Experiment(Declaration):
     def _consistent(self) -> Self:
         names = list(self.factor_names)
         _refuse_repeats(names, "factor")
+        _refuse_reserved(names)
         _refuse_repeats([form.name for form in self.forms], "form")
         used = {"exemplars.own_per": self.exemplars.own_per, "analysis.factors": self.analysis.factors}
         used |= {"analysis.pairs": self.analysis.pairs}
@@ -187,7 +188,6 @@ class Experiment(Declaration):
         for language in self.languages:
             if language not in self.texts:
                 raise ValueError(f"texts.{language} is missing: languages lists '{language}'")
-        _refuse_reserved(names)
         return self
 
 

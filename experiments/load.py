@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from experiments.errors import InputError, did_you_mean
 from experiments.toml_lines import line_of
 
 FOLDER = Path(__file__).parent
+_PLACE = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
 SHIPPED = ("exp1", "exp2", "exp3")
 
 
@@ -68,7 +70,9 @@ def parse_experiment(text: str, source: str = "definition") -> Experiment:
     try:
         return Experiment.model_validate(data)
     except ValidationError as error:
-        problems = [_problem(detail, text) for detail in error.errors()]
+        # A misspelt key is also a missing one: name the misspelling first.
+        details = sorted(error.errors(), key=lambda detail: detail["type"] == "missing")
+        problems = [_problem(detail, text) for detail in details]
         raise DefinitionError(source, problems) from error
 
 
@@ -87,9 +91,17 @@ def _problem(detail: Any, text: str) -> Problem:
     location = tuple(part for part in detail["loc"] if not _is_union_tag(part))
     path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
     message = str(detail["msg"]).removeprefix("Value error, ")
+    if not location and (place := _PLACE.match(message)):
+        path, message = place[1], place[2]
+        location = tuple(path.split("."))
     if detail["type"] == "extra_forbidden":
         word = str(location[-1])
         message = f"unknown key '{word}'{did_you_mean(word, _keys_at(detail['loc'][:-1]))}"
+    elif detail["type"] == "union_tag_invalid":
+        context = detail["ctx"]
+        allowed = [tag.strip(" '") for tag in str(context["expected_tags"]).split(",")]
+        tag = str(context["tag"])
+        message = f"no such {context['discriminator']} '{tag}'{did_you_mean(tag, allowed)}"
     elif detail["type"] == "missing":
         message = "this key is required and missing"
     elif "input" in detail and isinstance(detail["input"], str | int | float | bool):

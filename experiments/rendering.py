@@ -3,14 +3,26 @@
 from pathlib import PurePath
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 
 from experiments.base import Declaration
+from experiments.errors import did_you_mean
 
 PROFILES = ("real", "model", "SL", "AL", "SL_ease", "AL_ease")
 """Built-in blink profiles: recorded, PCA model, and the four textbook curves (symmetric or asymmetric,
 linear or eased). Any other value names a CSV file of closure samples beside the experiment's TOML."""
 
+
+def _known_profile(value: str) -> str:
+    if value in PROFILES or PurePath(value).suffix == ".csv":
+        return value
+    near = did_you_mean(value, PROFILES)
+    raise ValueError(
+        f"expected one of {', '.join(PROFILES)} or a .csv file of closure samples, got '{value}'{near}"
+    )
+
+
+ProfileName = Annotated[str, AfterValidator(_known_profile)]
 Fps = Annotated[int, Field(ge=24, le=60)]
 
 
@@ -30,7 +42,7 @@ class RenderSettings(Declaration):
     """
 
     character: str = "photorealistic"
-    profile: str = "real"
+    profile: ProfileName = "real"
     duration_frames: Annotated[float, Field(ge=3, le=60)] | None = None
     amplitude: Literal["full", "natural"] = "full"
     motion_blur: bool = True
@@ -40,21 +52,12 @@ class RenderSettings(Declaration):
     width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
     height_px: Annotated[int, Field(ge=120, le=720, multiple_of=2)] = 360
 
-    @field_validator("profile")
-    @classmethod
-    def _profile_known(cls, value: str) -> str:
-        if value in PROFILES or PurePath(value).suffix == ".csv":
-            return value
-        raise ValueError(
-            f"expected one of {', '.join(PROFILES)} or a .csv file of closure samples, got '{value}'"
-        )
-
 
 class RenderOverrides(Declaration):
     """What one level changes of the experiment's `RenderSettings`; None leaves it as it is."""
 
     character: str | None = None
-    profile: str | None = None
+    profile: ProfileName | None = None
     duration_frames: Annotated[float, Field(ge=3, le=60)] | None = None
     amplitude: Literal["full", "natural"] | None = None
     motion_blur: bool | None = None

@@ -1,0 +1,46 @@
+# The two commands a newcomer needs are `make run` and `make test`. `make help` lists the rest.
+.DEFAULT_GOAL := help
+SHELL := /bin/bash
+PYTHON ?= python3
+BIN := .venv/bin
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+.PHONY: help run test check setup setup-test lock format types bench load screenshots docs api clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
+
+run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
+	@$(BIN)/python tools/first_run.py
+
+test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
+	@cd frontend && npm run --silent test
+	@$(BIN)/python -m pytest $(TESTS)
+
+check: setup-test ## lint and type-check everything, import rules, lock files
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check -q .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+	@cd frontend && npm run --silent typecheck
+	@$(BIN)/python tools/check_lock_files.py
+
+setup:
+	@$(PYTHON) tools/setup.py run
+
+setup-test:
+	@$(PYTHON) tools/setup.py test
+
+format: ## rewrite the Python in the house format
+	@$(BIN)/ruff format -q . && $(BIN)/ruff check --fix -q .
+
+lock: ## resolve the Python dependencies again, with hashes
+	@$(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o requirements.lock
+	@$(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 --all-extras --group dev pyproject.toml -o requirements-dev.lock
+	@$(BIN)/python tools/check_lock_files.py
+
+bench: setup-test ## speed, memory and accuracy, as figures and ratios
+	@$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' --benchmark-only --benchmark-columns=min,median,rounds -s
+
+clean: ## remove what the build made (never the data folder)
+	@rm -rf frontend/dist frontend/node_modules .mypy_cache .ruff_cache .import_linter_cache build *.egg-info

@@ -1,0 +1,45 @@
+from collections import Counter
+
+import pytest
+
+from experiments import design
+from experiments.load import load_experiment
+
+# design counts of Trutoiu et al. (2011), sections 4.1-4.3
+PAPER = {
+    "exp1": {"cells": 16, "clips": 320, "trials": 320, "blocks": [160, 160], "minutes": 40},
+    "exp2": {"cells": 40, "clips": 200, "trials": 400, "blocks": [100, 100, 100, 100], "minutes": 30},
+    "exp3": {"cells": 4, "clips": 80, "trials": 160, "blocks": [80, 80], "minutes": 20},
+}
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_shipped_experiments_have_the_papers_counts(name: str) -> None:
+    experiment = load_experiment(name)
+    assert len(design.cells(experiment)) == PAPER[name]["cells"]
+    assert len(set(design.clips(experiment))) == PAPER[name]["clips"]
+    assert design.trials_per_participant(experiment) == PAPER[name]["trials"]
+    assert [len(block.clips) for block in design.blocks(experiment)] == PAPER[name]["blocks"]
+    assert design.expected_minutes(experiment) == pytest.approx(PAPER[name]["minutes"], abs=1)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_blocks_show_every_clip_the_declared_number_of_times(name: str) -> None:
+    experiment = load_experiment(name)
+    shown = Counter(clip for block in design.blocks(experiment) for clip in block.clips)
+    assert set(shown) == set(design.clips(experiment))
+    assert set(shown.values()) == {experiment.blocks.repeats}
+
+
+def test_exemplars_are_shared_across_cells_that_do_not_own_them() -> None:
+    exp1, exp3 = load_experiment("exp1"), load_experiment("exp3")
+    assert len({design.exemplar_key(exp1, clip) for clip in design.clips(exp1)}) == 40  # 20 real, 20 model
+    assert len({design.exemplar_key(exp3, clip) for clip in design.clips(exp3)}) == 20
+
+
+def test_levels_override_the_render_settings() -> None:
+    exp2 = load_experiment("exp2")
+    spec = next(c for c in design.clips(exp2) if c.cell == "AL_ease/11/cartoon")
+    settings = design.render_settings(exp2, spec)
+    assert (settings.profile, settings.duration_frames, settings.character) == ("AL_ease", 11, "cartoon")
+    assert (settings.amplitude, settings.motion_blur) == ("full", True)

