@@ -1,0 +1,127 @@
+"""Cut the profiles of measured blinks out of their series, one eye at a time or both together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stimuli_builder.blinks.labelling import LabelOptions, RefusedMinimum, find_blinks
+from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300, measure_blinks, smoothed
+from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
+from stimuli_builder.blinks.series import BlinkSeries
+
+
+@dataclass(frozen=True, eq=False)
+class EyeBlinks:
+    """The blinks of one column: the series, its filtered distance, every blink measured, what was refused."""
+
+    series: BlinkSeries
+    smooth: Array
+    blinks: tuple[MeasuredBlink, ...]
+    refused: tuple[RefusedMinimum, ...]
+
+
+def blinks_of(
+    series: BlinkSeries,
+    options: LabelOptions,
+    *,
+    closed_distance: float | None = None,
+    complete_from: float = 0.95,
+) -> EyeBlinks:
+    """Label and measure one series."""
+    labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)
+    measured = measure_blinks(
+        series, labelled, options, closed_distance=closed_distance, complete_from=complete_from
+    )
+    return EyeBlinks(series, smoothed(series, options), tuple(measured), tuple(refused))
+
+
+def eye_profile(eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye: Eye | None) -> BlinkProfile:
+    """Return the profile of one blink of one eye, closure at 300 fps."""
+    closure, minimum = closure_at_300(
+        eye_blinks.smooth,
+        eye_blinks.series.fps,
+        blink.onset_frame,
+        blink.minimum_frame,
+        blink.end_frame,
+        blink.closed_distance,
+    )
+    return BlinkProfile(
+        profile_id=f"{recording}-{eye or eye_blinks.series.column}-{blink.number:02d}",
+        closure=np.round(closure, 6),
+        minimum_index=minimum,
+        down_frames=minimum,
+        up_frames=closure.size - 1 - minimum,
+        amplitude=round(float(closure.max()), 6),
+        source=f"recorded: {recording}, {eye_blinks.series.column}, blink {blink.number}",
+        eye=eye,
+        recording=recording,
+        rest_before=round(blink.rest_before, 6),
+        rest_after=round(blink.rest_after, 6),
+    )
+
+
+def eye_profiles(eye_blinks: EyeBlinks, recording: str, eye: Eye | None) -> list[BlinkProfile]:
+    """Return the profile of every blink of one eye."""
+    return [eye_profile(eye_blinks, blink, recording, eye) for blink in eye_blinks.blinks]
+
+
+def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
+    """Match the blinks of both eyes whose minima lie within the other's blink; each is used once."""
+    free = list(right.blinks)
+    pairs = []
+    for blink in left.blinks:
+        for other in free:
+            if (
+                blink.onset_frame < other.minimum_frame < blink.end_frame
+                and other.onset_frame < blink.minimum_frame < other.end_frame
+            ):
+                pairs.append((blink, other))
+                free.remove(other)
+                break
+    return pairs
+
+
+def paired_profiles(left: EyeBlinks, right: EyeBlinks, recording: str) -> list[BlinkProfile]:
+    """Return the blinks seen in both eyes, from the earlier onset to the later end, the minimum the left eye's."""
+    profiles = []
+    for number, (blink, other) in enumerate(paired_blinks(left, right), start=1):
+        onset = min(blink.onset_frame, other.onset_frame)
+        end = max(blink.end_frame, other.end_frame)
+        both = [
+            closure_at_300(eye.smooth, eye.series.fps, onset, blink.minimum_frame, end, row.closed_distance)
+            for eye, row in ((left, blink), (right, other))
+        ]
+        closure, minimum = both[0]
+        profiles.append(
+            BlinkProfile(
+                profile_id=f"{recording}-both-{number:02d}",
+                closure=np.round(closure, 6),
+                closure_other=np.round(both[1][0], 6),
+                minimum_index=minimum,
+                down_frames=minimum,
+                up_frames=closure.size - 1 - minimum,
+                amplitude=round(float(closure.max()), 6),
+                source=f"recorded: {recording}, both eyes, blinks {blink.number} and {other.number}",
+                eye="both",
+                recording=recording,
+                rest_before=round(blink.rest_before, 6),
+                rest_after=round(blink.rest_after, 6),
+            )
+        )
+    return profiles
+
+
+def all_profiles(
+    eyes: Sequence[EyeBlinks], recording: str, names: Sequence[Eye | None]
+) -> list[BlinkProfile]:
+    """Return every eye's profiles, then those of both eyes together where there are two."""
+    profiles = [
+        profile
+        for eye_blinks, name in zip(eyes, names, strict=True)
+        for profile in eye_profiles(eye_blinks, recording, name)
+    ]
+    if set(names) == {"left", "right"} and len(eyes) == 2:
+        by_name = dict(zip(names, eyes, strict=True))
+        profiles += paired_profiles(by_name["left"], by_name["right"], recording)
+    return profiles

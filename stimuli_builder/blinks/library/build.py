@@ -1,0 +1,104 @@
+"""Measure the shipped library anew from its recordings."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.blink_model import BlinkModel
+from stimuli_builder.blinks.extract import all_profiles, blinks_of
+from stimuli_builder.blinks.files import written_whole
+from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS, LabelOptions
+from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, Recording
+from stimuli_builder.blinks.profile import BlinkProfile
+from stimuli_builder.blinks.series import read_series
+
+PROFILE_COLUMNS = (
+    "profile_id",
+    "recording",
+    "person",
+    "eye",
+    "fps",
+    "samples",
+    "minimum_index",
+    "down_frames",
+    "up_frames",
+    "amplitude",
+    "rest_before",
+    "rest_after",
+    "source",
+    "licence",
+)
+
+
+def recorded_profiles(
+    recording: Recording, data: Path | None, options: LabelOptions = DEFAULT_OPTIONS
+) -> list[BlinkProfile]:
+    """Label one recording and return its profiles."""
+    folders = ([] if data is None else [data]) + [LIBRARY_FOLDER]
+    path = next((folder / recording.file for folder in folders if (folder / recording.file).is_file()), None)
+    if path is None:
+        raise InputError(
+            f"recording {recording.name}: {recording.file} is not in {data}; say with --data where it is"
+        )
+    eyes = [
+        blinks_of(series, options)
+        for series in read_series(path, list(recording.columns.values()), recording.fps)
+    ]
+    return all_profiles(eyes, recording.name, list(recording.columns))
+
+
+def write_profiles(
+    folder: Path, profiles: Sequence[BlinkProfile], recordings: Sequence[Recording]
+) -> tuple[Path, Path]:
+    """Write profiles.csv (a row a profile) and closures.csv (a row a sample at 300 fps)."""
+    by_name = {recording.name: recording for recording in recordings}
+    rows = [_row(profile, by_name[profile.recording]) for profile in profiles]
+    table, closures = folder / "profiles.csv", folder / "closures.csv"
+    with written_whole(table) as partial_table, written_whole(closures) as partial_closures:
+        pd.DataFrame(rows, columns=list(PROFILE_COLUMNS)).to_csv(
+            partial_table, index=False, lineterminator="\n"
+        )
+        pd.concat([_samples(profile) for profile in profiles]).to_csv(
+            partial_closures, index=False, lineterminator="\n"
+        )
+    return table, closures
+
+
+def write_model(folder: Path, profiles: Sequence[BlinkProfile], components: int = 5) -> BlinkModel:
+    """Fit the model to the one-eye profiles and write model.json."""
+    model = BlinkModel.fit([p for p in profiles if p.closure_other is None], components)
+    model.save(folder / "model.json")
+    return model
+
+
+def _row(profile: BlinkProfile, recording: Recording) -> dict[str, object]:
+    return {
+        "profile_id": profile.profile_id,
+        "recording": profile.recording,
+        "person": recording.person,
+        "eye": profile.eye,
+        "fps": profile.fps,
+        "samples": profile.closure.size,
+        "minimum_index": profile.minimum_index,
+        "down_frames": profile.down_frames,
+        "up_frames": profile.up_frames,
+        "amplitude": profile.amplitude,
+        "rest_before": profile.rest_before,
+        "rest_after": profile.rest_after,
+        "source": profile.source,
+        "licence": recording.licence,
+    }
+
+
+def _samples(profile: BlinkProfile) -> pd.DataFrame:
+    other = [None] * profile.closure.size if profile.closure_other is None else profile.closure_other
+    return pd.DataFrame(
+        {
+            "profile_id": profile.profile_id,
+            "sample": range(profile.closure.size),
+            "closure": profile.closure,
+            "closure_other": other,
+        }
+    )

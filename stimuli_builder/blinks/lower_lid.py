@@ -1,0 +1,41 @@
+"""How the lower eyelid moves in a blink: from physiology where no track measured it."""
+
+from zlib import crc32
+
+import numpy as np
+
+from stimuli_builder.blinks.profile import Array, BlinkProfile
+
+VERTICAL_RANGE_MM = (0.5, 1.0)
+HORIZONTAL_RANGE_MM = (1.4, 5.0)
+
+
+def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
+    """Vertical and horizontal displacement of the lower lid during a blink, in mm.
+
+    Blinks move the lower lid 1.4-5 mm towards the nose and lift it 0.5-1 mm (Doane 1980, Am J
+    Ophthalmol 89:507, ranges as in design/tracking.md), along with the upper lid. Peak displacements of
+    a complete blink are drawn from these ranges, the horizontal one evenly on a log scale, by the profile's
+    name: the same profile always moves alike. Both follow the closure; the nasal slide lags it slightly, as
+    its own muscle pull is slower to relax.
+
+    Returns
+    -------
+    vertical_mm, horizontal_mm : (n,) float64 arrays
+        Upwards and towards the nose positive, 0 with the eye open, at the profile's rate.
+    """
+    rng = np.random.default_rng(crc32(profile.profile_id.encode()))
+    vertical_peak_mm = rng.uniform(*VERTICAL_RANGE_MM)
+    horizontal_peak_mm = float(np.exp(rng.uniform(*np.log(HORIZONTAL_RANGE_MM))))
+    return vertical_peak_mm * profile.closure, horizontal_peak_mm * _lagged(profile.closure, profile.fps)
+
+
+def _lagged(closure: Array, fps: int, time_constant_ms: float = 10.0) -> Array:
+    """First-order lag of the closure, starting from its first sample; never above the closure's peak."""
+    share = 1.0 - np.exp(-1000.0 / (fps * time_constant_ms))
+    lagged = np.empty_like(closure)
+    level = float(closure[0])
+    for index, value in enumerate(closure):
+        level += share * (float(value) - level)
+        lagged[index] = level
+    return lagged

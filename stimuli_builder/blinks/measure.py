@@ -1,0 +1,184 @@
+"""Measure labelled blinks: phases, amplitude, velocities, complete or partial; and cut their profiles."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.labelling import LabelledBlink, LabelOptions
+from stimuli_builder.blinks.profile import PROFILE_FPS, Array
+from stimuli_builder.blinks.series import BlinkSeries, box_filter, scaled_frames
+
+COMPLETE_FROM = 0.95
+"""Closure from which a blink counts as complete: less is left open than the closed reference is sure of."""
+DEEPEST_SHARE = 0.25
+
+
+@dataclass(frozen=True)
+class MeasuredBlink:
+    """One row of the blinks table; frames are the series' own, distances in its unit.
+
+    The closure takes the line from the onset to the end as open (0) and the recording's closed level as
+    closed (1). Velocities are of the filtered distance, in its unit a second. `amplitude` is the fall from
+    the open level to the minimum, `closure` the greatest closure. `rest_before` and `rest_after` tell how
+    far the resting eye was open before and after: closure against the wider of the two.
+    """
+
+    number: int
+    column: str
+    onset_frame: int
+    minimum_frame: int
+    end_frame: int
+    onset_s: float
+    minimum_s: float
+    end_s: float
+    down_frames: int
+    up_frames: int
+    down_ms: float
+    up_ms: float
+    duration_ms: float
+    open_distance: float
+    minimum_distance: float
+    closed_distance: float
+    amplitude: float
+    closure: float
+    complete: bool
+    peak_closing_velocity: float
+    peak_opening_velocity: float
+    rest_before: float
+    rest_after: float
+    touches_neighbour: bool
+
+
+def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | None = None) -> float:
+    """Distance at lid contact: the value given, else the mean minimum of the recording's deepest blinks.
+
+    An eye aspect ratio does not reach 0 when the lids meet; a quarter of the blinks, the deepest, two at
+    least, tell where it stops. A single deepest one would be ruled by noise.
+    """
+    if given is not None:
+        return given
+    minima = np.sort([smooth[blink.minimum] for blink in blinks])
+    count = min(len(minima), max(2, round(DEEPEST_SHARE * len(minima))))
+    return float(minima[:count].mean())
+
+
+def smoothed(series: BlinkSeries, options: LabelOptions) -> Array:
+    """Filtered distance; frames next to a gap are averaged over what there is, gaps stay NaN."""
+    known = np.isfinite(series.distance)
+    width = scaled_frames(options.filter_frames, series.fps)
+    if known.all():
+        return box_filter(series.distance, width)
+    share = box_filter(known.astype(np.float64), width)
+    total = box_filter(np.where(known, series.distance, 0.0), width)
+    return np.where(known, total / np.maximum(share, 1e-12), np.nan)
+
+
+def measure_blinks(
+    series: BlinkSeries,
+    blinks: Sequence[LabelledBlink],
+    options: LabelOptions,
+    *,
+    closed_distance: float | None = None,
+    complete_from: float = COMPLETE_FROM,
+) -> list[MeasuredBlink]:
+    """Measure every labelled blink; the closed level is the recording's (see `closed_level`)."""
+    if not blinks:
+        return []
+    smooth = smoothed(series, options)
+    closed = closed_level(smooth, blinks, closed_distance)
+    velocity = np.gradient(smooth) * series.fps
+    return [
+        _measure(series, blink, number, smooth, velocity, closed, complete_from)
+        for number, blink in enumerate(blinks, start=1)
+    ]
+
+
+def _measure(
+    series: BlinkSeries,
+    blink: LabelledBlink,
+    number: int,
+    smooth: Array,
+    velocity: Array,
+    closed: float,
+    complete_from: float,
+) -> MeasuredBlink:
+    fps, least = series.fps, float(smooth[blink.minimum])
+    open_distance = float(open_line(smooth, blink.onset, blink.end)(blink.minimum))
+    if not closed < min(smooth[blink.onset], smooth[blink.end]):
+        raise InputError(
+            f"the closed distance {closed:g} is not below the opening {open_distance:g} of blink {number}"
+        )
+    closure = min(1.0, (open_distance - least) / (open_distance - closed))
+    down, up = blink.minimum - blink.onset, blink.end - blink.minimum
+    before, after = _rests(smooth, blink, fps, closed)
+    return MeasuredBlink(
+        number=number,
+        column=series.column,
+        onset_frame=blink.onset,
+        minimum_frame=blink.minimum,
+        end_frame=blink.end,
+        onset_s=blink.onset / fps,
+        minimum_s=blink.minimum / fps,
+        end_s=blink.end / fps,
+        down_frames=down,
+        up_frames=up,
+        down_ms=down * 1000 / fps,
+        up_ms=up * 1000 / fps,
+        duration_ms=(down + up) * 1000 / fps,
+        open_distance=open_distance,
+        minimum_distance=least,
+        closed_distance=closed,
+        amplitude=open_distance - least,
+        closure=closure,
+        complete=closure >= complete_from,
+        peak_closing_velocity=float(-velocity[blink.onset : blink.minimum + 1].min()),
+        peak_opening_velocity=float(velocity[blink.minimum : blink.end + 1].max()),
+        rest_before=before,
+        rest_after=after,
+        touches_neighbour=blink.touches_neighbour,
+    )
+
+
+def open_line(smooth: Array, onset: int, end: int) -> Callable[[Array | int], Array]:
+    """Open level during a blink: the line from its onset to its end.
+
+    Eyes seldom reopen exactly as far as they were; against this line a profile begins and ends at 0,
+    and nothing jumps where an animation joins it to an open eye.
+    """
+    levels = [float(smooth[onset]), float(smooth[end])]
+    return lambda frame: np.interp(frame, [onset, end], levels)
+
+
+def _rests(smooth: Array, blink: LabelledBlink, fps: float, closed: float) -> tuple[float, float]:
+    """Closure of the resting eye before and after, against the wider: medians over 100 frames at 300 fps,
+    the later ones 50 frames after the end, when the lid has settled."""
+    reach, pause = round(scaled_frames(100, fps)), round(scaled_frames(50, fps))
+    before = smooth[max(0, blink.onset - reach) : blink.onset + 1]
+    after = smooth[blink.end + pause : blink.end + pause + reach]
+    levels = [
+        float(np.nanmedian(before)),
+        float(np.nanmedian(after)) if np.isfinite(after).any() else float(smooth[blink.end]),
+    ]
+    widest = max(levels)
+    return (widest - levels[0]) / (widest - closed), (widest - levels[1]) / (widest - closed)
+
+
+def closure_at_300(
+    smooth: Array, fps: float, onset: int, minimum: int, end: int, closed: float
+) -> tuple[Array, int]:
+    """Closure of one blink at 300 fps, and the sample of its minimum.
+
+    A spline passes through the filtered frames; its time is laid so that the minimum falls on a sample and
+    the ends on the last whole ones. Closure is cut to [0, 1]: a lid that met the other moves no further.
+    """
+    before = max(1, round((minimum - onset) * PROFILE_FPS / fps))
+    after = max(1, round((end - minimum) * PROFILE_FPS / fps))
+    frames = np.concatenate(
+        [np.linspace(onset, minimum, before + 1), np.linspace(minimum, end, after + 1)[1:]]
+    )
+    spline = PchipInterpolator(np.arange(onset, end + 1), smooth[onset : end + 1])
+    level = open_line(smooth, onset, end)(frames)
+    return np.clip((level - spline(frames)) / (level - closed), 0.0, 1.0), before

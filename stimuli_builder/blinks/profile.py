@@ -1,0 +1,193 @@
+"""What a blink profile is: closure over time at 300 fps, and what may be done to it."""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from experiments.errors import InputError
+
+PROFILE_FPS = 300
+SAMPLES_PER_CLIP_FRAME = 10
+"""Samples at 300 fps in one frame of a 30 fps clip."""
+
+Array = NDArray[np.float64]
+Eye = Literal["left", "right", "both"]
+
+
+@dataclass(frozen=True, eq=False)
+class BlinkProfile:
+    """One blink: closure (0 open, 1 closed) sampled at `fps`.
+
+    `closure[onset_index]` is the onset and `closure[end_index]` the end; a few samples of the start
+    level may come before it (sub-frame phase). Recorded profiles begin and end at 0 (open), textbook
+    ones at their start and end level: whoever renders a lead-in holds `closure[0]`, and in the lead-out
+    `closure[-1]`; then nothing jumps.
+
+    Parameters
+    ----------
+    profile_id : str
+        Unique name, stable over versions.
+    closure : (n,) float64 array
+        Closure in [0, 1]; the left eye's where `closure_other` is given.
+    minimum_index : int
+        Sample of the least inter-eyelid distance, that is of the greatest closure.
+    down_frames, up_frames : int
+        Lengths of the closing and the opening phase in samples.
+    amplitude : float
+        Range of the closure, 1 for an eye that closes fully from fully open.
+    source : str
+        Where it comes from, in words: a recording, the model, a textbook curve.
+    eye : {"left", "right", "both"} or None
+        Eye measured; "both" where `closure_other` holds the right one, None for made curves.
+    recording : str
+        Name of the recording, empty for made curves.
+    closure_other : (n,) float64 array or None
+        The second (right) eye on the same samples, where both were measured.
+    rest_before, rest_after : float
+        Closure of the resting eye before and after the recorded blink, against the wider of the two.
+    """
+
+    profile_id: str
+    closure: Array
+    minimum_index: int
+    down_frames: int
+    up_frames: int
+    amplitude: float
+    source: str
+    eye: Eye | None = None
+    recording: str = ""
+    closure_other: Array | None = None
+    rest_before: float = 0.0
+    rest_after: float = 0.0
+    fps: int = field(default=PROFILE_FPS)
+
+    def __post_init__(self) -> None:
+        for name in ("closure", "closure_other"):
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, _checked_closure(self.profile_id, values))
+        if self.closure_other is not None and self.closure_other.shape != self.closure.shape:
+            raise InputError(
+                f"profile {self.profile_id}: both eyes need the same number of samples, "
+                f"got {self.closure.size} and {self.closure_other.size}"
+            )
+        if not 0 <= self.onset_index < self.minimum_index < self.end_index < self.closure.size:
+            raise InputError(
+                f"profile {self.profile_id}: onset {self.onset_index}, minimum {self.minimum_index} and end "
+                f"{self.end_index} must lie in this order within {self.closure.size} samples"
+            )
+
+    @property
+    def onset_index(self) -> int:
+        """Sample at which the eye begins to close."""
+        return self.minimum_index - self.down_frames
+
+    @property
+    def end_index(self) -> int:
+        """Sample at which the eye is open again."""
+        return self.minimum_index + self.up_frames
+
+    @property
+    def duration_frames_30fps(self) -> float:
+        """Length from onset to end in frames of a 30 fps clip."""
+        return (self.down_frames + self.up_frames) * 30 / self.fps
+
+    @property
+    def duration_ms(self) -> float:
+        """Length from onset to end in milliseconds."""
+        return (self.down_frames + self.up_frames) * 1000 / self.fps
+
+    @property
+    def down_fraction(self) -> float:
+        """Share of the blink spent closing, 0.5 for a symmetric blink."""
+        return self.down_frames / (self.down_frames + self.up_frames)
+
+
+def _checked_closure(profile_id: str, values: Array) -> Array:
+    closure = np.array(values, dtype=np.float64)
+    if closure.ndim != 1 or closure.size < 3:
+        raise InputError(f"profile {profile_id}: closure needs 3 or more samples, got shape {closure.shape}")
+    if not np.isfinite(closure).all() or closure.min() < -1e-9 or closure.max() > 1 + 1e-9:
+        raise InputError(
+            f"profile {profile_id}: closure must lie between 0 and 1, got {closure.min():g} to {closure.max():g}"
+        )
+    closure = np.clip(closure, 0.0, 1.0)
+    closure.setflags(write=False)
+    return closure
+
+
+def to_full_closure(profile: BlinkProfile) -> BlinkProfile:
+    """Return the profile stretched so that it reaches closure 1 exactly (condition FC).
+
+    The paper (4.1.1) says of FC that the distance is divided by its maximum and of NC by its range.
+    Dividing by the maximum keeps whatever opening is left at the minimum; only subtracting the minimum
+    and dividing by the range shuts the eye. The names decide: FC is the one that closes. With
+    d' = (d - min d) / (max d - min d), closure' = 1 - d' is the closure less its least value, over its range.
+    """
+    stretched = _stretch(profile.closure)
+    other = None if profile.closure_other is None else _stretch(profile.closure_other)
+    return replace(profile, closure=stretched, closure_other=other, amplitude=1.0)
+
+
+def to_natural_closure(profile: BlinkProfile) -> BlinkProfile:
+    """Return the profile as measured (condition NC): a blink that stayed partly open stays so.
+
+    See `to_full_closure` for why this is not the range normalisation the paper's text names.
+    """
+    return profile
+
+
+def _stretch(closure: Array) -> Array:
+    low, high = float(closure.min()), float(closure.max())
+    if high - low < 1e-6:
+        raise InputError("a profile without any closing cannot be stretched to full closure")
+    return (closure - low) / (high - low)
+
+
+def phase_spline(samples: Array, length_frames: int) -> Array:
+    """Resample one phase to `length_frames` intervals, ends kept.
+
+    A monotone cubic spline (PCHIP) passes through every sample and never overshoots, so a closing
+    phase stays one.
+    """
+    spline = PchipInterpolator(np.linspace(0.0, 1.0, samples.size), samples)
+    return np.asarray(spline(np.linspace(0.0, 1.0, length_frames + 1)), dtype=np.float64)
+
+
+def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> BlinkProfile:
+    """Return the profile from onset to end with phases of the given lengths (samples at its own rate)."""
+    if down_frames < 1 or up_frames < 1:
+        raise InputError(f"a phase needs one frame or more, got {down_frames} down and {up_frames} up")
+
+    def rescale(closure: Array) -> Array:
+        middle = profile.minimum_index
+        down = phase_spline(closure[profile.onset_index : middle + 1], down_frames)
+        up = phase_spline(closure[middle : profile.end_index + 1], up_frames)
+        return np.concatenate([down, up[1:]])
+
+    other = None if profile.closure_other is None else rescale(profile.closure_other)
+    return replace(
+        profile,
+        closure=rescale(profile.closure),
+        closure_other=other,
+        minimum_index=down_frames,
+        down_frames=down_frames,
+        up_frames=up_frames,
+    )
+
+
+def split_duration(duration_frames_30fps: float, down_fraction: float) -> tuple[int, int]:
+    """Share a duration, in frames at 30 fps, between the phases: whole samples at 300 fps, one or more each."""
+    total = round(duration_frames_30fps * SAMPLES_PER_CLIP_FRAME)
+    if not 2 <= total <= 3000:
+        raise InputError(f"a blink lasts between 0.2 and 300 frames at 30 fps, got {duration_frames_30fps:g}")
+    down = min(max(round(total * down_fraction), 1), total - 1)
+    return down, total - down
+
+
+def resample(profile: BlinkProfile, duration_frames_30fps: float) -> BlinkProfile:
+    """Return the profile scaled to a duration in frames at 30 fps, the ratio of its phases kept."""
+    return resample_phases(profile, *split_duration(duration_frames_30fps, profile.down_fraction))

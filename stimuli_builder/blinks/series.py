@@ -1,0 +1,203 @@
+"""An inter-eyelid distance over time: read from a plain series or a track, filtered with zero phase."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.blinks.profile import Array
+
+PAPER_FPS = 300
+DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
+INDEX_COLUMNS = ("frame", "time_s", "valid")
+MOST_BRIDGED_MS = 1000 / 30
+"""Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
+
+
+@dataclass(frozen=True, eq=False)
+class BlinkSeries:
+    """One eye's distance over a recording.
+
+    Parameters
+    ----------
+    distance : (n,) float64 array
+        Inter-eyelid distance or eye aspect ratio; NaN only where `allow_gaps` left long gaps.
+    fps : float
+    column : str
+        Column it came from.
+    is_px : bool
+        Whether the distance is in pixels.
+    bridged_frames, missing_frames : int
+        Frames filled by a straight line, and frames left out of the labelling.
+    """
+
+    distance: Array
+    fps: float
+    column: str
+    is_px: bool
+    bridged_frames: int = 0
+    missing_frames: int = 0
+
+
+def scaled_frames(paper_frames: float, fps: float) -> float:
+    """Turn a number of frames of the paper (300 fps) into one at `fps`."""
+    return paper_frames * fps / PAPER_FPS
+
+
+def box_filter(values: Array, width_frames: float) -> Array:
+    """Zero-phase moving average over a window of `width_frames`, which need not be a whole number.
+
+    The window is centred, its outermost samples weighted by the part of them it covers: so ten frames
+    at 300 fps stay 33 ms at any rate. Ends are averaged over the part of the window that exists.
+    """
+    reach = int(np.ceil((width_frames - 1) / 2))
+    if reach <= 0:
+        return values.copy()
+    edge = (width_frames - (2 * reach - 1)) / 2
+    kernel = np.ones(2 * reach + 1)
+    kernel[0] = kernel[-1] = edge
+    weight = np.convolve(np.ones(values.size), kernel, mode="full")[reach : reach + values.size]
+    return np.asarray(np.convolve(values, kernel, mode="full")[reach : reach + values.size] / weight)
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Read a series or track CSV, column names stripped of blanks."""
+    try:
+        table = pd.read_csv(path, skipinitialspace=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: expected a CSV table with a header line ({str(error).strip()})") from error
+    table.columns = table.columns.str.strip()
+    if table.empty:
+        raise InputError(f"{path}: the table has a header but no rows")
+    return table
+
+
+def choose_columns(table: pd.DataFrame, wanted: Sequence[str], path: Path) -> list[str]:
+    """Return the distance columns to label: the wanted ones, else a track's, else the only candidate."""
+    candidates = [
+        str(name)
+        for name in table.columns
+        if table[name].dtype.kind == "f" and str(name).lower() not in INDEX_COLUMNS
+    ]
+    for name in wanted:
+        if name not in table.columns:
+            raise InputError(f"{path.name} has no column '{name}'{did_you_mean(name, candidates)}")
+    if wanted:
+        return list(wanted)
+    tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
+    if tracked:
+        return tracked
+    if len(candidates) == 1:
+        return candidates
+    raise InputError(
+        f"{path.name}: say with --column which series to label; it has {', '.join(candidates) or 'no numbers'}"
+    )
+
+
+def series_fps(table: pd.DataFrame, fps: float | None, path: Path) -> float:
+    """Return the frame rate: given, or measured from `time_s`; both must agree within 1%."""
+    measured = _measured_fps(table, path) if "time_s" in table.columns else None
+    if fps is None and measured is None:
+        raise InputError(f"{path.name} has no column time_s: give the recording's rate with --fps")
+    if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
+        raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
+    if fps is not None and measured is not None and abs(fps / measured - 1) > 0.01:
+        raise InputError(
+            f"--fps {fps:g} contradicts {path.name}, whose time_s runs at {measured:.2f}; leave --fps out"
+        )
+    rate = measured if measured is not None else fps
+    if rate is None or rate < 10:
+        raise InputError(
+            f"{path.name}: at {rate} frames a second no blink can be seen; 10 or more are needed"
+        )
+    return rate
+
+
+def _measured_fps(table: pd.DataFrame, path: Path) -> float:
+    times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
+    steps = np.diff(times)
+    if steps.size == 0 or not np.isfinite(steps).all() or (steps <= 0).any():
+        raise InputError(f"{path.name}: time_s must be complete and increase from row to row")
+    step = float(np.median(steps))
+    if (np.abs(steps / step - 1) > 0.2).any():
+        row = int(np.argmax(np.abs(steps / step - 1) > 0.2)) + 2
+        raise InputError(
+            f"{path.name}: time_s is uneven (row {row}); the labels need a constant frame rate: resample it first"
+        )
+    return float((times.size - 1) / (times[-1] - times[0]))
+
+
+def make_series(
+    table: pd.DataFrame, column: str, fps: float, path: Path, *, allow_gaps: bool | None = None
+) -> BlinkSeries:
+    """Return one column as a series: short gaps bridged, long ones kept as NaN or refused.
+
+    `allow_gaps` left at None means: in a track yes (its frames without a fit say why), in a plain series no.
+    """
+    if table[column].dtype.kind not in "fiu":
+        raise InputError(f"{path.name}: column '{column}' must hold numbers, got {table[column].iloc[0]!r}")
+    values = table[column].to_numpy(dtype=np.float64)
+    values = np.where(np.isfinite(values), values, np.nan)
+    if values.size < scaled_frames(300, fps):
+        raise InputError(
+            f"{path.name}: {values.size} frames at {fps:g} fps are less than a second: nothing to label"
+        )
+    if not np.isfinite(values).any():
+        raise InputError(f"{path.name}: column '{column}' is empty")
+    gaps_allowed = (
+        column in DISTANCE_COLUMNS and "status" in table.columns if allow_gaps is None else allow_gaps
+    )
+    filled, bridged = bridge_gaps(values, round(MOST_BRIDGED_MS * fps / 1000))
+    missing = np.isnan(filled)
+    if missing.any() and not gaps_allowed:
+        first = int(np.argmax(missing))
+        rest = missing[first:]
+        length = int(np.argmin(rest)) if not rest.all() else rest.size
+        raise InputError(
+            f"{path.name}: column '{column}' has no value on {length} frames from row {first + 2} on; "
+            "mend the series, or label round the gap with --allow-gaps"
+        )
+    if np.nanmin(values) < 0:
+        raise InputError(f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g})")
+    return BlinkSeries(
+        distance=filled,
+        fps=fps,
+        column=column,
+        is_px=column.endswith("_px"),
+        bridged_frames=bridged,
+        missing_frames=int(missing.sum()),
+    )
+
+
+def bridge_gaps(values: Array, most_frames: int) -> tuple[Array, int]:
+    """Fill inner runs of NaN no longer than `most_frames` by straight lines; return the number filled."""
+    filled = values.copy()
+    bridged = 0
+    for start, stop in runs(np.isnan(values)):
+        if start > 0 and stop < values.size and stop - start <= most_frames:
+            share = np.arange(1, stop - start + 1) / (stop - start + 1)
+            filled[start:stop] = values[start - 1] + share * (values[stop] - values[start - 1])
+            bridged += stop - start
+    return filled, bridged
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the (start, stop) of every run of True."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
+
+
+def read_series(
+    path: Path, columns: Sequence[str] = (), fps: float | None = None, *, allow_gaps: bool | None = None
+) -> list[BlinkSeries]:
+    """Read the distance columns of a plain series or track CSV, see `choose_columns` and `series_fps`."""
+    table = read_table(path)
+    chosen = choose_columns(table, columns, path)
+    rate = series_fps(table, fps, path)
+    return [make_series(table, column, rate, path, allow_gaps=allow_gaps) for column in chosen]
