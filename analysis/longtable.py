@@ -1,5 +1,6 @@
 """From long rows, one a trial, to the participants x cells table of means that the ANOVA takes."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -12,6 +13,8 @@ from experiments.errors import InputError, did_you_mean
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+_NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?")
 
 NAMED_CELLS = 5
 """How many empty cells a one-line message names before it counts the rest."""
@@ -49,10 +52,9 @@ class CellTable:
 
 def natural_order(names: Sequence[str]) -> list[str]:
     """Sort names: by value where all are numbers, else by text without case; independent of row order."""
-    try:
+    if all(_NUMBER.fullmatch(name) for name in names):
         return sorted(names, key=lambda name: (float(name), name))
-    except ValueError:
-        return sorted(names, key=lambda name: (name.casefold(), name))
+    return sorted(names, key=lambda name: (name.casefold(), name))
 
 
 def cell_table(
@@ -87,7 +89,8 @@ def cell_table(
     values = rows[rating].to_numpy(dtype=np.float64)
     slot, slots = who * int(np.prod(shape)) + cell, len(people) * int(np.prod(shape))
     counts = np.bincount(slot, minlength=slots).reshape(len(people), *shape)
-    sums = np.bincount(slot, weights=values, minlength=slots).reshape(counts.shape)
+    sums: Floats = np.zeros(counts.shape)
+    sums += np.bincount(slot, weights=values, minlength=slots).reshape(counts.shape)
     return _complete(
         people, list(within), [names for _, names in coded], sums, counts, _constant(who, values)
     )
@@ -96,6 +99,8 @@ def cell_table(
 def _codes(column: pd.Series, declared: Sequence[str] | None, name: str) -> tuple[Integers, list[str]]:
     """Codes of a column into its sorted (or declared) names."""
     codes, found = pd.factorize(column)
+    if (codes < 0).any():
+        raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
     texts = [str(text) for text in found]
     names = natural_order(texts) if declared is None else [str(level) for level in declared]
     position = {text: i for i, text in enumerate(names)}
