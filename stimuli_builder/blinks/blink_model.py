@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.files import written_whole
 from stimuli_builder.blinks.profile import (
     PROFILE_FPS,
     Array,
@@ -18,6 +17,7 @@ from stimuli_builder.blinks.profile import (
     resample,
     resample_phases,
 )
+from stimuli_builder.files import whole_text
 
 SHIPPED_MODEL = Path(__file__).parent / "library" / "model.json"
 MODEL_FORMAT = "palpebra-blink-model-1"
@@ -175,8 +175,8 @@ class BlinkModel:
             "mean": np.round(self.mean, 9).tolist(),
             "components": np.round(self.components, 9).tolist(),
         }
-        with written_whole(path) as partial:
-            partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        with whole_text(path) as stream:
+            stream.write(json.dumps(content, indent=1) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> "BlinkModel":

@@ -83,7 +83,7 @@ def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink
 
 
 def paired_profiles(left: EyeBlinks, right: EyeBlinks, recording: str) -> list[BlinkProfile]:
-    """Return the blinks seen in both eyes, from the earlier onset to the later end, the minimum the left eye's."""
+    """Return the blinks seen in both eyes: earlier onset, later end, the minimum the left eye's."""
     profiles = []
     for number, (blink, other) in enumerate(paired_blinks(left, right), start=1):
         onset = min(blink.onset_frame, other.onset_frame)

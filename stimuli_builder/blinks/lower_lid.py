@@ -1,4 +1,4 @@
-"""How the lower eyelid moves in a blink: from physiology where no track measured it."""
+"""How the lower eyelid moves in a blink: as a track measured it, else from physiology."""
 
 from zlib import crc32
 
@@ -13,7 +13,7 @@ HORIZONTAL_RANGE_MM = (1.4, 5.0)
 def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
     """Vertical and horizontal displacement of the lower lid during a blink, in mm.
 
-    Blinks move the lower lid 1.4-5 mm towards the nose and lift it 0.5-1 mm (Doane 1980, Am J
+    Measured where a track gave it. Else from physiology: blinks move the lower lid 1.4-5 mm towards the nose and lift it 0.5-1 mm (Doane 1980, Am J
     Ophthalmol 89:507, ranges as in design/tracking.md), along with the upper lid. Peak displacements of
     a complete blink are drawn from these ranges, the horizontal one evenly on a log scale, by the profile's
     name: the same profile always moves alike. Both follow the closure; the nasal slide lags it slightly, as
@@ -24,6 +24,8 @@ def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
     vertical_mm, horizontal_mm : (n,) float64 arrays
         Upwards and towards the nose positive, 0 with the eye open, at the profile's rate.
     """
+    if profile.lower_up_mm is not None and profile.lower_nasal_mm is not None:
+        return profile.lower_up_mm, profile.lower_nasal_mm
     rng = np.random.default_rng(crc32(profile.profile_id.encode()))
     vertical_peak_mm = rng.uniform(*VERTICAL_RANGE_MM)
     horizontal_peak_mm = float(np.exp(rng.uniform(*np.log(HORIZONTAL_RANGE_MM))))

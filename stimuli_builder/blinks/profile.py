@@ -46,6 +46,8 @@ class BlinkProfile:
         Name of the recording, empty for made curves.
     closure_other : (n,) float64 array or None
         The second (right) eye on the same samples, where both were measured.
+    lower_up_mm, lower_nasal_mm : (n,) float64 array or None
+        Measured motion of the lower lid in mm, where a track gave it; see `lower_lid.lower_lid`.
     rest_before, rest_after : float
         Closure of the resting eye before and after the recorded blink, against the wider of the two.
     """
@@ -60,6 +62,8 @@ class BlinkProfile:
     eye: Eye | None = None
     recording: str = ""
     closure_other: Array | None = None
+    lower_up_mm: Array | None = None
+    lower_nasal_mm: Array | None = None
     rest_before: float = 0.0
     rest_after: float = 0.0
     fps: int = field(default=PROFILE_FPS)
@@ -69,11 +73,13 @@ class BlinkProfile:
             values = getattr(self, name)
             if values is not None:
                 object.__setattr__(self, name, _checked_closure(self.profile_id, values))
-        if self.closure_other is not None and self.closure_other.shape != self.closure.shape:
-            raise InputError(
-                f"profile {self.profile_id}: both eyes need the same number of samples, "
-                f"got {self.closure.size} and {self.closure_other.size}"
-            )
+        for name in ("closure_other", "lower_up_mm", "lower_nasal_mm"):
+            values = getattr(self, name)
+            if values is not None and values.shape != self.closure.shape:
+                raise InputError(
+                    f"profile {self.profile_id}: {name} needs as many samples as closure, "
+                    f"{self.closure.size}; got {values.size}"
+                )
         if not 0 <= self.onset_index < self.minimum_index < self.end_index < self.closure.size:
             raise InputError(
                 f"profile {self.profile_id}: onset {self.onset_index}, minimum {self.minimum_index} and end "
@@ -111,9 +117,8 @@ def _checked_closure(profile_id: str, values: Array) -> Array:
     if closure.ndim != 1 or closure.size < 3:
         raise InputError(f"profile {profile_id}: closure needs 3 or more samples, got shape {closure.shape}")
     if not np.isfinite(closure).all() or closure.min() < -1e-9 or closure.max() > 1 + 1e-9:
-        raise InputError(
-            f"profile {profile_id}: closure must lie between 0 and 1, got {closure.min():g} to {closure.max():g}"
-        )
+        low, high = closure.min(), closure.max()
+        raise InputError(f"profile {profile_id}: closure must lie between 0 and 1, got {low:g} to {high:g}")
     closure = np.clip(closure, 0.0, 1.0)
     closure.setflags(write=False)
     return closure
@@ -168,11 +173,15 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
         up = phase_spline(closure[middle : profile.end_index + 1], up_frames)
         return np.concatenate([down, up[1:]])
 
-    other = None if profile.closure_other is None else rescale(profile.closure_other)
+    def rescale_if(values: Array | None) -> Array | None:
+        return None if values is None else rescale(values)
+
     return replace(
         profile,
         closure=rescale(profile.closure),
-        closure_other=other,
+        closure_other=rescale_if(profile.closure_other),
+        lower_up_mm=rescale_if(profile.lower_up_mm),
+        lower_nasal_mm=rescale_if(profile.lower_nasal_mm),
         minimum_index=down_frames,
         down_frames=down_frames,
         up_frames=up_frames,
@@ -180,7 +189,7 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
 
 
 def split_duration(duration_frames_30fps: float, down_fraction: float) -> tuple[int, int]:
-    """Share a duration, in frames at 30 fps, between the phases: whole samples at 300 fps, one or more each."""
+    """Share a duration, in frames at 30 fps, between the phases: whole 300 fps samples, one or more each."""
     total = round(duration_frames_30fps * SAMPLES_PER_CLIP_FRAME)
     if not 2 <= total <= 3000:
         raise InputError(f"a blink lasts between 0.2 and 300 frames at 30 fps, got {duration_frames_30fps:g}")

@@ -95,9 +95,8 @@ def choose_columns(table: pd.DataFrame, wanted: Sequence[str], path: Path) -> li
         return tracked
     if len(candidates) == 1:
         return candidates
-    raise InputError(
-        f"{path.name}: say with --column which series to label; it has {', '.join(candidates) or 'no numbers'}"
-    )
+    there = ", ".join(candidates) or "no numbers"
+    raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
 
 
 def series_fps(table: pd.DataFrame, fps: float | None, path: Path) -> float:
@@ -128,7 +127,7 @@ def _measured_fps(table: pd.DataFrame, path: Path) -> float:
     if (np.abs(steps / step - 1) > 0.2).any():
         row = int(np.argmax(np.abs(steps / step - 1) > 0.2)) + 2
         raise InputError(
-            f"{path.name}: time_s is uneven (row {row}); the labels need a constant frame rate: resample it first"
+            f"{path.name}: time_s is uneven (row {row}); labels need a constant frame rate: resample it first"
         )
     return float((times.size - 1) / (times[-1] - times[0]))
 

@@ -8,11 +8,12 @@ import pandas as pd
 from experiments.errors import InputError
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.extract import all_profiles, blinks_of
-from stimuli_builder.blinks.files import written_whole
 from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS, LabelOptions
 from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, Recording
 from stimuli_builder.blinks.profile import BlinkProfile
+from stimuli_builder.blinks.profile_table import write_profile_table
 from stimuli_builder.blinks.series import read_series
+from stimuli_builder.files import whole_file
 
 PROFILE_COLUMNS = (
     "profile_id",
@@ -56,13 +57,9 @@ def write_profiles(
     by_name = {recording.name: recording for recording in recordings}
     rows = [_row(profile, by_name[profile.recording]) for profile in profiles]
     table, closures = folder / "profiles.csv", folder / "closures.csv"
-    with written_whole(table) as partial_table, written_whole(closures) as partial_closures:
-        pd.DataFrame(rows, columns=list(PROFILE_COLUMNS)).to_csv(
-            partial_table, index=False, lineterminator="\n"
-        )
-        pd.concat([_samples(profile) for profile in profiles]).to_csv(
-            partial_closures, index=False, lineterminator="\n"
-        )
+    write_profile_table(closures, profiles)
+    with whole_file(table) as partial:
+        pd.DataFrame(rows, columns=list(PROFILE_COLUMNS)).to_csv(partial, index=False, lineterminator="\n")
     return table, closures
 
 
@@ -90,15 +87,3 @@ def _row(profile: BlinkProfile, recording: Recording) -> dict[str, object]:
         "source": profile.source,
         "licence": recording.licence,
     }
-
-
-def _samples(profile: BlinkProfile) -> pd.DataFrame:
-    other = [None] * profile.closure.size if profile.closure_other is None else profile.closure_other
-    return pd.DataFrame(
-        {
-            "profile_id": profile.profile_id,
-            "sample": range(profile.closure.size),
-            "closure": profile.closure,
-            "closure_other": other,
-        }
-    )

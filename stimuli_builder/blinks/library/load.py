@@ -1,14 +1,18 @@
 """Read the shipped profile tables."""
 
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from experiments.errors import InputError
 from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER
 from stimuli_builder.blinks.profile import Array, BlinkProfile
+from stimuli_builder.blinks.profile_table import read_profile_table
+from stimuli_builder.blinks.series import read_table
 
 
 def load_library(*, paired: bool = False) -> tuple[BlinkProfile, ...]:
@@ -32,16 +36,11 @@ def recorded_rests() -> Array:
 
 
 def read_profiles(profiles_csv: Path, closures_csv: Path) -> tuple[BlinkProfile, ...]:
-    """Read a table of profiles and the closures that belong to it, see `stimuli profiles build`."""
+    """Read the library's table of profiles with the samples that belong to it (`stimuli profiles build`)."""
+    samples = {profile.profile_id: profile for profile in read_profile_table(closures_csv)}
+    rows = read_table(profiles_csv).to_dict("records")
     try:
-        rows = pd.read_csv(profiles_csv, keep_default_na=False)
-        samples = pd.read_csv(closures_csv)
-        closures = {str(name): group for name, group in samples.groupby("profile_id", sort=False)}
-        return tuple(_profile(row, closures[str(row["profile_id"])]) for row in rows.to_dict("records"))
-    except OSError as error:
-        raise InputError(f"{error.filename}: cannot be read ({error.strerror})") from error
-    except InputError:
-        raise
+        return tuple(_with_origin(samples[str(row["profile_id"])], row) for row in rows)
     except (KeyError, ValueError) as error:
         raise InputError(
             f"{profiles_csv.name} and {closures_csv.name} do not belong together ({error}); "
@@ -49,21 +48,12 @@ def read_profiles(profiles_csv: Path, closures_csv: Path) -> tuple[BlinkProfile,
         ) from error
 
 
-def _profile(row: dict[str, object], samples: pd.DataFrame) -> BlinkProfile:
-    other = samples["closure_other"].to_numpy(dtype=np.float64)
-    eye = str(row["eye"])
-    return BlinkProfile(
-        profile_id=str(row["profile_id"]),
-        closure=samples["closure"].to_numpy(dtype=np.float64),
-        minimum_index=int(str(row["minimum_index"])),
-        down_frames=int(str(row["down_frames"])),
-        up_frames=int(str(row["up_frames"])),
-        amplitude=float(str(row["amplitude"])),
+def _with_origin(profile: BlinkProfile, row: Mapping[Hashable, Any]) -> BlinkProfile:
+    return replace(
+        profile,
+        amplitude=float(row["amplitude"]),
         source=str(row["source"]),
-        eye="left" if eye == "left" else "right" if eye == "right" else "both" if eye == "both" else None,
         recording=str(row["recording"]),
-        closure_other=None if np.isnan(other).any() else other,
-        rest_before=float(str(row["rest_before"])),
-        rest_after=float(str(row["rest_after"])),
-        fps=int(str(row["fps"])),
+        rest_before=float(row["rest_before"]),
+        rest_after=float(row["rest_after"]),
     )

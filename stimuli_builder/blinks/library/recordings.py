@@ -14,7 +14,7 @@ _EYES: dict[str, Eye] = {"left": "left", "right": "right"}
 
 @dataclass(frozen=True)
 class Recording:
-    """One recording: its file, the column of each eye, its rate (None: from time_s), who is seen, and rights."""
+    """One recording: file, column of each eye, rate (None: from time_s), who is seen, and rights."""
 
     name: str
     file: str
