@@ -1,1 +1,1 @@
-"""Database migrations (Alembic)."""
+"""Alembic migrations of the server's database."""

@@ -1,0 +1,38 @@
+"""What Alembic runs: the migrations on the connection it was given, or on the database of the settings."""
+
+from typing import Literal
+
+from alembic import context
+from sqlalchemy import Connection
+
+from server.db import open_database
+from server.models import Base, UtcDateTime
+from server.settings import Settings
+
+
+def render_item(kind: str, item: object, _context: object) -> str | Literal[False]:
+    # A migration must not change when the program's own column type does.
+    return "sa.DateTime(timezone=True)" if kind == "type" and isinstance(item, UtcDateTime) else False
+
+
+def migrate(connection: Connection) -> None:
+    context.configure(
+        connection=connection,
+        target_metadata=Base.metadata,
+        render_as_batch=connection.dialect.name == "sqlite",
+        compare_type=True,
+        render_item=render_item,
+    )
+    with context.begin_transaction():
+        context.run_migrations()
+
+
+given = context.config.attributes.get("connection")
+if given is not None:
+    migrate(given)
+else:
+    database = open_database(Settings())
+    with database.engine.connect() as connection:
+        migrate(connection)
+        connection.commit()
+    database.close()

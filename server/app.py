@@ -1,0 +1,52 @@
+"""The application: `create_app(settings)` puts routers, headers and error shape together."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+from fastapi import APIRouter, FastAPI
+from fastapi.routing import APIRoute
+
+from server import health, pages
+from server.clips import endpoints as clips
+from server.context import open_services
+from server.errors import install_error_handlers
+from server.middleware import BodyLimit, SecurityHeaders
+from server.settings import Settings
+
+
+def _routers() -> tuple[APIRouter, ...]:
+    """Every router; `pages` comes last because it answers for whole folders of addresses."""
+    return (health.router, clips.router, pages.router)
+
+
+def _operation_id(route: APIRoute) -> str:
+    return route.name
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The server with these settings (from the environment where None); the database must be migrated."""
+    services = open_services(settings or Settings())
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        yield
+        services.database.close()
+
+    app = FastAPI(
+        title="Palpebra",
+        version=version("palpebra"),
+        summary="Factorial rating studies of short clips: participants, ratings, data.",
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        generate_unique_id_function=_operation_id,
+        lifespan=lifespan,
+    )
+    app.state.services = services
+    for router in _routers():
+        app.include_router(router)
+    install_error_handlers(app)
+    app.add_middleware(BodyLimit, settings=services.settings)
+    app.add_middleware(SecurityHeaders, settings=services.settings)
+    return app

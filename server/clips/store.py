@@ -1,0 +1,90 @@
+"""Where clip bytes lie: named by their SHA-256, written once, never changed."""
+
+import hashlib
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+from experiments.errors import InputError
+
+CHUNK_BYTES = 1 << 20
+
+
+class ClipStore(Protocol):
+    """What a clip store does; the folder is one, an object store could be another."""
+
+    def add(self, source: BinaryIO, sha256: str) -> bool:
+        """Store a clip; True where it was not there yet. InputError where the bytes have another hash."""
+
+    def size(self, sha256: str) -> int | None:
+        """Length in bytes; None where there is no such clip."""
+
+    def read(self, sha256: str, start: int, end: int) -> Iterator[bytes]:
+        """Bytes from `start` up to but without `end`, in pieces."""
+
+    def remove(self, sha256: str) -> None:
+        """Delete a clip; nothing happens where it is not there."""
+
+
+class FolderStore:
+    """Clips in a folder, in sub-folders by the first two digits of the hash."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def path(self, sha256: str) -> Path:
+        """Where the clip lies or would lie."""
+        return self.folder / sha256[:2] / f"{sha256}.mp4"
+
+    def add(self, source: BinaryIO, sha256: str) -> bool:
+        """Copy to a temporary name, check the hash, then rename: no half clip is ever visible."""
+        final = self.path(sha256)
+        if final.is_file():
+            return False
+        final.parent.mkdir(parents=True, exist_ok=True)
+        temporary = final.with_name(f".{sha256[:16]}.{secrets.token_hex(4)}")
+        try:
+            found = _copy(source, temporary)
+            if found != sha256:
+                raise InputError(
+                    f"clip: expected sha256 {sha256[:12]}..., got {found[:12]}...; the file was changed"
+                )
+            temporary.replace(final)
+        finally:
+            temporary.unlink(missing_ok=True)
+        return True
+
+    def size(self, sha256: str) -> int | None:
+        """Length in bytes; None where there is no such clip."""
+        try:
+            return self.path(sha256).stat().st_size
+        except FileNotFoundError:
+            return None
+
+    def read(self, sha256: str, start: int, end: int) -> Iterator[bytes]:
+        """Bytes from `start` up to but without `end`, in pieces of at most a mebibyte."""
+        with self.path(sha256).open("rb") as stream:
+            stream.seek(start)
+            while start < end:
+                piece = stream.read(min(CHUNK_BYTES, end - start))
+                if not piece:
+                    return
+                start += len(piece)
+                yield piece
+
+    def remove(self, sha256: str) -> None:
+        """Delete a clip; nothing happens where it is not there."""
+        self.path(sha256).unlink(missing_ok=True)
+
+
+def _copy(source: BinaryIO, target: Path) -> str:
+    digest = hashlib.sha256()
+    with target.open("wb") as stream:
+        while piece := source.read(CHUNK_BYTES):
+            digest.update(piece)
+            stream.write(piece)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return digest.hexdigest()

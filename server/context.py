@@ -1,0 +1,54 @@
+"""What endpoints need of the running server, as FastAPI dependencies."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from server.clips.store import ClipStore, FolderStore
+from server.db import Database, open_database
+from server.rate_limit import RateLimit
+from server.settings import Settings
+
+
+@dataclass(frozen=True)
+class Services:
+    """The parts of one running server: made once by `create_app`."""
+
+    settings: Settings
+    database: Database
+    clips: ClipStore
+    run_starts: RateLimit
+    unsupported: RateLimit
+
+
+def open_services(settings: Settings) -> Services:
+    """Open database and clip store; nothing is migrated or started."""
+    return Services(
+        settings=settings,
+        database=open_database(settings),
+        clips=FolderStore(settings.clip_folder),
+        run_starts=RateLimit(settings.run_starts_per_minute),
+        unsupported=RateLimit(settings.unsupported_per_minute),
+    )
+
+
+# The dependencies are async so that FastAPI does not send them through its thread pool.
+async def _services(request: Request) -> Services:
+    services: Services = request.app.state.services
+    return services
+
+
+async def _settings(request: Request) -> Settings:
+    services: Services = request.app.state.services
+    return services.settings
+
+
+async def _database(request: Request) -> Database:
+    services: Services = request.app.state.services
+    return services.database
+
+
+ServicesDep = Annotated[Services, Depends(_services)]
+SettingsDep = Annotated[Settings, Depends(_settings)]
+DatabaseDep = Annotated[Database, Depends(_database)]

@@ -1,0 +1,89 @@
+"""The database: one code path for SQLite and PostgreSQL, and where transactions begin and end."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, create_engine, event
+from sqlalchemy.engine import Engine, make_url
+from sqlalchemy.orm import Session
+
+from server.settings import Settings
+
+BUSY_TIMEOUT_S = 30
+
+
+class Database:
+    """An engine and the two kinds of transaction: `read()` and `write()`.
+
+    One request uses one of them, and it ends before the answer is sent: what is acknowledged is committed.
+    """
+
+    def __init__(self, url: str, *, pool: int = 20) -> None:
+        self.url = make_url(url)
+        self.is_sqlite = self.url.get_backend_name() == "sqlite"
+        self.engine = _sqlite_engine(url, pool) if self.is_sqlite else _postgres_engine(url, pool)
+        self._write_engine = self.engine.execution_options(immediate=True)
+        # SQLite lets one writer in and makes the others poll; queueing them here keeps the wait short.
+        self._writer = threading.Lock() if self.is_sqlite else nullcontext()
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A session that only reads; rolled back at the end."""
+        with Session(self.engine, autoflush=False) as session:
+            yield session
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """A session committed at the end, rolled back where an exception leaves the block."""
+        with self._writer, Session(self._write_engine, expire_on_commit=False) as session:
+            yield session
+            session.commit()
+
+    def close(self) -> None:
+        """Close every pooled connection."""
+        self.engine.dispose()
+
+
+def open_database(settings: Settings) -> Database:
+    """The database of these settings; the folder of a SQLite file is made."""
+    url = make_url(settings.resolved_database_url)
+    if url.get_backend_name() == "sqlite" and url.database:
+        Path(url.database).parent.mkdir(parents=True, exist_ok=True)
+    return Database(settings.resolved_database_url, pool=settings.database_pool)
+
+
+def _postgres_engine(url: str, pool: int) -> Engine:
+    return create_engine(
+        url, pool_size=pool, max_overflow=pool, pool_timeout=BUSY_TIMEOUT_S, pool_pre_ping=True
+    )
+
+
+def _sqlite_engine(url: str, pool: int) -> Engine:
+    engine = create_engine(
+        url,
+        pool_size=pool,
+        max_overflow=2 * pool,
+        pool_timeout=BUSY_TIMEOUT_S,
+        connect_args={"timeout": BUSY_TIMEOUT_S, "check_same_thread": False},
+    )
+    event.listen(engine, "connect", _prepare_sqlite)
+    event.listen(engine, "begin", _begin_sqlite)
+    return engine
+
+
+def _prepare_sqlite(connection: Any, _record: object) -> None:
+    # The driver's own transaction handling would begin late and not for reads; `_begin_sqlite` does it.
+    connection.isolation_level = None
+    cursor = connection.cursor()
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "temp_store=MEMORY"):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    immediate = connection.get_execution_options().get("immediate", False)
+    # What reads before it writes must hold the write lock from its start, or it may have to fail.
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if immediate else "BEGIN")

@@ -1,0 +1,130 @@
+"""One base class, one handler, one JSON shape for everything the server refuses."""
+
+import logging
+from http import HTTPStatus
+from typing import Any, ClassVar
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from experiments.errors import InputError
+
+log = logging.getLogger("palpebra")
+
+
+class ApiError(Exception):
+    """Base of every refusal: a status, a code for programs, a sentence for people.
+
+    Subclasses set `status` and `code`; the message says what was expected, what came, and what to do.
+    """
+
+    status: ClassVar[int] = 400
+    code: ClassVar[str] = "bad_request"
+
+    def __init__(self, message: str, *, headers: dict[str, str] | None = None, **details: Any) -> None:
+        super().__init__(message)
+        self.message = message
+        self.details = details
+        self.headers = headers
+
+
+class NotFound(ApiError):
+    """Nothing is there."""
+
+    status = 404
+    code = "not_found"
+
+
+class Conflict(ApiError):
+    """The request contradicts what is stored."""
+
+    status = 409
+    code = "conflict"
+
+
+class TooManyRequests(ApiError):
+    """A rate limit was reached; try again later."""
+
+    status = 429
+    code = "too_many_requests"
+
+
+class Invalid(ApiError):
+    """The request is well-formed, but its content is not acceptable."""
+
+    status = 422
+    code = "invalid"
+
+
+class ErrorDetail(BaseModel):
+    """What went wrong."""
+
+    code: str = Field(description="Short name of the error, for programs.")
+    message: str = Field(description="One plain sentence: expected, got, what to do.")
+    details: dict[str, Any] = Field(description="Further values, by error code.")
+
+
+class ErrorBody(BaseModel):
+    """The shape of every answer with a status of 400 or above."""
+
+    error: ErrorDetail
+
+
+ERROR_RESPONSES: dict[int | str, dict[str, Any]] = {
+    "4XX": {"model": ErrorBody, "description": "Refused"},
+    "422": {"model": ErrorBody, "description": "The request's content is not acceptable"},
+}
+"""For `responses=` of a router: documents the one error shape in the OpenAPI schema."""
+
+
+def error_response(
+    status: int, code: str, message: str, details: dict[str, Any] | None = None, headers: Any = None
+) -> JSONResponse:
+    """The one JSON shape of a refusal."""
+    body = {"error": {"code": code, "message": message, "details": details or {}}}
+    return JSONResponse(body, status_code=status, headers=headers)
+
+
+def install_error_handlers(app: FastAPI) -> None:
+    """Make `app` answer every refusal in the one shape."""
+    app.add_exception_handler(ApiError, _refused)
+    app.add_exception_handler(InputError, _bad_input)
+    app.add_exception_handler(RequestValidationError, _not_valid)
+    app.add_exception_handler(HTTPException, _http)
+    app.add_exception_handler(Exception, _unexpected)
+
+
+async def _refused(_request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, ApiError):
+        raise error
+    return error_response(error.status, error.code, error.message, error.details, error.headers)
+
+
+async def _bad_input(_request: Request, error: Exception) -> JSONResponse:
+    return error_response(422, "bad_input", str(error))
+
+
+async def _not_valid(_request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, RequestValidationError):
+        raise error
+    problems = [
+        {"where": ".".join(str(part) for part in detail["loc"]), "problem": detail["msg"]}
+        for detail in error.errors()
+    ]
+    first = problems[0]
+    return error_response(422, "invalid", f"{first['where']}: {first['problem']}", {"problems": problems})
+
+
+async def _http(_request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, HTTPException):
+        raise error
+    code = HTTPStatus(error.status_code).name.lower()
+    return error_response(error.status_code, code, str(error.detail), headers=error.headers)
+
+
+async def _unexpected(_request: Request, error: Exception) -> JSONResponse:
+    log.error("request failed", exc_info=error)
+    return error_response(500, "internal", "The server failed; please try again.")

@@ -1,0 +1,48 @@
+"""All tables, one module a subject; import them from here."""
+
+from server.models.accounts import (
+    ROLES,
+    Account,
+    AdminSession,
+    ApiToken,
+    AuditEntry,
+    Invitation,
+    Job,
+)
+from server.models.base import Base, UtcDateTime
+from server.models.runs import (
+    RUN_STATUSES,
+    STAGES,
+    AssignedTrial,
+    Calibration,
+    FormAnswer,
+    Rating,
+    RunEvent,
+    StudyRun,
+)
+from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
+
+__all__ = [
+    "ROLES",
+    "RUN_STATUSES",
+    "STAGES",
+    "Account",
+    "AdminSession",
+    "ApiToken",
+    "AssignedTrial",
+    "AuditEntry",
+    "Base",
+    "Calibration",
+    "Clip",
+    "FormAnswer",
+    "Invitation",
+    "Job",
+    "Link",
+    "Rating",
+    "RunEvent",
+    "Study",
+    "StudyRun",
+    "StudyVersion",
+    "UtcDateTime",
+    "VersionClip",
+]

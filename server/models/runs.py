@@ -1,0 +1,200 @@
+"""A participant's visit: the run, its trials in stored order, ratings, events, forms and calibrations."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import BigInteger, ForeignKey, ForeignKeyConstraint, Index, String, Text, UniqueConstraint
+from sqlalchemy.orm import Mapped, mapped_column, relationship
+
+from server.clock import now
+from server.models.base import Base, one_of
+from server.models.studies import Link, Study, StudyVersion, VersionClip
+
+STAGES = (
+    "consent",
+    "forms_before",
+    "calibration",
+    "instructions",
+    "practice",
+    "trials",
+    "forms_after",
+    "debrief",
+    "done",
+)
+RUN_STATUSES = ("active", "complete", "screened_out", "withdrawn")
+
+
+class StudyRun(Base):
+    """A participant's visit. No internet address is stored, here or anywhere.
+
+    slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease.
+    seed: of the trial order. elapsed_ms: latest `time_elapsed`, where the clock goes on after a reload.
+    px_per_mm, viewing_distance_mm: of the latest calibration, copied to each rating.
+    erased_at: the person's data were deleted on request; the row stays so that counts stay right.
+    """
+
+    __tablename__ = "study_runs"
+    __table_args__ = (
+        one_of("phase", "pilot", "live"),
+        one_of("status", *RUN_STATUSES),
+        one_of("stage", *STAGES),
+        UniqueConstraint("link_id", "client_id"),
+        Index("ix_study_runs_study_id_status", "study_id", "status"),
+        Index("ix_study_runs_version_id_slot", "version_id", "slot"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    public_id: Mapped[str] = mapped_column(String(32), unique=True)
+    study_id: Mapped[int] = mapped_column(ForeignKey("studies.id"))
+    version_id: Mapped[int] = mapped_column(ForeignKey("study_versions.id"))
+    link_id: Mapped[int] = mapped_column(ForeignKey("links.id"))
+    client_id: Mapped[str] = mapped_column(String(40))
+    token_hash: Mapped[str] = mapped_column(String(64), unique=True)
+    participant: Mapped[str] = mapped_column(String(200))
+    phase: Mapped[str] = mapped_column(String(10))
+    synthetic: Mapped[bool] = mapped_column(default=False)
+    preview: Mapped[bool] = mapped_column(default=False)
+    status: Mapped[str] = mapped_column(String(20), default="active")
+    stage: Mapped[str] = mapped_column(String(20), default="consent")
+    language: Mapped[str] = mapped_column(String(10))
+    seed: Mapped[int] = mapped_column(BigInteger)
+    slot: Mapped[int]
+    trials_total: Mapped[int]
+    started_at: Mapped[datetime] = mapped_column(default=now)
+    last_seen_at: Mapped[datetime] = mapped_column(default=now)
+    consented_at: Mapped[datetime | None]
+    completed_at: Mapped[datetime | None]
+    completion_code: Mapped[str] = mapped_column(String(100), default="")
+    recruiter_parameters: Mapped[dict[str, str]] = mapped_column(default=dict)
+    device: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    elapsed_ms: Mapped[float] = mapped_column(default=0.0)
+    px_per_mm: Mapped[float | None]
+    viewing_distance_mm: Mapped[float | None]
+    excluded: Mapped[bool] = mapped_column(default=False)
+    exclusion_reason: Mapped[str | None] = mapped_column(Text)
+    excluded_at: Mapped[datetime | None]
+    excluded_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
+    erased_at: Mapped[datetime | None]
+
+    study: Mapped[Study] = relationship()
+    version: Mapped[StudyVersion] = relationship()
+    link: Mapped[Link] = relationship()
+
+
+class AssignedTrial(Base):
+    """One trial of a run in its stored order. Attention checks have no clip, but an expected response."""
+
+    __tablename__ = "assigned_trials"
+    __table_args__ = (one_of("kind", "practice", "main", "attention"),)
+
+    study_run_id: Mapped[int] = mapped_column(
+        ForeignKey("study_runs.id", ondelete="CASCADE"), primary_key=True, autoincrement=False
+    )
+    trial_index: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    kind: Mapped[str] = mapped_column(String(10))
+    block: Mapped[int]
+    block_label: Mapped[str] = mapped_column(String(60))
+    version_clip_id: Mapped[int | None] = mapped_column(ForeignKey("version_clips.id"))
+    expected_response: Mapped[int | None]
+
+    version_clip: Mapped[VersionClip | None] = relationship()
+
+
+class Rating(Base):
+    """One play of one trial with its answer. The view `ratings` shows it with everything around it.
+
+    rating_id: made by the client, so that sending it again stores it once. drawn: [frame index, time in ms]
+    of every drawn frame. response is None where the clip failed and could not be rated.
+    """
+
+    __tablename__ = "trial_ratings"
+    __table_args__ = (
+        UniqueConstraint("study_run_id", "trial_index", "play"),
+        UniqueConstraint("study_run_id", "rating_id"),
+        ForeignKeyConstraint(
+            ["study_run_id", "trial_index"],
+            ["assigned_trials.study_run_id", "assigned_trials.trial_index"],
+            ondelete="CASCADE",
+        ),
+        one_of("method", "webcodecs", "video", "none"),
+        one_of("verdict", "good", "flagged", "failed"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    rating_id: Mapped[str] = mapped_column(String(40))
+    study_run_id: Mapped[int]
+    trial_index: Mapped[int]
+    play: Mapped[int]
+    response: Mapped[int | None]
+    rt: Mapped[float | None]
+    rt_from_first_frame: Mapped[float | None]
+    time_elapsed: Mapped[float | None]
+    changes: Mapped[int] = mapped_column(default=0)
+    comment: Mapped[str | None] = mapped_column(Text)
+    answered_at_client: Mapped[datetime | None]
+    method: Mapped[str] = mapped_column(String(10))
+    clip_sha256: Mapped[str | None] = mapped_column(String(64))
+    key_to_first_frame_ms: Mapped[float | None]
+    frames_drawn: Mapped[int | None]
+    frames_late: Mapped[int | None]
+    frames_missing: Mapped[int | None]
+    longest_gap_ms: Mapped[float | None]
+    stalls: Mapped[int | None]
+    focus_lost: Mapped[bool | None]
+    refresh_rate_hz: Mapped[float | None]
+    device_pixel_ratio: Mapped[float | None]
+    px_per_mm: Mapped[float | None]
+    viewing_distance_mm: Mapped[float | None]
+    verdict: Mapped[str] = mapped_column(String(10))
+    verdict_rule: Mapped[str] = mapped_column(String(40), default="")
+    drawn: Mapped[list[list[float]] | None]
+    saved_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class RunEvent(Base):
+    """What happened around a run (or before one: `link_id` only, where a browser was refused)."""
+
+    __tablename__ = "run_events"
+    __table_args__ = (UniqueConstraint("study_run_id", "event_id"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    event_id: Mapped[str] = mapped_column(String(40))
+    study_run_id: Mapped[int | None] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"))
+    link_id: Mapped[int | None] = mapped_column(ForeignKey("links.id", ondelete="CASCADE"), index=True)
+    type: Mapped[str] = mapped_column(String(30))
+    at_client: Mapped[datetime | None]
+    received_at: Mapped[datetime] = mapped_column(default=now)
+    data: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class FormAnswer(Base):
+    """The answers of one declared form; the latest version a participant sent."""
+
+    __tablename__ = "form_answers"
+    __table_args__ = (UniqueConstraint("study_run_id", "form"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    study_run_id: Mapped[int] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"))
+    form: Mapped[str] = mapped_column(String(40))
+    answers: Mapped[dict[str, Any]]
+    saved_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class Calibration(Base):
+    """One size calibration of a run; every one is kept, the latest counts."""
+
+    __tablename__ = "calibrations"
+    __table_args__ = (one_of("method", "card", "ruler"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    study_run_id: Mapped[int] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"), index=True)
+    px_per_mm: Mapped[float]
+    method: Mapped[str] = mapped_column(String(10))
+    viewing_distance_mm: Mapped[float | None]
+    device_pixel_ratio: Mapped[float]
+    screen_width_px: Mapped[int]
+    screen_height_px: Mapped[int]
+    window_width_px: Mapped[int]
+    window_height_px: Mapped[int]
+    zoom: Mapped[float]
+    saved_at: Mapped[datetime] = mapped_column(default=now)

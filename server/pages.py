@@ -1,0 +1,81 @@
+"""The built pages: the participant's page and the admin site, with their hashed assets."""
+
+import mimetypes
+from functools import lru_cache
+from pathlib import Path
+
+from fastapi import APIRouter, Response
+from fastapi.responses import HTMLResponse, RedirectResponse
+
+from server.context import SettingsDep
+from server.errors import ApiError, NotFound
+from server.middleware import NONCE_PLACEHOLDER, content_security_policy, new_nonce
+
+router = APIRouter(include_in_schema=False)
+IMMUTABLE = "public, max-age=31536000, immutable"
+mimetypes.add_type("text/javascript", ".mjs")
+mimetypes.add_type("application/wasm", ".wasm")
+
+
+class PagesNotBuilt(ApiError):
+    """The frontend has not been built on this machine."""
+
+    status = 503
+    code = "pages_not_built"
+
+
+@router.get("/")
+def home() -> RedirectResponse:
+    """Send whoever comes without a link to the admin site."""
+    return RedirectResponse("/admin/")
+
+
+@router.get("/run/{link_token}")
+def participant_page(settings: SettingsDep, link_token: str) -> Response:  # noqa: ARG001 - read by the page
+    """The participant's page; it reads its link from the address."""
+    return _page(settings.frontend_folder / "participant")
+
+
+@router.get("/admin")
+@router.get("/admin/{rest:path}")
+def admin_page(settings: SettingsDep, rest: str = "") -> Response:  # noqa: ARG001 - read by the page
+    """The admin site; its own router reads the address."""
+    return _page(settings.frontend_folder / "admin")
+
+
+@router.get("/assets/{site}/{name:path}")
+def asset(settings: SettingsDep, site: str, name: str) -> Response:
+    """A file of a built page; its name carries a hash, so it may be cached for ever."""
+    folder = settings.frontend_folder.resolve()
+    for place in (
+        folder / site / "assets" / site / name,
+        folder / site / "assets" / name,
+        folder / site / name,
+    ):
+        path = place.resolve()
+        if path.is_file() and path.is_relative_to(folder):
+            kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+            return Response(
+                _read(path, path.stat().st_mtime_ns), media_type=kind, headers={"cache-control": IMMUTABLE}
+            )
+    raise NotFound(f"There is no file {name}.")
+
+
+def _page(folder: Path) -> Response:
+    index = folder / "index.html"
+    if not index.is_file():
+        raise PagesNotBuilt(
+            f"The page {folder.name} is not built; run `make run`, or `npm run build` in frontend."
+        )
+    text = _read(index, index.stat().st_mtime_ns).decode("utf-8")
+    headers = {"cache-control": "no-cache"}
+    if NONCE_PLACEHOLDER in text:
+        nonce = new_nonce()
+        text = text.replace(NONCE_PLACEHOLDER, nonce)
+        headers = {"cache-control": "no-store", "content-security-policy": content_security_policy(nonce)}
+    return HTMLResponse(text, headers=headers)
+
+
+@lru_cache(maxsize=256)
+def _read(path: Path, _changed_ns: int) -> bytes:
+    return path.read_bytes()

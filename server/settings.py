@@ -1,0 +1,113 @@
+"""Every setting of the server in one documented class, read from environment variables."""
+
+import os
+import secrets
+from functools import cached_property
+from pathlib import Path
+
+from pydantic import AliasChoices, Field, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+class Settings(BaseSettings):
+    """Settings of the server: `PALPEBRA_<NAME>` in the environment, and `DATABASE_URL`.
+
+    Times are minutes, hours or seconds as the name says; sizes are bytes.
+    """
+
+    model_config = SettingsConfigDict(env_prefix="PALPEBRA_", validate_by_name=True, extra="ignore")
+
+    data_folder: Path = Field(
+        default=Path("data"),
+        description="Folder of everything the server keeps: database, clips, secret key.",
+    )
+    database_url: str = Field(
+        default="",
+        validation_alias=AliasChoices("DATABASE_URL", "PALPEBRA_DATABASE_URL"),
+        description="Database: empty for SQLite in the data folder, or postgresql://user:password@host/name.",
+    )
+    database_pool: int = Field(default=20, ge=1, description="Database connections a worker may hold.")
+    public_url: str = Field(
+        default="http://localhost:8000", description="Address under which participants reach the server."
+    )
+    secret_key: str = Field(
+        default="",
+        description="Key from which tokens are derived; empty: data_folder/secret_key, made at first start.",
+    )
+    frontend_folder: Path = Field(
+        default=REPOSITORY / "frontend" / "dist",
+        description="Folder of the built pages (participant, admin).",
+    )
+    max_body_bytes: int = Field(default=512 * 1024, ge=1024, description="Largest request of a participant.")
+    max_upload_bytes: int = Field(
+        default=2 * 1024**3, ge=1024, description="Largest request of an experimenter, clip uploads included."
+    )
+    run_starts_per_minute: int = Field(
+        default=3000, ge=1, description="Runs that may be started by one link a minute, per worker."
+    )
+    unsupported_per_minute: int = Field(
+        default=300, ge=1, description="Reports of unsupported browsers accepted for one link a minute."
+    )
+    preview_keep_hours: float = Field(
+        default=24.0, gt=0, description="Hours after which the answers of a preview are deleted."
+    )
+    session_hours: float = Field(default=12.0, gt=0, description="Hours an experimenter stays signed in.")
+    logins_per_minute: int = Field(
+        default=10, ge=1, description="Sign-in attempts for one account a minute before it must wait."
+    )
+
+    @field_validator("database_url")
+    @classmethod
+    def _with_driver(cls, value: str) -> str:
+        for prefix in ("postgres://", "postgresql://"):
+            if value.startswith(prefix):
+                return "postgresql+psycopg://" + value.removeprefix(prefix)
+        return value
+
+    @field_validator("public_url")
+    @classmethod
+    def _without_slash(cls, value: str) -> str:
+        return value.rstrip("/")
+
+    @property
+    def is_https(self) -> bool:
+        """True where participants reach the server by https."""
+        return self.public_url.startswith("https://")
+
+    @property
+    def clip_folder(self) -> Path:
+        """Folder of the clips, each named by the hash of its bytes."""
+        return self.data_folder / "clips"
+
+    @property
+    def resolved_database_url(self) -> str:
+        """The database address, SQLite in the data folder where none is set."""
+        if self.database_url:
+            return self.database_url
+        return f"sqlite:///{(self.data_folder / 'palpebra.sqlite').resolve()}"
+
+    @cached_property
+    def key(self) -> bytes:
+        """The secret key; generated at first use with file mode 600 where none is set."""
+        if self.secret_key:
+            return self.secret_key.encode("utf-8")
+        return _kept_key(self.data_folder / "secret_key")
+
+
+def _kept_key(path: Path) -> bytes:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    if not path.is_file():
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "w", encoding="ascii") as stream:
+            stream.write(secrets.token_hex(32))
+        try:
+            # A link fails where another worker was first, so that all of them read one key.
+            os.link(temporary, path)
+        except FileExistsError:
+            pass
+        finally:
+            temporary.unlink()
+    return path.read_bytes().strip()
