@@ -1,0 +1,121 @@
+"""Fitting the coupled AAM to one picture: the steepest-descent algebra, and buffers kept between frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.tracking import kernels
+from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.video import Picture
+
+Values = NDArray[np.float64]
+
+STOP_PX = 0.03
+MOST_ITERATIONS = 30
+LIMIT_SD = 4.0
+RIDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where one fit ended.
+
+    Attributes
+    ----------
+    c, pose : coupled parameters (l,) and similarity (4,) in the reduced picture.
+    vertices : float32 (V, 2) in the reduced picture.
+    residuals : (eyes,) root mean square grey levels.
+    iterations : 0 if the fit broke down.
+    """
+
+    c: Values
+    pose: Values
+    vertices: NDArray[np.float32]
+    residuals: Values
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Algebra:
+    """What steepest-descent images SD = A_i - grad A(c) . dW/dc need, worked out once for a model.
+
+    Attributes
+    ----------
+    directions : float64 (K, V, 2); movement of the vertices per parameter, the 4 of the similarity last.
+    scales, centre : the similarity directions' norms (4,) and the centroid they turn about (2,).
+    hessian_forms : float64 (pairs, K, K); H(c) = sum over pairs i <= j of c_i c_j forms, with c_0 = 1.
+    """
+
+    directions: Values
+    scales: Values
+    centre: Values
+    hessian_forms: Values
+
+
+def similarity_directions(vertices: Values) -> tuple[Values, Values, Values]:
+    """Unit vertex movements (4, V, 2) of scale, turn, shift x and shift y, with their norms and centre."""
+    centre = vertices.mean(0)
+    from_centre = vertices - centre
+    turned = np.stack([-from_centre[:, 1], from_centre[:, 0]], axis=1)
+    one = np.ones(len(vertices))
+    basis = np.stack([from_centre, turned, np.outer(one, [1, 0]), np.outer(one, [0, 1])])
+    norms = np.sqrt((basis**2).sum((1, 2)))
+    return basis / norms[:, None, None], norms, centre
+
+
+def linear_parts(model: CoupledModel, gx: Values, gy: Values, directions: Values) -> Values:
+    """Steepest-descent images as a linear form in (1, c): (l + 1, K, N), SD = sum_i c_i parts[i]."""
+    mesh, modes = model.mesh, len(model.shape_modes)
+    corners = directions[:, mesh.triangles[mesh.triangle_of], :]
+    movement = np.einsum("nk,pnkd->pnd", mesh.weights(), corners)
+    parts = -(gx[:, None] * movement[None, :, :, 0] + gy[:, None] * movement[None, :, :, 1])
+    parts[0, :modes] += model.appearance[1:]
+    return np.asarray(parts)
+
+
+def work_out(model: CoupledModel) -> Algebra:
+    """Prepare everything that does not depend on the picture or on c."""
+    basis, scales, centre = similarity_directions(model.mesh.vertices)
+    directions = np.concatenate([model.shape_modes, basis])
+    gx, gy = model.mesh.gradient(model.appearance.astype(np.float64))
+    parts = linear_parts(model, gx, gy, directions)
+    count, size, pixels = parts.shape
+    rows = parts.reshape(count * size, pixels)
+    products = (rows @ rows.T).reshape(count, size, count, size).transpose(0, 2, 1, 3)
+    forms = [
+        products[i, j] + (products[j, i] if i < j else 0.0) for i in range(count) for j in range(i, count)
+    ]
+    return Algebra(directions, scales, centre, np.ascontiguousarray(forms))
+
+
+class Fitter:
+    """Fits one model to pictures; keeps its buffers, so use one for each thread."""
+
+    def __init__(self, model: CoupledModel, *, stop_px: float = STOP_PX, most: int = MOST_ITERATIONS, prior: float = 0.0):
+        self.model = model
+        self.stop_px, self.most = stop_px, most
+        algebra = work_out(model)
+        mesh, pixels = model.mesh, model.mesh.pixel_count
+        diagonal = np.diagonal(algebra.hessian_forms[0])[: len(model.sd)]
+        self._prior = RIDGE * diagonal + prior / np.maximum(model.sd, 1e-9) ** 2
+        self._fixed = (
+            mesh.vertices, model.shape_modes, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y,
+            mesh.eye_of, model.appearance, *mesh.neighbours(), algebra.hessian_forms,
+            algebra.directions, self._prior, LIMIT_SD * model.sd, algebra.scales, algebra.centre,
+        )  # fmt: skip
+        self._pixels = tuple(np.empty(pixels, np.float32) for _ in range(4))
+        self._vertices = np.empty(mesh.vertices.shape, np.float32)
+        self._squares = np.empty(model.eyes)
+
+    def fit(self, picture: Picture, c: Values, pose: Values, most: int | None = None) -> Fit:
+        """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""
+        c, pose = c.copy(), pose.copy()
+        iterations = kernels.fit(
+            picture, c, pose, most or self.most, self.stop_px, *self._fixed, *self._pixels, self._vertices, self._squares
+        )
+        return Fit(c, pose, self._vertices.copy(), np.sqrt(self._squares), int(iterations))
+
+    def error_picture(self) -> NDArray[np.float32]:
+        """Model minus picture over the base pixels (N,) at the last evaluation."""
+        return self._pixels[1].copy()

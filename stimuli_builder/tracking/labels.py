@@ -1,0 +1,195 @@
+"""Label files: landmarks a person placed on a few frames of a video, checked before anything is learned."""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.errors import InputError
+from stimuli_builder.files import whole_text
+from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, default_markers, eye_axis
+
+FEWEST_FRAMES = 3
+ORDER_TOLERANCE = 0.06
+CROSSING_TOLERANCE = 0.12
+POINT_ORDER = (
+    "9 points an eye, image-left eye first: outer canthus, 4 upper-lid points outer to inner, inner canthus, "
+    "3 lower-lid points inner to outer; image-right eye mirrored"
+)
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Landmarks of labelled frames.
+
+    Attributes
+    ----------
+    size_px : (width, height) of the video they belong to.
+    frames : frame number -> (18, 2) or, for one eye, (9, 2) points in pixels, x right, y down.
+    """
+
+    path: Path
+    size_px: tuple[int, int]
+    markers: LidMarkers
+    frames: dict[int, Points]
+
+    @property
+    def eyes(self) -> int:
+        """One or two."""
+        return self.markers.eyes
+
+
+def load_labels(path: Path, size_px: tuple[int, int] | None = None, frame_count: int | None = None) -> Labels:
+    """Read and check a label file.
+
+    Parameters
+    ----------
+    size_px, frame_count : of the video the labels are to be used with; checked where given.
+
+    Raises
+    ------
+    InputError
+        One line: what was expected, what came, in which frame.
+    """
+    document = _document(path)
+    width, height = _size(path, document)
+    if size_px is not None and (width, height) != tuple(size_px):
+        raise InputError(
+            f"{path}: labels were made on {width} x {height} pixels, the video has {size_px[0]} x {size_px[1]}; "
+            "use the video they were made on"
+        )
+    frames = _frames(path, document.get("frames"))
+    eyes = len(next(iter(frames.values()))) // EYE_POINTS
+    for number, points in frames.items():
+        _check_frame(f"{path}: frame {number}", points, eyes, (width, height))
+        if frame_count is not None and number >= frame_count:
+            raise InputError(f"{path}: frame {number} is labelled, the video ends at frame {frame_count - 1}")
+    return Labels(path, (width, height), _markers(path, document, eyes), frames)
+
+
+def _document(path: Path) -> dict[str, Any]:
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        seen = dict(pairs)
+        if len(seen) < len(pairs):
+            names = [name for name, _ in pairs]
+            twice = next(name for name in names if names.count(name) > 1)
+            raise InputError(f"{path}: '{twice}' occurs twice; keep one set of points for each frame")
+        return seen
+
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=unique)
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: expected a label file, found none; check the path") from error
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not a label file in JSON ({error})") from error
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: expected a JSON object with 'image_size_px' and 'frames'")
+    return document
+
+
+def _size(path: Path, document: dict[str, Any]) -> tuple[int, int]:
+    size = document.get("image_size_px")
+    whole = isinstance(size, list) and len(size) == 2 and all(type(side) is int and side > 0 for side in size)
+    if not whole:
+        raise InputError(f"{path}: expected 'image_size_px': [width, height], found {size!r}")
+    return size[0], size[1]  # type: ignore[index]
+
+
+def _frames(path: Path, found: object) -> dict[int, Points]:
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: expected 'frames': {{frame number: points}}, found {type(found).__name__}")
+    if len(found) < FEWEST_FRAMES:
+        raise InputError(
+            f"{path}: {len(found)} labelled frames, at least {FEWEST_FRAMES} are needed and about 20 are good"
+        )
+    frames: dict[int, Points] = {}
+    for key, points in found.items():
+        if not str(key).strip().isdecimal():
+            raise InputError(f"{path}: expected a frame number from 0, found '{key}'")
+        number = int(key)
+        if number in frames:
+            raise InputError(f"{path}: frame {number} occurs twice; keep one set of points for each frame")
+        frames[number] = _points(f"{path}: frame {number}", points)
+    counts = sorted({len(points) for points in frames.values()})
+    if len(counts) > 1:
+        raise InputError(f"{path}: some frames have {counts[0]} points and some {counts[-1]}; label all alike")
+    return dict(sorted(frames.items()))
+
+
+def _points(where: str, found: object) -> Points:
+    if not isinstance(found, list) or len(found) not in (EYE_POINTS, 2 * EYE_POINTS):
+        count = len(found) if isinstance(found, list) else "no list of"
+        raise InputError(f"{where}: expected 18 points (or 9 for one eye), found {count}")
+    for place, point in enumerate(found):
+        pair = isinstance(point, list) and len(point) == 2
+        if not pair or not all(type(v) in (int, float) and math.isfinite(v) for v in point):
+            raise InputError(f"{where}: point {place + 1} is {point!r}, expected [x, y] in pixels")
+    return np.asarray(found, np.float64)
+
+
+def _check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) -> None:
+    outside = np.flatnonzero(((points < -0.5) | (points > np.array(size) - 0.5)).any(1))
+    if len(outside):
+        x, y = points[outside[0]]
+        raise InputError(
+            f"{where}: point {outside[0] + 1} at ({x:g}, {y:g}) is outside the picture of {size[0]} x {size[1]}"
+        )
+    centres = [points[start : start + EYE_POINTS].mean(0)[0] for start in range(0, eyes * EYE_POINTS, EYE_POINTS)]
+    if centres != sorted(centres):
+        raise InputError(f"{where}: the eyes are swapped; points 1 to 9 belong to the image-left eye")
+    for eye in range(eyes):
+        _check_eye(where, points[EYE_POINTS * eye : EYE_POINTS * (eye + 1)], EYE_POINTS * eye)
+
+
+def _check_eye(where: str, eye: Points, first: int) -> None:
+    """Refuse an eye whose outline crosses itself by more than the wobble of a closed eye's labels."""
+    if np.hypot(*(eye[5] - eye[0])) < 4:
+        raise InputError(f"{where}: canthi {first + 1} and {first + 6} are under 4 px apart; label a larger eye")
+    along, down, width = eye_axis(eye)
+    x, y = (eye - eye[0]) @ along / width, (eye - eye[0]) @ down / width
+    sign = 1.0 if x[5] > 0 else -1.0
+    upper, lower = sign * x[:6], sign * x[[5, 6, 7, 8, 0]]
+    for order, names in ((np.diff(upper), range(6)), (-np.diff(lower), (5, 6, 7, 8, 0))):
+        wrong = np.flatnonzero(order < -ORDER_TOLERANCE)
+        if len(wrong):
+            a, b = list(names)[wrong[0]], list(names)[wrong[0] + 1]
+            raise InputError(f"{where}: points {first + a + 1} and {first + b + 1} cross; check the point order")
+    steps = np.argsort(upper)
+    upper_y = np.interp(sign * x[6:9], upper[steps], y[:6][steps])
+    crossed = np.flatnonzero(upper_y - y[6:9] > CROSSING_TOLERANCE)
+    if len(crossed):
+        raise InputError(f"{where}: lower-lid point {first + 7 + crossed[0]} lies above the upper lid; they cross")
+
+
+def _markers(path: Path, document: dict[str, Any], eyes: int) -> LidMarkers:
+    default = default_markers(eyes)
+    chosen = []
+    for key, fallback in (("mid_upper", default.upper), ("mid_lower", default.lower)):
+        given = document.get(key, [list(eye) for eye in fallback])
+        if not isinstance(given, list) or len(given) != eyes:
+            raise InputError(f"{path}: expected '{key}' with one list of points for each of {eyes} eyes")
+        for number, eye in enumerate(given):
+            allowed = range(EYE_POINTS * number, EYE_POINTS * (number + 1))
+            if not isinstance(eye, list) or not eye or any(type(p) is not int or p not in allowed for p in eye):
+                raise InputError(f"{path}: '{key}' names {eye!r}, expected points {allowed[0]} to {allowed[-1]}")
+        chosen.append(tuple(tuple(eye) for eye in given))
+    return LidMarkers(chosen[0], chosen[1])
+
+
+def save_labels(labels: Labels, video: str, origin: str) -> None:
+    """Write a label file at `labels.path`, in the form `load_labels` reads; points to 0.001 px."""
+    document = {
+        "video": video,
+        "image_size_px": list(labels.size_px),
+        "origin": origin,
+        "point_order": POINT_ORDER,
+        "mid_upper": [list(eye) for eye in labels.markers.upper],
+        "mid_lower": [list(eye) for eye in labels.markers.lower],
+        "frames": {str(number): np.round(points, 3).tolist() for number, points in labels.frames.items()},
+    }
+    with whole_text(labels.path) as stream:
+        json.dump(document, stream, indent=1)
+        stream.write("\n")
