@@ -5,10 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.errors import InputError
 from stimuli_builder.blinks.labelling import LabelOptions, RefusedMinimum, find_blinks
 from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300, measure_blinks, smoothed
 from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
 from stimuli_builder.blinks.series import BlinkSeries
+
+PLAUSIBLE_MEDIAN_MS = (100, 1000)
+"""The paper's blinks last 150-500 ms; a drowsy person's may take twice that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,35 @@ def blinks_of(
         series, labelled, options, closed_distance=closed_distance, complete_from=complete_from
     )
     return EyeBlinks(series, smoothed(series, options), tuple(measured), tuple(refused))
+
+
+def require_blinks(eye: EyeBlinks, options: LabelOptions, *, any_duration: bool = False) -> None:
+    """Refuse a series without a blink, or whose blinks last as none do: then its rate is wrong."""
+    column = eye.series.column
+    if not eye.blinks:
+        deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
+        lost = f"; {len(eye.refused)} minima could not be labelled" if eye.refused else ""
+        raise InputError(
+            f"no blink in column '{column}': its deepest dip is {deepest:.0%} of the opening, a blink needs "
+            f"{options.minimum_depth:.0%} (--minimum-depth){lost}; is the column right, and --fps?"
+        )
+    median_ms = float(np.median([blink.duration_ms for blink in eye.blinks]))
+    low, high = PLAUSIBLE_MEDIAN_MS
+    if not any_duration and not low <= median_ms <= high:
+        raise InputError(
+            f"at {eye.series.fps:g} fps the median blink of '{column}' would last {median_ms:.0f} ms, but "
+            f"blinks last {low} to {high}: is --fps right? (--any-duration takes them as they are)"
+        )
+
+
+def eye_of(column: str) -> Eye | None:
+    """Tell the eye from a column's name: left..., ..._l, right..., ..._r; else None."""
+    name = column.lower()
+    if name.startswith("left") or name.endswith(("_l", "_left")):
+        return "left"
+    if name.startswith("right") or name.endswith(("_r", "_right")):
+        return "right"
+    return None
 
 
 def eye_profile(eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye: Eye | None) -> BlinkProfile:

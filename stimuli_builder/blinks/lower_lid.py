@@ -13,11 +13,11 @@ HORIZONTAL_RANGE_MM = (1.4, 5.0)
 def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
     """Vertical and horizontal displacement of the lower lid during a blink, in mm.
 
-    Measured where a track gave it. Else from physiology: blinks move the lower lid 1.4-5 mm towards the nose and lift it 0.5-1 mm (Doane 1980, Am J
-    Ophthalmol 89:507, ranges as in design/tracking.md), along with the upper lid. Peak displacements of
-    a complete blink are drawn from these ranges, the horizontal one evenly on a log scale, by the profile's
-    name: the same profile always moves alike. Both follow the closure; the nasal slide lags it slightly, as
-    its own muscle pull is slower to relax.
+    Measured where a track gave it. Else from physiology: a blink slides the lower lid 1.4-5 mm towards the
+    nose and lifts it 0.5-1 mm, together with the upper lid (Doane 1980, Am J Ophthalmol 89:507, describes
+    the motion). The peaks for a complete blink are drawn from these ranges, the horizontal one evenly on a
+    log scale, by the profile's name: the same profile always moves alike. Both follow the closure; the
+    nasal slide lags it by some 10 ms, and nothing moves while the eye is open.
 
     Returns
     -------

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
@@ -143,14 +142,14 @@ def _measure(
     )
 
 
-def open_line(smooth: Array, onset: int, end: int) -> Callable[[ArrayLike], Array]:
+def open_line(smooth: Array, onset: int, end: int) -> Callable[[Array | int], Array]:
     """Open level during a blink: the line from its onset to its end.
 
     Eyes seldom reopen exactly as far as they were; against this line a profile begins and ends at 0,
     and nothing jumps where an animation joins it to an open eye.
     """
     levels = [float(smooth[onset]), float(smooth[end])]
-    return lambda frame: np.asarray(np.interp(frame, [onset, end], levels))
+    return lambda frame: np.asarray(np.interp(np.asarray(frame), [onset, end], levels))
 
 
 def _rests(smooth: Array, blink: LabelledBlink, fps: float, closed: float) -> tuple[float, float]:

@@ -15,7 +15,7 @@ EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "both": "both",
 TABLE_COLUMNS = {
     "profile_id": "name of the profile",
     "eye": "left, right, both (closure is the left eye's, closure_other the right one's) or empty",
-    "from_minimum_frames": "place of the sample in frames at 300 fps from the minimum: the first is the onset",
+    "from_minimum_frames": "place in frames at 300 fps from the minimum; the first sample is the onset",
     "closure": "0 open, 1 closed",
     "closure_other": "the same for the right eye where both were measured, else empty",
     "lower_up_mm": "lower lid's lift in mm where it was measured, else empty",
@@ -88,7 +88,7 @@ def _profile(profile_id: str, rows: pd.DataFrame, path: Path) -> BlinkProfile:
         up_frames=int(place[-1]),
         amplitude=float(np.ptp(closure)),
         source=f"profile table {path.name}",
-        eye=EYES.get(str(eye) if isinstance(eye, str) else "", None),
+        eye=EYES.get(str(eye) if isinstance(eye, str) else ""),
         recording=path.stem,
         fps=PROFILE_FPS,
     )

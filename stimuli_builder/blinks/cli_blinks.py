@@ -1,0 +1,133 @@
+"""`stimuli blinks`: label the blinks of a series or track."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from stimuli_builder.blinks.labelling import LabelOptions
+
+EXAMPLES = """
+Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.
+
+The series is a CSV with a column of distances; a track's distance columns are found by themselves.
+BLINKS.csv gets a row a blink; the blinks' profiles (closure at 300 fps) are written beside it, to fit a
+model to. Frame counts of the labelling rule are the paper's at 300 fps and scale with the rate.
+
+Examples:
+
+  stimuli blinks series.csv --column EAR_l --fps 240 --out blinks.csv
+
+  stimuli blinks series.csv --column EAR_l --column EAR_r --fps 240 --out blinks.csv --summary summary.json
+
+  stimuli blinks track.csv --out blinks.csv --plot series.png --plot-aligned aligned.png
+
+  stimuli blinks track.csv --out blinks.csv --review review.csv --reject "left_distance_px:3=talking"
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add `stimuli blinks` to `app`."""
+    app.command("blinks", help=EXAMPLES)(blinks)
+
+
+def blinks(
+    series: Annotated[Path, typer.Argument(help="Series or track CSV.")],
+    out: Annotated[Path, typer.Option(help="Blinks table to write (CSV).")],
+    column: Annotated[list[str] | None, typer.Option(help="Column to label; repeat for both eyes.")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frame rate; from the column time_s without it.")] = None,
+    profiles: Annotated[
+        Path | None,
+        typer.Option(help="Profiles table to write; OUT with the ending .profiles.csv without it."),
+    ] = None,
+    preset: Annotated[
+        str,
+        typer.Option(help="Values of the rule: 'relative' to the opening, or the 'paper' 's 0.1 px a frame."),
+    ] = "relative",
+    gradient: Annotated[
+        float | None, typer.Option(help="Gradient at rest, as part of the opening per frame at 300 fps.")
+    ] = None,
+    gradient_px: Annotated[
+        float | None, typer.Option(help="Gradient at rest in px per frame at 300 fps.")
+    ] = None,
+    opening_px: Annotated[
+        float | None, typer.Option(help="Opening in px that --gradient-px supposes for a series not in px.")
+    ] = None,
+    minimum_depth: Annotated[
+        float | None, typer.Option(help="Least depth of a blink as part of the opening [default: 0.23].")
+    ] = None,
+    closed: Annotated[
+        float | None, typer.Option(help="Distance at lid contact; from the deepest blinks without it.")
+    ] = None,
+    complete_from: Annotated[float, typer.Option(help="Closure from which a blink is complete.")] = 0.95,
+    allow_gaps: Annotated[
+        bool | None,
+        typer.Option(
+            "--allow-gaps/--no-gaps", help="Label round long gaps; tracks allow them, plain series not."
+        ),
+    ] = None,
+    any_duration: Annotated[bool, typer.Option("--any-duration", help="Take blinks of any length.")] = False,
+    summary: Annotated[Path | None, typer.Option(help="Summary to write (JSON).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="The labelled series as a figure (PNG, SVG, PDF).")
+    ] = None,
+    plot_aligned: Annotated[
+        Path | None, typer.Option(help="Aligned blinks and histograms as a figure.")
+    ] = None,
+    review: Annotated[
+        Path | None, typer.Option(help="Review file (CSV), kept up to date with decisions.")
+    ] = None,
+    reject: Annotated[
+        list[str] | None, typer.Option(help="N=reason or COLUMN:N=reason; needs --review.")
+    ] = None,
+    accept: Annotated[list[str] | None, typer.Option(help="N, N=reason or COLUMN:N; needs --review.")] = None,
+) -> None:
+    """Label, measure, review, write."""
+    from stimuli_builder.blinks.run import BlinksJob, run_blinks
+
+    run_blinks(
+        BlinksJob(
+            series=series,
+            out=out,
+            columns=tuple(column or ()),
+            fps=fps,
+            profiles=profiles or out.with_name(f"{out.stem}.profiles.csv"),
+            options=_options(preset, gradient, gradient_px, opening_px, minimum_depth),
+            closed=closed,
+            complete_from=complete_from,
+            allow_gaps=allow_gaps,
+            any_duration=any_duration,
+            summary=summary,
+            plot=plot,
+            plot_aligned=plot_aligned,
+            review=review,
+            reject=tuple(reject or ()),
+            accept=tuple(accept or ()),
+        )
+    )
+
+
+def _options(
+    name: str,
+    gradient: float | None,
+    gradient_px: float | None,
+    opening_px: float | None,
+    minimum_depth: float | None,
+) -> "LabelOptions":
+    from dataclasses import replace
+
+    from stimuli_builder.blinks.labelling import preset
+
+    if gradient is not None and gradient_px is not None:
+        raise InputError("give --gradient or --gradient-px, not both")
+    options = preset(name)
+    if gradient is not None:
+        options = replace(options, gradient_opening=gradient, gradient_px=None)
+    if gradient_px is not None:
+        options = replace(options, gradient_opening=None, gradient_px=gradient_px)
+    if opening_px is not None:
+        options = replace(options, opening_px=opening_px)
+    return options if minimum_depth is None else replace(options, minimum_depth=minimum_depth)

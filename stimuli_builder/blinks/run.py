@@ -1,0 +1,188 @@
+"""What `stimuli blinks` does: read, label, apply the review, write everything or nothing."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.extract import EyeBlinks, all_profiles, blinks_of, eye_of, require_blinks
+from stimuli_builder.blinks.labelling import LabelOptions
+from stimuli_builder.blinks.profile import BlinkProfile
+from stimuli_builder.blinks.profile_table import write_profile_table
+from stimuli_builder.blinks.review import (
+    Review,
+    decide,
+    match_frames,
+    merge,
+    parse_choice,
+    read_reviews,
+    write_reviews,
+)
+from stimuli_builder.blinks.series import read_series
+from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_summary
+from stimuli_builder.files import temporary_beside
+
+
+@dataclass(frozen=True)
+class BlinksJob:
+    """One call of `stimuli blinks`; the fields are its options."""
+
+    series: Path
+    out: Path
+    columns: tuple[str, ...]
+    fps: float | None
+    profiles: Path
+    options: LabelOptions
+    closed: float | None = None
+    complete_from: float = 0.95
+    allow_gaps: bool | None = None
+    any_duration: bool = False
+    summary: Path | None = None
+    plot: Path | None = None
+    plot_aligned: Path | None = None
+    review: Path | None = None
+    reject: tuple[str, ...] = ()
+    accept: tuple[str, ...] = ()
+
+
+def run_blinks(job: BlinksJob) -> None:
+    """Label the series of a job; all checks come before the first file is written."""
+    _check(job)
+    eyes = label_recording(job)
+    reviews, decided, lost = _reviewed(job, eyes)
+    frame = blinks_frame([blink for eye in eyes for blink in eye.blinks], decided)
+    accepted = [_accepted_only(eye, decided) for eye in eyes]
+    names = [eye_of(eye.series.column) for eye in accepted]
+    profiles = all_profiles(accepted, job.series.stem, names)
+    if not profiles:
+        raise InputError("the review rejects every blink: nothing is left to write")
+    summaries = [
+        summarise(eye, frame, [p for p in profiles if p.eye == name and _is_of(p, eye)])
+        for eye, name in zip(accepted, names, strict=True)
+    ]
+    _write_figures(job, eyes, decided, profiles)
+    write_profile_table(job.profiles, profiles)
+    if job.summary is not None:
+        write_summary(job.summary, summaries)
+    if job.review is not None and (job.reject or job.accept):
+        write_reviews(job.review, reviews)
+    write_blinks(job.out, frame)
+    _report(job, summaries, frame, lost)
+
+
+def label_recording(job: BlinksJob) -> list[EyeBlinks]:
+    """Label every column of the job; none with a blink, or a wrong rate, is refused."""
+    eyes = [
+        blinks_of(series, job.options, closed_distance=job.closed, complete_from=job.complete_from)
+        for series in read_series(job.series, job.columns, job.fps, allow_gaps=job.allow_gaps)
+    ]
+    with_blinks = [eye for eye in eyes if eye.blinks]
+    for eye in with_blinks or eyes:
+        require_blinks(eye, job.options, any_duration=job.any_duration)
+    return eyes
+
+
+def _check(job: BlinksJob) -> None:
+    from stimuli_builder.blinks.plots import check_figure_name
+
+    if not 0 < job.complete_from <= 1:
+        raise InputError(f"--complete-from is a closure above 0 and up to 1, got {job.complete_from:g}")
+    if job.closed is not None and job.closed < 0:
+        raise InputError(f"--closed is a distance, 0 or more, got {job.closed:g}")
+    if (job.reject or job.accept) and job.review is None:
+        raise InputError("--reject and --accept are kept in a review file: name it with --review FILE")
+    for figure in (job.plot, job.plot_aligned):
+        if figure is not None:
+            check_figure_name(figure)
+    outputs = [job.out, job.profiles, job.summary, job.plot, job.plot_aligned, job.review]
+    named = [path for path in outputs if path is not None]
+    for path in named:
+        temporary_beside(path)
+    seen = [path.resolve() for path in [job.series, *named]]
+    if len(set(seen)) < len(seen):
+        raise InputError(
+            "the series, the blinks table and every other file of the call need names of their own"
+        )
+
+
+def _reviewed(
+    job: BlinksJob, eyes: Sequence[EyeBlinks]
+) -> tuple[list[Review], dict[tuple[str, int], Review], list[Review]]:
+    blinks = [blink for eye in eyes for blink in eye.blinks]
+    reach = match_frames(eyes[0].series.fps)
+    new = [parse_choice(text, "reject", blinks) for text in job.reject]
+    new += [parse_choice(text, "accept", blinks) for text in job.accept]
+    old = read_reviews(job.review) if job.review is not None else []
+    if job.review is not None and not new and not job.review.exists():
+        raise InputError(f"{job.review}: there is no such review file; --reject N=reason begins one")
+    reviews = merge(old, new, reach)
+    return reviews, *decide(blinks, reviews, reach)
+
+
+def _accepted_only(eye: EyeBlinks, decided: Mapping[tuple[str, int], Review]) -> EyeBlinks:
+    rejected = {key for key, review in decided.items() if review.decision == "reject"}
+    kept = tuple(blink for blink in eye.blinks if (blink.column, blink.number) not in rejected)
+    return replace(eye, blinks=kept)
+
+
+def _is_of(profile: BlinkProfile, eye: EyeBlinks) -> bool:
+    return profile.closure_other is None and f", {eye.series.column}, " in profile.source
+
+
+def _write_figures(
+    job: BlinksJob,
+    eyes: Sequence[EyeBlinks],
+    decided: Mapping[tuple[str, int], Review],
+    profiles: Sequence[BlinkProfile],
+) -> None:
+    if job.plot is None and job.plot_aligned is None:
+        return
+    from stimuli_builder.blinks.plots import aligned_figure, save_figure, series_figure
+
+    if job.plot is not None:
+        rejected = {key for key, review in decided.items() if review.decision == "reject"}
+        save_figure(series_figure(eyes, rejected), job.plot)
+    if job.plot_aligned is not None:
+        groups = {eye.series.column: [p for p in profiles if _is_of(p, eye)] for eye in eyes}
+        save_figure(
+            aligned_figure({name: group for name, group in groups.items() if group}), job.plot_aligned
+        )
+
+
+def _report(
+    job: BlinksJob, summaries: Sequence[dict[str, Any]], frame: pd.DataFrame, lost: Sequence[Review]
+) -> None:
+    console = Console()
+    table = Table(
+        "column", "blinks", "per minute", "complete", "down ms", "up ms", "total ms", "closure", "rejected"
+    )
+    for row in summaries:
+        medians = [
+            f"{row[name].get('median', float('nan')):.0f}" for name in ("down_ms", "up_ms", "duration_ms")
+        ]
+        closure = f"{row['closure'].get('median', float('nan')):.2f}"
+        counts = [str(row["blinks"]), f"{row['rate_per_minute']:.1f}", str(row["complete"])]
+        table.add_row(row["column"], *counts, *medians, closure, str(row["rejected"]))
+    console.print(table)
+    for row in summaries:
+        for refused in row["refused"]:
+            console.print(
+                f"{row['column']}: minimum at frame {refused['minimum']} left out: {refused['reason']}"
+            )
+        if row["missing_frames"]:
+            console.print(f"{row['column']}: {row['missing_frames']} frames without a value were left out")
+        if row["bridged_frames"]:
+            console.print(f"{row['column']}: {row['bridged_frames']} frames in short gaps were filled")
+    for review in lost:
+        console.print(
+            f"the review names a blink at frame {review.minimum_frame} of {review.column}: none is there"
+        )
+    written = [job.out, job.profiles, job.summary, job.plot, job.plot_aligned]
+    console.print(
+        f"{len(frame)} blinks; wrote " + ", ".join(str(path) for path in written if path is not None)
+    )

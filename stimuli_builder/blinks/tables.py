@@ -1,0 +1,166 @@
+"""The blinks table (a row a blink) and the summary of a recording."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from stimuli_builder.blinks.extract import EyeBlinks
+from stimuli_builder.blinks.measure import MeasuredBlink
+from stimuli_builder.blinks.profile import Array, BlinkProfile
+from stimuli_builder.blinks.review import Review
+from stimuli_builder.files import whole_file, whole_text
+
+BLINK_COLUMNS = {
+    "number": "number of the blink in its column, from 1",
+    "column": "column of the series",
+    "onset_frame": "frame where the eye begins to close",
+    "minimum_frame": "frame of the least inter-eyelid distance",
+    "end_frame": "frame where the eye has come to rest again",
+    "onset_s": "onset in seconds from the first frame",
+    "minimum_s": "minimum in seconds",
+    "end_s": "end in seconds",
+    "down_frames": "length of the closing phase in frames of the series",
+    "up_frames": "length of the opening phase in frames",
+    "down_ms": "length of the closing phase in ms",
+    "up_ms": "length of the opening phase in ms",
+    "duration_ms": "onset to end in ms",
+    "open_distance": "open level at the minimum: the line from onset to end, in the unit of the series",
+    "minimum_distance": "filtered distance at the minimum",
+    "closed_distance": "distance taken as lid contact in this column",
+    "amplitude": "open_distance - minimum_distance",
+    "closure": "greatest closure, 0 open to 1 closed",
+    "complete": "true where the closure reaches the limit for a complete blink",
+    "peak_closing_velocity": "greatest speed of closing, in the unit of the series a second",
+    "peak_opening_velocity": "greatest speed of opening, in the unit of the series a second",
+    "rest_before": "closure of the resting eye before the blink, against the wider of before and after",
+    "rest_after": "closure of the resting eye after the blink, likewise",
+    "touches_neighbour": "true where the eye does not come to rest before the neighbouring blink",
+    "accepted": "false where a review rejected the blink",
+    "reason": "reason given in the review",
+}
+DURATION_BIN_MS = 1000 / 30
+AMPLITUDE_BINS = 10
+
+
+def blinks_frame(blinks: Sequence[MeasuredBlink], decided: Mapping[tuple[str, int], Review]) -> pd.DataFrame:
+    """Return the blinks table, columns as in `BLINK_COLUMNS`."""
+    rows = []
+    for blink in blinks:
+        review = decided.get((blink.column, blink.number))
+        row = asdict(blink) | {
+            "accepted": review is None or review.decision == "accept",
+            "reason": "" if review is None else review.reason,
+        }
+        rows.append(row)
+    frame = pd.DataFrame(rows, columns=list(BLINK_COLUMNS))
+    numbers = [field.name for field in fields(MeasuredBlink) if field.type in (float, "float")]
+    frame[numbers] = frame[numbers].astype(float).round(6)
+    return frame
+
+
+def write_blinks(path: Path, frame: pd.DataFrame) -> None:
+    """Write the blinks table as CSV."""
+    with whole_file(path) as partial:
+        frame.to_csv(partial, index=False, lineterminator="\n")
+
+
+def aligned(profiles: Sequence[BlinkProfile]) -> tuple[Array, Array]:
+    """Lay profiles on their minima; outside its own length a blink keeps its first or last closure.
+
+    Returns
+    -------
+    time_ms : (n,) array
+        Time from the minimum.
+    closures : (profiles, n) array
+    """
+    before = max(profile.minimum_index for profile in profiles)
+    after = max(profile.closure.size - profile.minimum_index for profile in profiles)
+    rows = [
+        np.pad(
+            profile.closure,
+            (before - profile.minimum_index, after - (profile.closure.size - profile.minimum_index)),
+            mode="edge",
+        )
+        for profile in profiles
+    ]
+    return np.arange(-before, after) * 1000 / profiles[0].fps, np.array(rows)
+
+
+def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[BlinkProfile]) -> dict[str, Any]:
+    """Return rate, spread and histograms of one column's accepted blinks, with the mean blink."""
+    series = eye_blinks.series
+    rows = frame[frame["accepted"] & (frame["column"] == series.column)]
+    minutes = (series.distance.size - series.missing_frames) / series.fps / 60
+    durations, closures = rows["duration_ms"].to_numpy(), rows["closure"].to_numpy()
+    return {
+        "column": series.column,
+        "fps": round(series.fps, 4),
+        "minutes": round(minutes, 4),
+        "blinks": len(rows),
+        "rejected": int((frame["column"] == series.column).sum() - len(rows)),
+        "refused": [asdict(refused) for refused in eye_blinks.refused],
+        "bridged_frames": series.bridged_frames,
+        "missing_frames": series.missing_frames,
+        "rate_per_minute": round(len(rows) / minutes, 3),
+        "complete": int(rows["complete"].sum()),
+        "duration_ms": _spread(durations),
+        "down_ms": _spread(rows["down_ms"].to_numpy()),
+        "up_ms": _spread(rows["up_ms"].to_numpy()),
+        "closure": _spread(closures),
+        "opening_to_closing_velocity": _spread(
+            (rows["peak_opening_velocity"] / rows["peak_closing_velocity"]).to_numpy()
+        ),
+        "peak_velocity_to_amplitude_per_s": _spread(
+            (rows["peak_closing_velocity"] / rows["amplitude"]).to_numpy()
+        ),
+        "interval_s": _spread(np.diff(rows["minimum_s"].to_numpy())),
+        "duration_histogram": duration_histogram(durations),
+        "amplitude_histogram": amplitude_histogram(closures),
+        "mean_blink": _mean_blink(profiles),
+    }
+
+
+def write_summary(path: Path, summaries: Sequence[dict[str, Any]]) -> None:
+    """Write the summaries of all columns as JSON."""
+    with whole_text(path) as stream:
+        stream.write(json.dumps({"columns": list(summaries)}, indent=1) + "\n")
+
+
+def duration_histogram(durations_ms: Array) -> dict[str, list[float] | list[int]]:
+    """Count durations in bins of one frame at 30 fps, as in the paper's Figure 6c."""
+    if not durations_ms.size:
+        return {"edges_ms": [], "counts": []}
+    last = int(np.ceil((durations_ms.max() + 1e-9) / DURATION_BIN_MS))
+    edges = np.arange(last + 1) * DURATION_BIN_MS
+    counts, _ = np.histogram(durations_ms, bins=edges)
+    return {"edges_ms": np.round(edges, 3).tolist(), "counts": counts.tolist()}
+
+
+def amplitude_histogram(closures: Array) -> dict[str, list[float] | list[int]]:
+    """Count greatest closures in tenths from 0 to 1."""
+    edges = np.linspace(0.0, 1.0, AMPLITUDE_BINS + 1)
+    counts, _ = np.histogram(closures, bins=edges)
+    return {"edges": np.round(edges, 3).tolist(), "counts": counts.tolist()}
+
+
+def _spread(values: Array) -> dict[str, float]:
+    if not values.size:
+        return {}
+    sd = float(values.std(ddof=1)) if values.size > 1 else 0.0
+    spread = {"mean": values.mean(), "sd": sd, "median": np.median(values), "min": values.min()}
+    return {name: round(float(value), 4) for name, value in (spread | {"max": values.max()}).items()}
+
+
+def _mean_blink(profiles: Sequence[BlinkProfile]) -> dict[str, list[float]]:
+    if not profiles:
+        return {}
+    time_ms, closures = aligned(profiles)
+    return {
+        "from_minimum_ms": np.round(time_ms, 3).tolist(),
+        "closure": np.round(closures.mean(axis=0), 5).tolist(),
+    }
