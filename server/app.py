@@ -8,6 +8,8 @@ from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
 
 from server import health, pages
+from server.accounts import endpoints as accounts
+from server.accounts import people
 from server.clips import endpoints as clips
 from server.context import open_services
 from server.errors import install_error_handlers
@@ -17,7 +19,7 @@ from server.settings import Settings
 
 def _routers() -> tuple[APIRouter, ...]:
     """Every router; `pages` comes last because it answers for whole folders of addresses."""
-    return (health.router, clips.router, pages.router)
+    return (health.router, clips.router, accounts.router, people.router, pages.router)
 
 
 def _operation_id(route: APIRoute) -> str:

@@ -20,6 +20,7 @@ class Services:
     clips: ClipStore
     run_starts: RateLimit
     unsupported: RateLimit
+    sign_ins: RateLimit
 
 
 def open_services(settings: Settings) -> Services:
@@ -30,6 +31,7 @@ def open_services(settings: Settings) -> Services:
         clips=FolderStore(settings.clip_folder),
         run_starts=RateLimit(settings.run_starts_per_minute),
         unsupported=RateLimit(settings.unsupported_per_minute),
+        sign_ins=RateLimit(settings.logins_per_minute),
     )
 
 

@@ -1,0 +1,33 @@
+"""The audit log: one row for every change an experimenter makes."""
+
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.accounts.identity import Identity
+from server.models import AuditEntry
+
+
+def record(
+    session: Session, who: Identity | None, action: str, kind: str = "", target: str = "", **details: Any
+) -> None:
+    """Add an entry in the caller's transaction, so that a change and its entry stand or fall together."""
+    session.add(
+        AuditEntry(
+            account_id=who.account_id if who else None,
+            actor=who.name if who else "command line",
+            action=action,
+            target_kind=kind,
+            target=target[:200],
+            details=details,
+        )
+    )
+
+
+def latest(session: Session, before: int | None, limit: int) -> list[AuditEntry]:
+    """The latest entries with a number below `before`, newest first."""
+    query = select(AuditEntry).order_by(AuditEntry.id.desc()).limit(limit)
+    if before is not None:
+        query = query.where(AuditEntry.id < before)
+    return list(session.scalars(query))

@@ -1,0 +1,151 @@
+"""Who is asking: a signed-in browser or an API token, and what each may do."""
+
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Annotated, Literal
+from urllib.parse import urlsplit
+
+from fastapi import Depends, Request
+from fastapi.security import APIKeyCookie, HTTPBearer
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.clock import now
+from server.context import Services, ServicesDep
+from server.errors import ApiError
+from server.models import Account, AdminSession, ApiToken
+from server.tokens import hash_token
+
+Role = Literal["viewer", "experimenter", "owner"]
+Scope = Literal["read", "write", "export"]
+COOKIE = "palpebra_session"
+_RANK: dict[str, int] = {"viewer": 0, "experimenter": 1, "owner": 2}
+_SEEN_EVERY = timedelta(minutes=1)
+_cookie_scheme = APIKeyCookie(name=COOKIE, auto_error=False, description="A signed-in browser.")
+_bearer_scheme = HTTPBearer(auto_error=False, description="An API token with scopes.")
+
+
+class NotSignedIn(ApiError):
+    """The request carries no valid session or token."""
+
+    status = 401
+    code = "not_signed_in"
+
+
+class NotAllowed(ApiError):
+    """The account's role or the token's scope is not enough."""
+
+    status = 403
+    code = "not_allowed"
+
+
+@dataclass(frozen=True)
+class Identity:
+    """The account behind a request; `session_id` for a browser, `scopes` for a token."""
+
+    account_id: int
+    name: str
+    role: str
+    session_id: int | None = None
+    scopes: frozenset[str] | None = None
+
+
+def check_origin(request: Request, services: Services) -> None:
+    """Refuse a change that another site's page asks for with this browser's cookie."""
+    if request.method in ("GET", "HEAD", "OPTIONS"):
+        return
+    origin = request.headers.get("origin")
+    if origin is None:
+        if request.headers.get("sec-fetch-site", "same-origin") in ("same-origin", "none"):
+            return
+        raise NotAllowed("This change was asked for by another site and is refused.")
+    own = {services.settings.public_url, f"{request.url.scheme}://{request.headers.get('host', '')}"}
+    if f"{urlsplit(origin).scheme}://{urlsplit(origin).netloc}" not in own:
+        raise NotAllowed(f"This change was asked for by another site ({origin[:100]}) and is refused.")
+
+
+def identify(request: Request, services: Services) -> Identity:
+    """The identity of a request; NotSignedIn where there is none."""
+    authorization = request.headers.get("authorization", "")
+    if authorization.startswith("Bearer "):
+        return _by_token(services, authorization.removeprefix("Bearer ").strip())
+    cookie = request.cookies.get(COOKIE)
+    if not cookie:
+        raise NotSignedIn("Please sign in.")
+    check_origin(request, services)
+    return _by_cookie(services, cookie)
+
+
+def _by_cookie(services: Services, cookie: str) -> Identity:
+    with services.database.read() as session:
+        found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(cookie)))
+        if found is None or found.revoked_at or found.expires_at <= now() or found.account.disabled_at:
+            raise NotSignedIn("Your session has ended; please sign in again.")
+        identity = Identity(found.account_id, found.account.name, found.account.role, session_id=found.id)
+        stale = now() - found.last_seen_at > _SEEN_EVERY
+    if stale:
+        with services.database.write() as session:
+            if (row := session.get(AdminSession, identity.session_id)) is not None:
+                row.last_seen_at = now()
+    return identity
+
+
+def _by_token(services: Services, token: str) -> Identity:
+    with services.database.read() as session:
+        found = session.scalar(select(ApiToken).where(ApiToken.token_hash == hash_token(token)))
+        expired = found is not None and found.expires_at is not None and found.expires_at <= now()
+        if found is None or found.revoked_at or expired or found.account.disabled_at:
+            raise NotSignedIn("This API token is unknown, revoked or expired; make a new one.")
+        account = found.account
+        identity = Identity(account.id, account.name, account.role, scopes=frozenset(found.scopes))
+        stale = found.last_used_at is None or now() - found.last_used_at > _SEEN_EVERY
+        token_id = found.id
+    if stale:
+        with services.database.write() as session:
+            if (row := session.get(ApiToken, token_id)) is not None:
+                row.last_used_at = now()
+    return identity
+
+
+class _Access:
+    """A dependency that lets in accounts of at least `role`, and tokens that carry `scope` as well."""
+
+    def __init__(self, role: Role, scope: Scope | None) -> None:
+        self.role, self.scope = role, scope
+
+    def __call__(
+        self,
+        request: Request,
+        services: ServicesDep,
+        _cookie: Annotated[str | None, Depends(_cookie_scheme)],
+        _bearer: Annotated[object, Depends(_bearer_scheme)],
+    ) -> Identity:
+        identity = identify(request, services)
+        if _RANK[identity.role] < _RANK[self.role]:
+            raise NotAllowed(f"This needs the role {self.role}; your account is a {identity.role}.")
+        if identity.scopes is not None:
+            if self.scope is None:
+                raise NotAllowed("This cannot be done with an API token; sign in in a browser.")
+            if self.scope not in identity.scopes:
+                raise NotAllowed(f"This needs a token with the scope '{self.scope}'.")
+        return identity
+
+
+Viewer = Annotated[Identity, Depends(_Access("viewer", "read"))]
+"""May look at everything but accounts."""
+Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]
+"""May download data."""
+Experimenter = Annotated[Identity, Depends(_Access("experimenter", "write"))]
+"""May change studies."""
+Owner = Annotated[Identity, Depends(_Access("owner", None))]
+"""May change accounts."""
+Myself = Annotated[Identity, Depends(_Access("viewer", None))]
+"""A signed-in browser, for changes to one's own account."""
+
+
+def account_of(session: Session, identity: Identity) -> Account:
+    """The account row of an identity."""
+    account = session.get(Account, identity.account_id)
+    if account is None:
+        raise NotSignedIn("Your account no longer exists.")
+    return account

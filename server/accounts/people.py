@@ -1,0 +1,81 @@
+"""Endpoints for owners: accounts, invitations and the audit log."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from sqlalchemy import select
+
+from server.accounts import audit, service
+from server.accounts.endpoints import account_out
+from server.accounts.identity import Owner
+from server.accounts.schemas import (
+    AccountOut,
+    AuditOut,
+    ChangeAccount,
+    InvitationOut,
+    NewInvitation,
+    NewInvitationOut,
+)
+from server.clock import now
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES, NotFound
+from server.models import Account, Invitation
+
+router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_RESPONSES)
+
+
+@router.get("/accounts")
+def list_accounts(services: ServicesDep, _who: Owner) -> list[AccountOut]:
+    """Every account."""
+    with services.database.read() as session:
+        return [account_out(row) for row in session.scalars(select(Account).order_by(Account.id))]
+
+
+@router.patch("/accounts/{account_id}")
+def change_account(services: ServicesDep, who: Owner, account_id: int, body: ChangeAccount) -> AccountOut:
+    """Change a role, or disable an account."""
+    return account_out(service.change_account(services.database, who, account_id, body.role, body.disabled))
+
+
+@router.get("/invitations")
+def list_invitations(services: ServicesDep, _who: Owner) -> list[InvitationOut]:
+    """Invitations that have neither been used nor expired."""
+    query = select(Invitation).where(Invitation.used_at.is_(None), Invitation.expires_at > now())
+    with services.database.read() as session:
+        return [InvitationOut.model_validate(row) for row in session.scalars(query.order_by(Invitation.id))]
+
+
+@router.post("/invitations", status_code=201)
+def create_invitation(services: ServicesDep, who: Owner, body: NewInvitation) -> NewInvitationOut:
+    """Invite somebody by a one-time link, shown this once."""
+    invitation, token = service.invite(services.database, body.role, body.label, who)
+    shown = InvitationOut.model_validate(invitation)
+    return NewInvitationOut(**shown.model_dump(), url=invitation_url(services.settings.public_url, token))
+
+
+def invitation_url(public_url: str, token: str) -> str:
+    """The page an invited person opens. The token stands behind '#', where no log and no referrer sees it."""
+    return f"{public_url}/admin/invitation#{token}"
+
+
+@router.delete("/invitations/{invitation_id}", status_code=204)
+def revoke_invitation(services: ServicesDep, who: Owner, invitation_id: int) -> None:
+    """Take an invitation back."""
+    with services.database.write() as session:
+        row = session.get(Invitation, invitation_id)
+        if row is None:
+            raise NotFound("There is no such invitation.")
+        audit.record(session, who, "invitation revoked", "invitation", row.label)
+        session.delete(row)
+
+
+@router.get("/audit")
+def list_audit(
+    services: ServicesDep,
+    _who: Owner,
+    before: Annotated[int | None, Query(ge=1, le=2**62)] = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+) -> list[AuditOut]:
+    """The audit log, newest first; `before` pages on."""
+    with services.database.read() as session:
+        return [AuditOut.model_validate(row) for row in audit.latest(session, before, limit)]

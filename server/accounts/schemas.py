@@ -1,0 +1,170 @@
+"""What the account endpoints take and give."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from server.accounts.identity import Role, Scope
+
+AccountName = Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^[\w.@+ -]{2,100}$")]
+Password = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+
+
+class _In(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class SignIn(_In):
+    """Name and password, and where a second factor is set up its code or a recovery code."""
+
+    name: Annotated[str, StringConstraints(strip_whitespace=True, max_length=100)]
+    password: Password
+    code: Annotated[str, StringConstraints(strip_whitespace=True, max_length=40)] | None = None
+
+
+class NewAccount(_In):
+    """The account an invited person makes."""
+
+    name: AccountName
+    password: Password
+
+
+class ChangePassword(_In):
+    """The present password and a new one."""
+
+    password: Password
+    new_password: Password
+
+
+class ConfirmCode(_In):
+    """A code from the authenticator app."""
+
+    code: Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^\d{6}$")]
+
+
+class ConfirmPassword(_In):
+    """The present password, asked for again before something is weakened."""
+
+    password: Password
+
+
+class NewInvitation(_In):
+    """Whom to invite, as what."""
+
+    role: Role
+    label: Annotated[str, StringConstraints(strip_whitespace=True, max_length=200)] = ""
+
+
+class NewToken(_In):
+    """An API token: its name, what it may do, and for how many days."""
+
+    name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=100)]
+    scopes: Annotated[list[Scope], Field(min_length=1, max_length=3)]
+    days: Annotated[int, Field(ge=1, le=3650)] | None = 365
+
+
+class ChangeAccount(_In):
+    """What an owner may change of an account."""
+
+    role: Role | None = None
+    disabled: bool | None = None
+
+
+class _Out(BaseModel):
+    model_config = ConfigDict(from_attributes=True)
+
+
+class AccountOut(_Out):
+    """An account as others see it."""
+
+    id: int
+    name: str
+    role: Role
+    second_factor: bool
+    disabled: bool
+    created_at: datetime
+
+
+class Me(BaseModel):
+    """Who is signed in here; `account` is null where nobody is."""
+
+    account: AccountOut | None
+    accounts_exist: bool = Field(description="False until the first owner has used the one-time link.")
+
+
+class SessionOut(_Out):
+    """A signed-in browser."""
+
+    id: int
+    current: bool
+    user_agent: str
+    created_at: datetime
+    last_seen_at: datetime
+    expires_at: datetime
+
+
+class SecondFactorSetup(BaseModel):
+    """What an authenticator app needs."""
+
+    secret: str
+    uri: str
+    qr_svg: str
+
+
+class RecoveryCodes(BaseModel):
+    """Codes shown once; each signs in once without the app."""
+
+    codes: list[str]
+
+
+class TokenOut(_Out):
+    """An API token without its secret."""
+
+    id: int
+    name: str
+    scopes: list[Scope]
+    created_at: datetime
+    last_used_at: datetime | None
+    expires_at: datetime | None
+
+
+class NewTokenOut(TokenOut):
+    """A fresh API token; `token` is shown this once."""
+
+    token: str
+
+
+class InvitationOut(_Out):
+    """An invitation that has not been used."""
+
+    id: int
+    role: Role
+    label: str
+    created_at: datetime
+    expires_at: datetime
+
+
+class NewInvitationOut(InvitationOut):
+    """A fresh invitation; `url` is shown this once."""
+
+    url: str
+
+
+class InvitationState(BaseModel):
+    """What an invited person sees."""
+
+    role: Role
+    status: Literal["open", "used", "expired"]
+
+
+class AuditOut(_Out):
+    """One line of the audit log."""
+
+    id: int
+    at: datetime
+    actor: str
+    action: str
+    target_kind: str
+    target: str
+    details: dict[str, Any]
