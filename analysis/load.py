@@ -1,0 +1,158 @@
+"""The ratings of a study, from a CSV export or from the database's view `ratings`, in one shape."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.csvfile import numbers, read_text_table
+from analysis.database import RatingsQuery
+from analysis.errors import NoRatingsError
+from experiments.definition import Experiment
+from experiments.errors import InputError
+
+TEXT_COLUMNS = [
+    "study",
+    "experiment",
+    "definition_sha256",
+    "phase",
+    "run",
+    "participant",
+    "run_status",
+    "kind",
+    "verdict",
+    "stimulus",
+    "exclusion_reason",
+]
+NUMBER_COLUMNS = ["trial_index", "play", "exemplar", "response", "expected_response", "rt"]
+FLAG_COLUMNS = ["synthetic", "excluded"]
+"""What the analysis reads of the columns that experiments/ratings.py declares, besides the factors."""
+
+
+@dataclass(frozen=True)
+class StudyRatings:
+    """Every row of one study, in columns of text (categorical), numbers (float) and flags (bool).
+
+    A column the source does not have is absent here. `first_seen` is when each run's first row was stored.
+    """
+
+    rows: pd.DataFrame
+    source: str
+    decisions: tuple[str, ...]
+    first_seen: Mapping[str, str]
+
+    @property
+    def synthetic(self) -> bool:
+        """True where any row was given by no person."""
+        return "synthetic" in self.rows.columns and bool(self.rows["synthetic"].any())
+
+
+def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> StudyRatings:
+    """Read a CSV export, or any table with columns `participant`, `response` and one a factor.
+
+    Raises
+    ------
+    NoRatingsError
+        A header and no rows.
+    InputError
+        As `read_text_table`; ratings that are text; another experiment's data.
+    """
+    factors = list(experiment.factor_names)
+    optional = [*TEXT_COLUMNS, *NUMBER_COLUMNS, *FLAG_COLUMNS, "saved_at"]
+    if _has_no_rows(path):
+        raise NoRatingsError(f"{path.name} has a header but no ratings yet")
+    table = read_text_table(path, ["participant", "response", *factors], optional)
+    rows = table.columns
+    for name in NUMBER_COLUMNS:
+        if name in rows.columns:
+            rows[name] = numbers(table, name)
+    for name in FLAG_COLUMNS:
+        if name in rows.columns:
+            rows[name] = _flags(rows[name])
+    seen = _first_seen(rows)
+    rows = rows.drop(columns="saved_at", errors="ignore")
+    rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
+    return StudyRatings(rows, path.name, (*table.decisions, *chosen), seen)
+
+
+def load_database(url: str, experiment: Experiment, study: str | None = None) -> StudyRatings:
+    """Read the study's rows from the SQL view `ratings`.
+
+    Raises
+    ------
+    NoRatingsError
+        No database there, no such view yet, or no row of this experiment.
+    InputError
+        A URL that cannot be used, or several studies and no `study` to choose one.
+    """
+    query = RatingsQuery(url, experiment.name, study)
+    try:
+        rows = query.rows(TEXT_COLUMNS, NUMBER_COLUMNS, FLAG_COLUMNS, list(experiment.factor_names))
+        if rows.empty:
+            named = f"study '{study}'" if study else f"experiment '{experiment.name}'"
+            raise NoRatingsError(f"{named} has no ratings yet in {query.name}")
+        rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
+        return StudyRatings(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
+    finally:
+        query.close()
+
+
+def _has_no_rows(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return bool(file.readline().strip()) and not file.read(64).strip()
+
+
+def _flags(column: pd.Series) -> NDArray[np.bool_]:
+    yes = [text for text in column.cat.categories if str(text).casefold() in {"1", "true", "yes"}]
+    return column.isin(yes).to_numpy()
+
+
+def _first_seen(rows: pd.DataFrame) -> dict[str, str]:
+    if not {"run", "saved_at"} <= set(rows.columns) or not _runs_again(rows):
+        return {}
+    first = rows[["run", "saved_at"]].astype(str).groupby("run", observed=True)["saved_at"].min()
+    return {str(run): str(moment) for run, moment in first.items()}
+
+
+def _runs_again(rows: pd.DataFrame) -> bool:
+    if "run" not in rows.columns:
+        return False
+    return bool(rows.groupby("participant", observed=True)["run"].nunique().max() > 1)
+
+
+def _of_one_study(
+    rows: pd.DataFrame, experiment: str, study: str | None, source: str
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    decisions: list[str] = []
+    if "experiment" in rows.columns:
+        rows = _only(rows, "experiment", experiment, source, decisions)
+    if study is not None:
+        if "study" not in rows.columns:
+            raise InputError(f"{source} has no column 'study'; leave --study out")
+        rows = _only(rows, "study", study, source, decisions)
+    elif "study" in rows.columns and len(names := _names(rows["study"])) > 1:
+        raise InputError(f"{source} holds {len(names)} studies; choose one with --study: {', '.join(names)}")
+    if "definition_sha256" in rows.columns and len(_names(rows["definition_sha256"])) > 1:
+        count = len(_names(rows["definition_sha256"]))
+        decisions.append(f"{count} versions of the experiment's declaration were used; analysed together")
+    return rows, tuple(decisions)
+
+
+def _only(rows: pd.DataFrame, column: str, name: str, source: str, decisions: list[str]) -> pd.DataFrame:
+    names = _names(rows[column])
+    if name not in names:
+        raise InputError(f"{source} holds {column} {', '.join(names) or 'nothing'}, not '{name}'")
+    if len(names) == 1:
+        return rows
+    mine = (rows[column] == name).to_numpy()
+    decisions.append(f"{(~mine).sum()} rows of other {column} values left aside")
+    return rows[mine]
+
+
+def _names(column: Iterable[object]) -> list[str]:
+    return sorted({str(name) for name in pd.unique(pd.Series(column))})
