@@ -1,0 +1,182 @@
+"""The synthetic recording: frames, exact truth of every frame, and label files of a few."""
+
+import csv
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.actor import skin
+from stimuli_builder.actor.face import EYE_CENTRES, EYE_WIDTH_PX, PICTURE_SIZE, head_matrix, landmarks, lid_distances
+from stimuli_builder.actor.physiology import Course, course, plan_blinks
+from stimuli_builder.actor.renderer import draw_eye
+from stimuli_builder.files import whole_text
+from stimuli_builder.video import Picture, VideoWriter
+
+Values = NDArray[np.float64]
+
+SHUTTER = 0.5
+FINE = 8
+BOX = (-0.80, 0.80, -0.52, 0.50)
+SKIN_CHROMA = (112.0, 146.0)
+NOISE_TILE = (1024, 1280)
+
+
+@dataclass(frozen=True)
+class ActorOptions:
+    """What `stimuli actor` is asked for; noise in grey levels (sd)."""
+
+    seconds: float = 20.0
+    fps: float = 300.0
+    seed: int = 1
+    noise: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.seconds <= 7200:
+            raise InputError(f"--seconds {self.seconds:g}: expected 0.1 to 7200")
+        if not 10 <= self.fps <= 2000:
+            raise InputError(f"--fps {self.fps:g}: expected 10 to 2000")
+        if not 0 <= self.noise <= 50:
+            raise InputError(f"--noise {self.noise:g}: expected 0 to 50 grey levels")
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames of the recording."""
+        return max(1, round(self.seconds * self.fps))
+
+
+class Actor:
+    """A face with a fixed look (seed), drawn at any moment of its course."""
+
+    def __init__(self, options: ActorOptions):
+        rng = np.random.default_rng([options.seed, 1])
+        self.options = options
+        self._face, self._lid = skin.face_texture(rng), skin.lid_texture(rng)
+        self._iris, self._lashes = skin.iris_texture(rng), skin.lash_texture(rng)
+        self._noise = (options.noise * rng.standard_normal(NOISE_TILE)).astype(np.float32)
+        self._places = np.random.default_rng([options.seed, 3])
+        blinks = plan_blinks(options.seconds, np.random.default_rng([options.seed, 4]))
+        fine_s = (np.arange(options.frame_count * FINE) - FINE // 2) / (options.fps * FINE)
+        self._fine = course(fine_s, blinks, options.seed)
+        self.course = course(np.arange(options.frame_count) / options.fps, blinks, options.seed)
+
+    def frame(self, number: int) -> tuple[Picture, Picture]:
+        """Luminance (h, w) and the two chroma planes of one frame, (h / 2, w / 2) each stacked."""
+        now = self.course
+        matrix = head_matrix(now.head[number])
+        inverse = np.asarray(cv2.invertAffineTransform(matrix))
+        width, height = PICTURE_SIZE
+        shift = np.array([[1.0, 0, -skin.MARGIN_PX], [0, 1.0, -skin.MARGIN_PX], [0, 0, 1]])
+        picture = cv2.warpAffine(self._face, matrix @ shift, (width, height), flags=cv2.INTER_LINEAR)
+        picture = np.asarray(picture * np.float32(now.light[number]), np.float32)
+        cover = np.zeros((height, width), np.float32)
+        for eye in range(2):
+            self._eye(picture, cover, eye, number, matrix, inverse)
+        return self._exposed(picture), _chroma(cover)
+
+    def _eye(self, picture: NDArray[np.float32], cover: NDArray[np.float32], eye: int, number: int, matrix: Values, inverse: Values) -> None:
+        x0, x1, y0, y1 = _box(EYE_CENTRES[eye], matrix)
+        part, seen = np.zeros((y1 - y0, x1 - x0), np.float32), cover[y0:y1, x0:x1]
+        closures = self._exposures(number, eye)
+        now = self.course
+        for closure in closures:
+            draw_eye(
+                part, seen, x0, y0, inverse, np.array(EYE_CENTRES[eye]), 1.0 - 2.0 * eye, EYE_WIDTH_PX, closure,
+                now.gaze[number], now.light[number], self._face, float(skin.MARGIN_PX), self._lid, self._iris,
+                self._lashes, 1.0 / len(closures),
+            )  # fmt: skip
+        picture[y0:y1, x0:x1] = part
+
+    def _exposures(self, number: int, eye: int) -> Values:
+        """Closures over the time the shutter is open, centred on the frame's time: one if the lid rests."""
+        reach = int(FINE * SHUTTER / 2)
+        middle = number * FINE + FINE // 2
+        open_time = self._fine.closure[max(middle - reach, 0) : middle + reach + 1, eye]
+        if np.ptp(open_time) * 0.36 * EYE_WIDTH_PX < 0.08:
+            return self.course.closure[number : number + 1, eye]
+        return open_time
+
+    def _exposed(self, picture: NDArray[np.float32]) -> Picture:
+        height, width = picture.shape
+        y, x = self._places.integers(0, [NOISE_TILE[0] - height, NOISE_TILE[1] - width])
+        noisy = picture + self._noise[y : y + height, x : x + width]
+        return np.asarray(cv2.convertScaleAbs(np.maximum(noisy, 0)), np.uint8)
+
+
+def _box(centre: tuple[float, float], matrix: Values) -> tuple[int, int, int, int]:
+    u0, u1, v0, v1 = BOX
+    corners = np.array([(u, v) for u in (u0, u1) for v in (v0, v1)]) * EYE_WIDTH_PX + centre
+    placed = corners @ matrix[:, :2].T + matrix[:, 2]
+    limits = np.array(PICTURE_SIZE)
+    x0, y0 = np.clip(np.floor(placed.min(0)), 0, limits).astype(int)
+    x1, y1 = np.clip(np.ceil(placed.max(0)) + 1, 0, limits).astype(int)
+    return int(x0), int(x1), int(y0), int(y1)
+
+
+def _chroma(cover: NDArray[np.float32]) -> Picture:
+    height, width = cover.shape
+    half = cv2.resize(cover, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    planes = [tint + (128 - tint) * 0.8 * half for tint in SKIN_CHROMA]
+    return np.asarray(np.concatenate([np.round(p) for p in planes]).astype(np.uint8))
+
+
+def write_video(actor: Actor, path: Path, advance: Callable[[], None]) -> None:
+    """Draw and encode every frame; `advance` is called after each."""
+    with VideoWriter(path, actor.options.fps, PICTURE_SIZE, crf=20) as writer:
+        for number in range(actor.options.frame_count):
+            luma, chroma = actor.frame(number)
+            planes = np.concatenate([luma.reshape(-1), chroma.reshape(-1)]).reshape(-1, PICTURE_SIZE[0])
+            writer.write_planes(planes)
+            advance()
+
+
+def truth_header() -> list[str]:
+    """Columns of the truth table: the track's points and distances, then closure, blink and phase."""
+    points = [f"{axis}{point:02d}" for point in range(1, 19) for axis in "xy"]
+    return ["frame", "time_s", *points, "left_distance_px", "right_distance_px", "closure", "blink", "phase"]
+
+
+def truth_points(now: Course) -> Iterator[Values]:
+    """Exact landmarks of every frame, (18, 2) each."""
+    for closure, head in zip(now.closure, now.head, strict=True):
+        yield landmarks(closure, head)
+
+
+def write_truth(actor: Actor, path: Path) -> None:
+    """Write the exact landmarks, distances, closure (mean of both eyes), blink number and phase as CSV."""
+    now = actor.course
+    with whole_text(path) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(truth_header())
+        for number, points in enumerate(truth_points(now)):
+            distances = [f"{value:.4f}" for value in (*points.reshape(-1), *lid_distances(points))]
+            blink = int(now.blink[number]) or ""
+            closure = f"{now.closure[number].mean():.5f}"
+            writer.writerow([number, f"{now.times_s[number]:.6f}", *distances, closure, blink, now.phase[number]])
+
+
+def choose_frames(now: Course, count: int, within: int = 20_000) -> list[int]:
+    """Frames a person would label: as different from one another as possible, starting from an open eye."""
+    numbers = np.arange(0, min(len(now.times_s), within), max(1, len(now.times_s) // 4000))
+    closed = now.closure[numbers]
+    features = np.c_[3 * closed, now.head[numbers, :2] / 20, now.head[numbers, 2:] * [20, 0] + [0, 0]]
+    chosen = [int(np.argmin(np.abs(closed.mean(1) - np.median(closed))))]
+    distance = np.full(len(numbers), np.inf)
+    while len(chosen) < min(count, len(numbers)):
+        distance = np.minimum(distance, ((features - features[chosen[-1]]) ** 2).sum(1))
+        chosen.append(int(distance.argmax()))
+    return sorted(int(numbers[place]) for place in chosen)
+
+
+def label_points(actor: Actor, count: int, noise_px: float) -> dict[int, Values]:
+    """Landmarks of chosen frames, with normal error of `noise_px` in each coordinate."""
+    rng = np.random.default_rng([actor.options.seed, 5])
+    now = actor.course
+    return {
+        number: landmarks(now.closure[number], now.head[number]) + rng.normal(0, noise_px, (18, 2)) * (noise_px > 0)
+        for number in choose_frames(now, count)
+    }
