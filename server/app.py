@@ -14,12 +14,22 @@ from server.clips import endpoints as clips
 from server.context import open_services
 from server.errors import install_error_handlers
 from server.middleware import BodyLimit, SecurityHeaders
+from server.monitor import endpoints as monitor
+from server.results import endpoints as results
 from server.settings import Settings
 
 
 def _routers() -> tuple[APIRouter, ...]:
     """Every router; `pages` comes last because it answers for whole folders of addresses."""
-    return (health.router, clips.router, accounts.router, people.router, pages.router)
+    return (
+        health.router,
+        clips.router,
+        accounts.router,
+        people.router,
+        monitor.router,
+        results.router,
+        pages.router,
+    )
 
 
 def _operation_id(route: APIRoute) -> str:

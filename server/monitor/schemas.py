@@ -1,0 +1,53 @@
+"""What the live monitor shows."""
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import BaseModel, Field
+
+
+class MonitoredRun(BaseModel):
+    """One visit in the monitor's table."""
+
+    run: str
+    participant: str
+    phase: str
+    synthetic: bool
+    status: str
+    stage: str
+    presence: Literal["here", "away", "dropped", "finished"] = Field(
+        description="here: seen within a minute; away: active but silent; dropped: silent beyond the lease."
+    )
+    started_at: datetime
+    last_seen_at: datetime
+    answered: int
+    trials: int
+    flagged: int
+    failed: int
+    excluded: bool
+    heat: str = Field(description="One letter a trial: . open, g good, f flagged, x failed.")
+
+
+class FunnelStep(BaseModel):
+    """How many runs came at least this far."""
+
+    stage: str
+    runs: int
+
+
+class MonitorSnapshot(BaseModel):
+    """Everything the monitor shows at one moment."""
+
+    study: str
+    study_status: str
+    quota: int | None
+    server_time: datetime
+    complete: int
+    active: int
+    dropped: int
+    refused_browsers: int
+    funnel: list[FunnelStep]
+    expected_finish: datetime | None = Field(
+        description="When the quota will be full at the pace of the last day; null where it cannot be said."
+    )
+    runs: list[MonitoredRun]

@@ -1,0 +1,103 @@
+"""What the results page reads: aggregates in SQL, one row a participant and clip at most."""
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+from sqlalchemy import ColumnElement, and_, func, select
+from sqlalchemy.orm import Session
+
+from server.models import AssignedTrial, Rating, StudyRun, VersionClip
+
+
+class ClipCount(NamedTuple):
+    """How often a clip got one answer."""
+
+    version_clip_id: int
+    response: int
+    times: int
+
+
+def usable(study_id: int, phase: str) -> ColumnElement[bool]:
+    """Main trials that count: answered, shown as declared, of a run that is neither preview nor excluded."""
+    return and_(
+        StudyRun.study_id == study_id,
+        StudyRun.phase == phase,
+        StudyRun.preview.is_(False),
+        StudyRun.excluded.is_(False),
+        AssignedTrial.kind == "main",
+        Rating.response.is_not(None),
+        Rating.verdict != "failed",
+    )
+
+
+def _joined(query: Any) -> Any:
+    return (
+        query.select_from(Rating)
+        .join(
+            AssignedTrial,
+            and_(
+                AssignedTrial.study_run_id == Rating.study_run_id,
+                AssignedTrial.trial_index == Rating.trial_index,
+            ),
+        )
+        .join(StudyRun, StudyRun.id == Rating.study_run_id)
+    )
+
+
+def cell_means(
+    session: Session, study_id: int, phase: str, factors: list[str]
+) -> dict[str, dict[tuple[str, ...], float]]:
+    """Participant (run number as text) -> levels in factor order -> mean rating."""
+    query = _joined(
+        select(Rating.study_run_id, VersionClip.cell, func.avg(Rating.response), func.min(VersionClip.id))
+    ).join(VersionClip, VersionClip.id == AssignedTrial.version_clip_id)
+    query = query.where(usable(study_id, phase)).group_by(Rating.study_run_id, VersionClip.cell)
+    rows = session.execute(query).all()
+    levels = _levels(session, {row[3] for row in rows}, factors)
+    means: dict[str, dict[tuple[str, ...], float]] = defaultdict(dict)
+    for run, _cell, mean, clip in rows:
+        means[str(run)][levels[clip]] = float(mean)
+    return dict(means)
+
+
+def _levels(session: Session, clips: set[int], factors: list[str]) -> dict[int, tuple[str, ...]]:
+    query = select(VersionClip.id, VersionClip.levels).where(VersionClip.id.in_(clips))
+    return {number: tuple(levels[name] for name in factors) for number, levels in session.execute(query)}
+
+
+def clip_counts(session: Session, study_id: int, phase: str) -> list[ClipCount]:
+    """How often each clip got each answer."""
+    query = _joined(select(AssignedTrial.version_clip_id, Rating.response, func.count()))
+    query = query.where(usable(study_id, phase)).group_by(AssignedTrial.version_clip_id, Rating.response)
+    return [ClipCount(*row) for row in session.execute(query)]
+
+
+def response_times(session: Session, study_id: int, phase: str) -> list[tuple[int, float]]:
+    """(bin of 250 ms, count) of the response times from the clip's end."""
+    place = func.floor(Rating.rt / 250)
+    query = _joined(select(place, func.count())).where(usable(study_id, phase), Rating.rt.is_not(None))
+    return [(int(start), count) for start, count in session.execute(query.group_by(place).order_by(place))]
+
+
+def playback(session: Session, study_id: int, phase: str) -> dict[str, list[tuple[str, int]]]:
+    """Counts of plays by verdict, by method and by the rule behind a verdict; failed plays included."""
+    run = and_(StudyRun.study_id == study_id, StudyRun.phase == phase, StudyRun.preview.is_(False))
+    counts = {}
+    for name, column in (
+        ("verdict", Rating.verdict),
+        ("method", Rating.method),
+        ("rule", Rating.verdict_rule),
+    ):
+        query = (
+            _joined(select(column, func.count())).where(run, AssignedTrial.kind == "main").group_by(column)
+        )
+        counts[name] = [(str(word), number) for word, number in session.execute(query) if word]
+    return counts
+
+
+def onset_delays(session: Session, study_id: int, phase: str) -> list[float]:
+    """Every key-to-first-frame time of at most 20,000 latest plays, in ms."""
+    query = _joined(select(Rating.key_to_first_frame_ms)).where(
+        usable(study_id, phase), Rating.key_to_first_frame_ms.is_not(None)
+    )
+    return list(session.scalars(query.order_by(Rating.id.desc()).limit(20_000)))

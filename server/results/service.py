@@ -1,0 +1,110 @@
+"""The results of a study as data arrive."""
+
+from collections import defaultdict
+from itertools import combinations
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from server.models import Study, StudyVersion, VersionClip
+from server.results import repository, summary
+from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results
+
+_DELAY_EDGES = [10.0 * step for step in range(11)]
+
+
+def results(session: Session, study: Study, definition: Experiment, phase: str) -> Results:
+    """Means, distributions, response times and playback of one phase (pilot or live)."""
+    scale = definition.trial.scale
+    factors = list(definition.factor_names)
+    means = repository.cell_means(session, study.id, phase, factors)
+    clips = _clips(session, study, phase, scale.minimum, scale.maximum)
+    return Results(
+        study=study.name,
+        phase=phase,
+        participants=len(means),
+        ratings=sum(clip.ratings for clip in clips),
+        scale_minimum=scale.minimum,
+        scale_maximum=scale.maximum,
+        margins=margins(means, factors),
+        cells=_cells(clips),
+        clips=clips,
+        response_times=[(250 * place, n) for place, n in repository.response_times(session, study.id, phase)],
+        playback=_playback(session, study, phase),
+    )
+
+
+def margins(means: summary.CellMeans, factors: list[str]) -> list[Margin]:
+    """Every factor, every pair of factors, and the cells where there are more than two factors."""
+    wanted = [list(chosen) for size in (1, 2) for chosen in combinations(factors, size)]
+    if len(factors) > 2:
+        wanted.append(factors)
+    return [
+        Margin(
+            factors=keep,
+            means=[Mean.model_validate(vars(one)) for one in summary.margin(means, factors, keep)],
+        )
+        for keep in wanted
+    ]
+
+
+def _clips(session: Session, study: Study, phase: str, lowest: int, highest: int) -> list[ClipResult]:
+    counts: dict[int, list[int]] = defaultdict(lambda: [0] * (highest - lowest + 1))
+    for clip, response, number in repository.clip_counts(session, study.id, phase):
+        if lowest <= response <= highest:
+            counts[clip][response - lowest] += number
+    query = select(VersionClip).join(StudyVersion, StudyVersion.id == VersionClip.version_id)
+    query = query.where(StudyVersion.study_id == study.id, StudyVersion.number == study.active_version)
+    shown = {row.id: row for row in session.scalars(query)}
+    older = set(counts) - set(shown)
+    for row in session.scalars(select(VersionClip).where(VersionClip.id.in_(older))):
+        shown[row.id] = row
+    return [
+        ClipResult(
+            clip_sha256=row.clip_sha256,
+            file=row.file,
+            cell=row.cell,
+            exemplar=row.exemplar,
+            ratings=sum(counts[number]),
+            mean=_mean(counts[number], lowest),
+            counts=counts[number],
+        )
+        for number, row in sorted(shown.items())
+    ]
+
+
+def _mean(counts: list[int], lowest: int) -> float | None:
+    total = sum(counts)
+    return sum(n * (lowest + place) for place, n in enumerate(counts)) / total if total else None
+
+
+def _cells(clips: list[ClipResult]) -> list[CellResult]:
+    grouped: dict[str, list[ClipResult]] = defaultdict(list)
+    for clip in clips:
+        grouped[clip.cell].append(clip)
+    return [
+        CellResult(
+            cell=cell,
+            ratings=sum(clip.ratings for clip in members),
+            mean=_weighted(members),
+            counts=[sum(column) for column in zip(*(clip.counts for clip in members), strict=True)],
+        )
+        for cell, members in grouped.items()
+    ]
+
+
+def _weighted(clips: list[ClipResult]) -> float | None:
+    total = sum(clip.ratings for clip in clips)
+    return sum(clip.ratings * clip.mean for clip in clips if clip.mean is not None) / total if total else None
+
+
+def _playback(session: Session, study: Study, phase: str) -> Playback:
+    counts = repository.playback(session, study.id, phase)
+    delays = repository.onset_delays(session, study.id, phase)
+    return Playback(
+        verdicts=dict(counts["verdict"]),
+        methods=dict(counts["method"]),
+        rules=dict(counts["rule"]),
+        key_to_first_frame_ms=summary.histogram(delays, _DELAY_EDGES),
+    )
