@@ -156,51 +156,52 @@ class LowerLidLayer:
         if lower is None:
             raise InputError(f"character '{character.name}' has no lower-lid layer: use lower lid 'none'")
         self._character, self._lower = character, lower
-        self._vertical, self._horizontal = np.array(lower.vertical_mm), np.array(lower.horizontal_mm)
+        self.vertical_mm, self.horizontal_mm = np.array(lower.vertical_mm), np.array(lower.horizontal_mm)
         crop = character.declaration.crop
         rows, columns = _slices(lower.crop)
         self.window = (
             slice(rows.start - crop[1], rows.stop - crop[1]),
             slice(columns.start - crop[0], columns.stop - crop[0]),
         )
-        self._changes = self._decode_poses()
-        self._matte_closures = np.array([matte.closure for matte in lower.mattes])
+        self.changes = self._decode_poses()
+        self.matte_closures = np.array([matte.closure for matte in lower.mattes])
         self._factors: dict[int, NDArray[np.float32]] = {}
 
     @property
     def vertical_range_mm(self) -> tuple[float, float]:
         """Lowest and highest vertical displacement that was baked."""
-        return float(self._vertical[0]), float(self._vertical[-1])
+        return float(self.vertical_mm[0]), float(self.vertical_mm[-1])
 
     @property
     def horizontal_range_mm(self) -> tuple[float, float]:
         """Lowest and highest horizontal displacement that was baked."""
-        return float(self._horizontal[0]), float(self._horizontal[-1])
+        return float(self.horizontal_mm[0]), float(self.horizontal_mm[-1])
 
     def delta(self, closure: float, vertical_mm: float, horizontal_mm: float) -> NDArray[np.float32]:
         """(h, w, 3) linear light to add to `window` of the crop. See Character.lower_lid_delta."""
         closure = float(check_closures([closure])[0])
-        row, row_share = _neighbours(self._vertical, vertical_mm, "vertical")
-        column, column_share = _neighbours(self._horizontal, horizontal_mm, "horizontal")
-        change = np.zeros(self._changes.shape[2:], np.float32)
+        row, row_share = _neighbours(self.vertical_mm, vertical_mm, "vertical")
+        column, column_share = _neighbours(self.horizontal_mm, horizontal_mm, "horizontal")
+        change = np.zeros(self.changes.shape[2:], np.float32)
         for i, across in ((row, 1 - row_share), (row + 1, row_share)):
             for j, along in ((column, 1 - column_share), (column + 1, column_share)):
                 if across * along > 0:
-                    change += np.float32(across * along) * self._changes[i, j]
+                    change += np.float32(across * along) * self.changes[i, j]
         return change * self._factor(closure)
 
     def _factor(self, closure: float) -> NDArray[np.float32]:
         """(h, w, 1 or 3) of visible share times shade at a closure, interpolated between mattes."""
-        if len(self._matte_closures) == 1:
-            return self._factor_at(0)
-        inside = float(np.clip(closure, self._matte_closures[0], self._matte_closures[-1]))
-        index, share = _neighbours(self._matte_closures, inside, "closure")
+        if len(self.matte_closures) == 1:
+            return self.factor_at(0)
+        inside = float(np.clip(closure, self.matte_closures[0], self.matte_closures[-1]))
+        index, share = _neighbours(self.matte_closures, inside, "closure")
         if share == 0.0:
-            return self._factor_at(index)
-        low, high = self._factor_at(index), self._factor_at(index + 1)
+            return self.factor_at(index)
+        low, high = self.factor_at(index), self.factor_at(index + 1)
         return (1 - np.float32(share)) * low + np.float32(share) * high
 
-    def _factor_at(self, index: int) -> NDArray[np.float32]:
+    def factor_at(self, index: int) -> NDArray[np.float32]:
+        """(h, w, 1 or 3) of visible share times shade at the closure of one matte."""
         if index not in self._factors:
             matte = self._lower.mattes[index]
             what = f"lower-lid matte at closure {matte.closure:g}"
@@ -229,7 +230,7 @@ class LowerLidLayer:
             what = f"lower-lid pose ({at[0]:g}, {at[1]:g}) mm"
             images[at] = srgb_to_linear(decode_picture(self._character.folder, pose, size, what))
         rest = images[(0.0, 0.0)]
-        return np.stack([np.stack([images[(v, h)] - rest for h in self._horizontal]) for v in self._vertical])
+        return np.stack([np.stack([images[(v, h)] - rest for h in self.horizontal_mm]) for v in self.vertical_mm])
 
 
 def load_character(folder: Path) -> Character:
