@@ -16,6 +16,7 @@ from server.errors import install_error_handlers
 from server.middleware import BodyLimit, SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.results import endpoints as results
+from server.runs import endpoints as runs
 from server.settings import Settings
 
 
@@ -28,6 +29,7 @@ def _routers() -> tuple[APIRouter, ...]:
         people.router,
         monitor.router,
         results.router,
+        runs.router,
         pages.router,
     )
 

@@ -1,0 +1,47 @@
+"""Participants of a study: list, timeline, exclude, erase."""
+
+from fastapi import APIRouter
+
+from server.accounts.identity import Experimenter, Viewer
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES
+from server.runs import service
+from server.runs.schemas import Erase, Exclude, RunSummary, Timeline
+from server.studies.lookup import find_study
+
+router = APIRouter(prefix="/api/admin/studies/{study}/runs", tags=["participants"], responses=ERROR_RESPONSES)
+
+
+@router.get("")
+def list_runs(services: ServicesDep, _who: Viewer, study: str) -> list[RunSummary]:
+    """Every run, the latest first."""
+    with services.database.read() as session:
+        return service.summaries(session, find_study(session, study))
+
+
+@router.get("/{run}")
+def get_timeline(services: ServicesDep, _who: Viewer, study: str, run: str) -> Timeline:
+    """One run: each trial with its frames and rating, forms, calibrations, events."""
+    with services.database.read() as session:
+        return service.timeline(session, find_study(session, study), run)
+
+
+@router.put("/{run}/exclusion", status_code=204)
+def exclude_run(services: ServicesDep, who: Experimenter, study: str, run: str, body: Exclude) -> None:
+    """Exclude a run from exports' `excluded = 0` and from the analysis; its data stay."""
+    with services.database.write() as session:
+        service.exclude(session, find_study(session, study), run, body.reason, who)
+
+
+@router.delete("/{run}/exclusion", status_code=204)
+def include_run(services: ServicesDep, who: Experimenter, study: str, run: str) -> None:
+    """Undo an exclusion."""
+    with services.database.write() as session:
+        service.include(session, find_study(session, study), run, who)
+
+
+@router.post("/{run}/erase", status_code=204)
+def erase_run(services: ServicesDep, who: Experimenter, study: str, run: str, body: Erase) -> None:
+    """Delete one person's data for good (a request under data protection law)."""
+    with services.database.write() as session:
+        service.erase(session, find_study(session, study), run, body.confirm, who)

@@ -1,0 +1,82 @@
+"""Runs and all that hangs on them."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import case, delete, func, select
+from sqlalchemy.orm import Session
+
+from server.errors import NotFound
+from server.models import (
+    AssignedTrial,
+    Calibration,
+    FormAnswer,
+    Rating,
+    RunEvent,
+    Study,
+    StudyRun,
+    VersionClip,
+)
+
+
+def find_run(session: Session, study: Study, public_id: str) -> StudyRun:
+    """The run of a study by its public identifier; previews are not runs of people."""
+    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.public_id == public_id)
+    run = session.scalar(query.where(StudyRun.preview.is_(False)))
+    if run is None:
+        raise NotFound(f"There is no run '{public_id[:40]}' in the study '{study.name}'.")
+    return run
+
+
+def runs_of(session: Session, study: Study) -> list[StudyRun]:
+    """Every run of a study but previews, the latest first."""
+    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    return list(session.scalars(query.order_by(StudyRun.id.desc())))
+
+
+def answered(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]]:
+    """Run number -> (trials answered, plays that were not good)."""
+    bad = func.sum(case((Rating.verdict != "good", 1), else_=0))
+    query = select(Rating.study_run_id, func.count(Rating.trial_index.distinct()), bad)
+    query = query.where(Rating.study_run_id.in_(runs)).group_by(Rating.study_run_id)
+    return {run: (int(done), int(not_good or 0)) for run, done, not_good in session.execute(query)}
+
+
+def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, VersionClip | None]]:
+    """Every stored play of a run with its trial and its clip, in the order they were stored."""
+    query = (
+        select(Rating, AssignedTrial, VersionClip)
+        .join(
+            AssignedTrial,
+            (AssignedTrial.study_run_id == Rating.study_run_id)
+            & (AssignedTrial.trial_index == Rating.trial_index),
+        )
+        .outerjoin(VersionClip, VersionClip.id == AssignedTrial.version_clip_id)
+        .where(Rating.study_run_id == run.id)
+        .order_by(Rating.id)
+    )
+    return [(rating, trial, clip) for rating, trial, clip in session.execute(query)]
+
+
+def events(session: Session, run: StudyRun) -> list[RunEvent]:
+    """The events of a run in the order they came, heartbeats left out."""
+    query = select(RunEvent).where(RunEvent.study_run_id == run.id, RunEvent.type != "heartbeat")
+    return list(session.scalars(query.order_by(RunEvent.id)))
+
+
+def forms(session: Session, run: StudyRun) -> list[FormAnswer]:
+    """The form answers of a run."""
+    return list(session.scalars(select(FormAnswer).where(FormAnswer.study_run_id == run.id)))
+
+
+def calibrations(session: Session, run: StudyRun) -> list[Calibration]:
+    """The calibrations of a run, in the order they were made."""
+    query = select(Calibration).where(Calibration.study_run_id == run.id).order_by(Calibration.id)
+    return list(session.scalars(query))
+
+
+def delete_personal_rows(session: Session, run: StudyRun) -> int:
+    """Delete everything a person left in a run; return how many ratings that were."""
+    ratings = session.scalar(select(func.count()).select_from(Rating).where(Rating.study_run_id == run.id))
+    for table in (Rating, RunEvent, FormAnswer, Calibration):
+        session.execute(delete(table).where(table.study_run_id == run.id))
+    return int(ratings or 0)

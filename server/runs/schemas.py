@@ -1,0 +1,112 @@
+"""One participant's visit as the experimenter sees it."""
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+
+class Exclude(BaseModel):
+    """Why a run is excluded; kept with the data."""
+
+    model_config = ConfigDict(extra="forbid")
+    reason: Annotated[str, StringConstraints(strip_whitespace=True, min_length=3, max_length=500)]
+
+
+class Erase(BaseModel):
+    """The run's identifier once more, as a guard against a slip."""
+
+    model_config = ConfigDict(extra="forbid")
+    confirm: Annotated[str, StringConstraints(max_length=40)]
+
+
+class RunSummary(BaseModel):
+    """One line of the participants page."""
+
+    run: str
+    participant: str
+    phase: str
+    synthetic: bool
+    status: str
+    stage: str
+    language: str
+    started_at: datetime
+    last_seen_at: datetime
+    completed_at: datetime | None
+    minutes: float = Field(description="From start to end, or to the last sign of life.")
+    trials: int
+    answered: int
+    not_good: int = Field(description="Plays that were flagged or failed.")
+    excluded: bool
+    exclusion_reason: str | None
+    erased_at: datetime | None
+    version: int
+    link: str
+
+
+class TimelineTrial(BaseModel):
+    """One play of one trial with its answer and what was shown."""
+
+    trial_index: int
+    kind: str
+    block: int
+    cell: str | None
+    exemplar: int | None
+    clip_sha256: str | None
+    play: int
+    response: int | None
+    expected_response: int | None
+    rt: float | None
+    comment: str | None
+    method: str
+    verdict: str
+    verdict_rule: str
+    key_to_first_frame_ms: float | None
+    frames_drawn: int | None
+    frames_late: int | None
+    frames_missing: int | None
+    longest_gap_ms: float | None
+    focus_lost: bool | None
+    drawn: list[list[float]] | None
+    saved_at: datetime
+
+
+class TimelineEvent(BaseModel):
+    """Something that happened around the trials."""
+
+    type: str
+    at_client: datetime | None
+    received_at: datetime
+    data: dict[str, Any]
+
+
+class TimelineForm(BaseModel):
+    """The answers of one form."""
+
+    form: str
+    answers: dict[str, Any]
+    saved_at: datetime
+
+
+class TimelineCalibration(BaseModel):
+    """One size calibration."""
+
+    model_config = ConfigDict(from_attributes=True)
+    px_per_mm: float
+    method: str
+    viewing_distance_mm: float | None
+    zoom: float
+    saved_at: datetime
+
+
+class Timeline(BaseModel):
+    """One run, complete."""
+
+    summary: RunSummary
+    device: dict[str, Any]
+    recruiter_parameters: dict[str, str]
+    consented_at: datetime | None
+    trials: list[TimelineTrial]
+    events: list[TimelineEvent]
+    forms: list[TimelineForm]
+    calibrations: list[TimelineCalibration]

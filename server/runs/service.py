@@ -1,0 +1,134 @@
+"""Timelines, exclusion with a reason, and erasure on request."""
+
+import secrets
+from datetime import timedelta
+
+from sqlalchemy.orm import Session
+
+from server.accounts.audit import record
+from server.accounts.identity import Identity
+from server.clock import now
+from server.errors import Conflict, Invalid
+from server.models import AssignedTrial, Rating, Study, StudyRun, VersionClip
+from server.runs import repository
+from server.runs.schemas import (
+    RunSummary,
+    Timeline,
+    TimelineCalibration,
+    TimelineEvent,
+    TimelineForm,
+    TimelineTrial,
+)
+
+
+def summaries(session: Session, study: Study) -> list[RunSummary]:
+    """One line a run, the latest first."""
+    runs = repository.runs_of(session, study)
+    counts = repository.answered(session, [run.id for run in runs])
+    return [summary(run, *counts.get(run.id, (0, 0))) for run in runs]
+
+
+def summary(run: StudyRun, answered: int, not_good: int) -> RunSummary:
+    """One line of the participants page."""
+    spent = (run.completed_at or run.last_seen_at) - run.started_at
+    return RunSummary(
+        run=run.public_id,
+        participant=run.participant,
+        phase=run.phase,
+        synthetic=run.synthetic,
+        status=run.status,
+        stage=run.stage,
+        language=run.language,
+        started_at=run.started_at,
+        last_seen_at=run.last_seen_at,
+        completed_at=run.completed_at,
+        minutes=round(spent / timedelta(minutes=1), 1),
+        trials=run.trials_total,
+        answered=answered,
+        not_good=not_good,
+        excluded=run.excluded,
+        exclusion_reason=run.exclusion_reason,
+        erased_at=run.erased_at,
+        version=run.version.number,
+        link=run.link.label or run.link.kind,
+    )
+
+
+def timeline(session: Session, study: Study, public_id: str) -> Timeline:
+    """Everything stored of one run."""
+    run = repository.find_run(session, study, public_id)
+    plays = repository.plays(session, run)
+    answered = len({rating.trial_index for rating, _, _ in plays})
+    not_good = sum(rating.verdict != "good" for rating, _, _ in plays)
+    return Timeline(
+        summary=summary(run, answered, not_good),
+        device=run.device,
+        recruiter_parameters=run.recruiter_parameters,
+        consented_at=run.consented_at,
+        trials=[_trial(*play) for play in plays],
+        events=[
+            TimelineEvent(type=row.type, at_client=row.at_client, received_at=row.received_at, data=row.data)
+            for row in repository.events(session, run)
+        ],
+        forms=[
+            TimelineForm(form=row.form, answers=row.answers, saved_at=row.saved_at)
+            for row in repository.forms(session, run)
+        ],
+        calibrations=[
+            TimelineCalibration.model_validate(row) for row in repository.calibrations(session, run)
+        ],
+    )
+
+
+_FROM_RATING = (
+    "trial_index", "play", "response", "rt", "comment", "method", "verdict", "verdict_rule",
+    "key_to_first_frame_ms", "frames_drawn", "frames_late", "frames_missing", "longest_gap_ms", "focus_lost",
+    "drawn", "saved_at",
+)  # fmt: skip
+
+
+def _trial(rating: Rating, trial: AssignedTrial, clip: VersionClip | None) -> TimelineTrial:
+    values = {name: getattr(rating, name) for name in _FROM_RATING}
+    values |= {"kind": trial.kind, "block": trial.block, "expected_response": trial.expected_response}
+    values |= {
+        "cell": clip.cell if clip else None,
+        "exemplar": clip.exemplar if clip else None,
+        "clip_sha256": clip.clip_sha256 if clip else None,
+    }
+    return TimelineTrial.model_validate(values)
+
+
+def exclude(session: Session, study: Study, public_id: str, reason: str, who: Identity) -> None:
+    """Mark a run as excluded; its data stay, with the reason."""
+    run = repository.find_run(session, study, public_id)
+    if run.erased_at is not None:
+        raise Conflict("This run's data were erased; there is nothing left to exclude.")
+    run.excluded, run.exclusion_reason = True, reason
+    run.excluded_at, run.excluded_by = now(), who.account_id
+    record(session, who, "run excluded", "run", public_id, study=study.name, reason=reason)
+
+
+def include(session: Session, study: Study, public_id: str, who: Identity) -> None:
+    """Undo an exclusion; the audit log keeps that it was there."""
+    run = repository.find_run(session, study, public_id)
+    if not run.excluded:
+        raise Conflict("This run is not excluded.")
+    record(session, who, "exclusion undone", "run", public_id, study=study.name, reason=run.exclusion_reason)
+    run.excluded, run.exclusion_reason, run.excluded_at, run.excluded_by = False, None, None, None
+
+
+def erase(session: Session, study: Study, public_id: str, confirm: str, who: Identity) -> None:
+    """Delete one person's data for good; a row without content stays, so that counts stay right."""
+    run = repository.find_run(session, study, public_id)
+    if confirm != public_id:
+        raise Invalid(f"To erase this run, confirm with its identifier {public_id}; got '{confirm}'.")
+    if run.erased_at is not None:
+        raise Conflict("This run's data were erased already.")
+    ratings = repository.delete_personal_rows(session, run)
+    run.participant, run.device, run.recruiter_parameters = "erased", {}, {}
+    run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
+    # Nobody can go on with an erased run: its tokens fit nothing any more.
+    run.token_hash, run.client_id = secrets.token_hex(32), secrets.token_hex(16)
+    run.status = "withdrawn" if run.status == "active" else run.status
+    run.erased_at = now()
+    record(session, who, "run erased", "run", public_id, study=study.name, ratings=ratings)
