@@ -15,9 +15,11 @@ from server.context import open_services
 from server.errors import install_error_handlers
 from server.middleware import BodyLimit, SecurityHeaders
 from server.monitor import endpoints as monitor
+from server.participants import endpoints as participants
 from server.results import endpoints as results
 from server.runs import endpoints as runs
 from server.settings import Settings
+from server.trials import endpoints as trials
 
 
 def _routers() -> tuple[APIRouter, ...]:
@@ -25,6 +27,8 @@ def _routers() -> tuple[APIRouter, ...]:
     return (
         health.router,
         clips.router,
+        participants.router,
+        trials.router,
         accounts.router,
         people.router,
         monitor.router,

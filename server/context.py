@@ -9,6 +9,7 @@ from server.clips.store import ClipStore, FolderStore
 from server.db import Database, open_database
 from server.rate_limit import RateLimit
 from server.settings import Settings
+from server.versions import Versions
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Services:
     clips: ClipStore
     run_starts: RateLimit
     unsupported: RateLimit
+    versions: Versions
     sign_ins: RateLimit
 
 
@@ -31,6 +33,7 @@ def open_services(settings: Settings) -> Services:
         clips=FolderStore(settings.clip_folder),
         run_starts=RateLimit(settings.run_starts_per_minute),
         unsupported=RateLimit(settings.unsupported_per_minute),
+        versions=Versions(),
         sign_ins=RateLimit(settings.logins_per_minute),
     )
 

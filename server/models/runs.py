@@ -28,7 +28,8 @@ class StudyRun(Base):
     """A participant's visit. No internet address is stored, here or anywhere.
 
     slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease.
-    seed: of the trial order. elapsed_ms: latest `time_elapsed`, where the clock goes on after a reload.
+    seed: of the trial order. trials_answered: trials that need no further play, practice and checks included.
+    elapsed_ms: latest `time_elapsed`, from which the clock goes on after a reload.
     px_per_mm, viewing_distance_mm: of the latest calibration, copied to each rating.
     erased_at: the person's data were deleted on request; the row stays so that counts stay right.
     """
@@ -48,7 +49,7 @@ class StudyRun(Base):
     study_id: Mapped[int] = mapped_column(ForeignKey("studies.id"))
     version_id: Mapped[int] = mapped_column(ForeignKey("study_versions.id"))
     link_id: Mapped[int] = mapped_column(ForeignKey("links.id"))
-    client_id: Mapped[str] = mapped_column(String(40))
+    client_id: Mapped[str] = mapped_column(String(80))
     token_hash: Mapped[str] = mapped_column(String(64), unique=True)
     participant: Mapped[str] = mapped_column(String(200))
     phase: Mapped[str] = mapped_column(String(10))
@@ -60,6 +61,7 @@ class StudyRun(Base):
     seed: Mapped[int] = mapped_column(BigInteger)
     slot: Mapped[int]
     trials_total: Mapped[int]
+    trials_answered: Mapped[int] = mapped_column(default=0)
     started_at: Mapped[datetime] = mapped_column(default=now)
     last_seen_at: Mapped[datetime] = mapped_column(default=now)
     consented_at: Mapped[datetime | None]

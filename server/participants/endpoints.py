@@ -1,0 +1,142 @@
+"""The participant's side of the API: links, runs, forms, events. A run's token is its only credential."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Depends, Response
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+
+from server.context import DatabaseDep, ServicesDep
+from server.errors import ERROR_RESPONSES
+from server.participants import links, runs
+from server.participants.refusals import RunUnknown
+from server.participants.schemas import (
+    CalibrationResult,
+    Completion,
+    Consent,
+    Events,
+    FormAnswers,
+    Key,
+    LanguageChange,
+    LinkState,
+    Received,
+    RunStart,
+    RunStarted,
+    RunState,
+    Saved,
+    StageChange,
+    Unsupported,
+)
+from server.tokens import hash_token
+
+router = APIRouter(prefix="/api", tags=["participants"], responses=ERROR_RESPONSES)
+_bearer = HTTPBearer(auto_error=False, description="The run token of POST /api/links/{link_token}/runs.")
+
+
+async def _run_token(
+    credentials: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
+) -> str:
+    if credentials is None:
+        message = "Expected the header `Authorization: Bearer <run_token>`, got none."
+        raise RunUnknown(message, headers={"www-authenticate": "Bearer"})
+    return credentials.credentials
+
+
+RunToken = Annotated[str, Depends(_run_token)]
+
+
+@router.get("/links/{link_token}")
+def get_link(services: ServicesDep, link_token: str) -> LinkState:
+    """Where a link leads and whether it is open."""
+    with services.database.read() as session:
+        return links.link_state(services, session, link_token)
+
+
+@router.post("/links/{link_token}/runs", status_code=201, responses={200: {"model": RunStarted}})
+def start_run(services: ServicesDep, link_token: str, start: RunStart, response: Response) -> RunStarted:
+    """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
+    services.run_starts.hit(hash_token(link_token))
+    with services.database.write() as session:
+        started = links.start_run(services, session, link_token, start)
+    response.status_code = 200 if started.resumed else 201
+    return started
+
+
+@router.post("/unsupported", status_code=202)
+def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
+    """Tell the server that a browser or screen was turned away before a run began."""
+    services.unsupported.hit(hash_token(report.link_token))
+    with services.database.write() as session:
+        runs.save_unsupported(session, report)
+    return Received(received=1)
+
+
+@router.get("/run")
+def get_run(services: ServicesDep, token: RunToken) -> RunState:
+    """Everything the page needs to begin or to go on."""
+    with services.database.read() as session:
+        return runs.run_state(services, session, token)
+
+
+@router.put("/run/consent")
+def put_consent(services: ServicesDep, token: RunToken, consent: Consent) -> Saved:
+    """Agree to take part; `agreed: false` ends the run."""
+    with services.database.write() as session:
+        return runs.save_consent(services, session, token, consent.agreed)
+
+
+@router.put("/run/calibration")
+def put_calibration(database: DatabaseDep, token: RunToken, calibration: CalibrationResult) -> Saved:
+    """Add a size calibration."""
+    with database.write() as session:
+        return runs.save_calibration(session, token, calibration)
+
+
+@router.put("/run/device")
+def put_device(
+    database: DatabaseDep, token: RunToken, device: Annotated[dict[Key, Any], Body(max_length=40)]
+) -> Saved:
+    """Add facts about browser and screen."""
+    with database.write() as session:
+        return runs.save_device(session, token, device)
+
+
+@router.put("/run/forms/{name}")
+def put_form(services: ServicesDep, token: RunToken, name: str, form: FormAnswers) -> Saved:
+    """Store the answers of a declared form."""
+    with services.database.write() as session:
+        return runs.save_form(services, session, token, name, form.answers)
+
+
+@router.put("/run/stage")
+def put_stage(database: DatabaseDep, token: RunToken, change: StageChange) -> Saved:
+    """Tell where the participant is."""
+    with database.write() as session:
+        return runs.save_stage(session, token, change.stage)
+
+
+@router.put("/run/language")
+def put_language(services: ServicesDep, token: RunToken, change: LanguageChange) -> Saved:
+    """Change the language."""
+    with services.database.write() as session:
+        return runs.save_language(services, session, token, change.language)
+
+
+@router.post("/run/events")
+def post_events(database: DatabaseDep, token: RunToken, events: Events) -> Received:
+    """Tell what happened; an event with a known id is left as it is."""
+    with database.write() as session:
+        return Received(received=runs.save_events(session, token, events.events))
+
+
+@router.post("/run/complete")
+def complete_run(services: ServicesDep, token: RunToken) -> Completion:
+    """Close the run and get the code; refused while trials are unanswered."""
+    with services.database.write() as session:
+        return runs.complete_run(services, session, token)
+
+
+@router.post("/run/withdraw")
+def withdraw_run(database: DatabaseDep, token: RunToken) -> Saved:
+    """Stop taking part."""
+    with database.write() as session:
+        return runs.withdraw(session, token)

@@ -1,0 +1,225 @@
+"""What a link leads to, and how a run begins or is taken up again."""
+
+import secrets
+from datetime import timedelta
+from typing import Any, Literal
+from uuid import UUID
+
+from sqlalchemy.orm import Session
+
+from experiments import design
+from experiments.definition import Experiment
+from experiments.errors import did_you_mean
+from server import assignment
+from server.clock import now
+from server.context import Services
+from server.models import Link, Study, StudyRun
+from server.participants import repository
+from server.participants.recruiter import NO_RECRUITER, Recruiter
+from server.participants.refusals import (
+    LanguageUnknown,
+    LinkExpired,
+    LinkUnknown,
+    LinkUsed,
+    RunTooOld,
+    StudyClosed,
+    StudyFull,
+    StudyPaused,
+)
+from server.participants.schemas import Gates, LinkedStudy, LinkState, RunStart, RunStarted
+from server.tokens import derived_token, hash_token, new_public_id, new_token
+from server.versions import LoadedVersion
+
+RUN_PURPOSE = "run"
+SEED_BITS = 53  # so that a seed survives JSON in every program
+_REFUSALS = {
+    "expired": (LinkExpired, "This link has expired; please ask the person who invited you for a new one."),
+    "closed": (StudyClosed, "This study takes no more participants."),
+    "paused": (StudyPaused, "This study is paused; please come back later."),
+    "full": (StudyFull, "Every place of this study is taken; please come back later."),
+}
+
+
+def find_link(session: Session, token: str) -> Link:
+    """The link with this token, or LinkUnknown."""
+    link = repository.link_by_token(session, token)
+    if link is None:
+        raise LinkUnknown("This link is not known; please check that the address is complete.")
+    return link
+
+
+def recruiter_of(link: Link) -> Recruiter:
+    """The recruiter of a link, or of its study."""
+    declared = link.recruiter or link.study.recruiter
+    return Recruiter.model_validate(declared) if declared else NO_RECRUITER
+
+
+def link_state(services: Services, session: Session, token: str) -> LinkState:
+    """What a visitor sees before a run begins."""
+    link = find_link(session, token)
+    version = repository.active_version(session, link.study)
+    experiment = services.versions.get(session, version.id).experiment
+    run = repository.latest_run(session, link) if link.kind == "personal" else None
+    resumable = run is not None and run.status == "active" and _refusal_to_resume(experiment, run) is None
+    over = run is not None and not resumable and not _restarts(experiment, run)
+    return LinkState(
+        study=LinkedStudy(
+            name=link.study.name,
+            title=experiment.title,
+            languages=list(experiment.languages),
+            background=experiment.display.background,
+            expected_minutes=design.expected_minutes(experiment),
+        ),
+        status="open" if resumable else "used" if over else _status(session, link, link.study, experiment),
+        kind=link.kind,
+        resumable=resumable,
+        gates=Gates.model_validate(experiment.display.model_dump(include=set(Gates.model_fields))),
+    )
+
+
+def start_run(services: Services, session: Session, token: str, start: RunStart) -> RunStarted:
+    """Begin a run, or give back the one this browser, person or personal link already has."""
+    link = find_link(session, token)
+    study = repository.lock_study(session, link.study_id)
+    known = _known_run(session, link, start)
+    if known is not None:
+        experiment = services.versions.get(session, known.version_id).experiment
+        if not _restarts(experiment, known):
+            return _resumed(services, experiment, known, start.client_id)
+        known.status = "withdrawn"
+        known.client_id = f"{known.client_id}:{known.public_id}"
+        session.flush()
+    version = repository.active_version(session, study)
+    loaded = services.versions.get(session, version.id)
+    status = _status(session, link, study, loaded.experiment)
+    if status != "open":
+        refusal, message = _REFUSALS[status]
+        raise refusal(message)
+    if start.language not in loaded.experiment.languages:
+        near = did_you_mean(start.language, loaded.experiment.languages)
+        raise LanguageUnknown(f"The study has no texts in '{start.language}'{near}.")
+    run, run_token = _new_run(services, session, link, study, version.id, loaded, start)
+    return RunStarted(run_token=run_token, run_id=run.public_id, resumed=False)
+
+
+Status = Literal["open", "closed", "expired", "full", "paused"]
+
+
+def _status(session: Session, link: Link, study: Study, experiment: Experiment) -> Status:
+    """Whether a new run may begin: open, or the reason why not."""
+    if link.expires_at is not None and link.expires_at <= now():
+        return "expired"
+    if link.kind == "preview":
+        return "open"
+    if study.status not in ("pilot", "live"):
+        return "closed"
+    if study.paused:
+        return "paused"
+    lease = timedelta(minutes=experiment.session.lease_minutes)
+    for quota, column, ident in (
+        (link.quota, StudyRun.link_id, link.id),
+        (study.quota, StudyRun.study_id, study.id),
+    ):
+        if quota is not None and not link.synthetic:
+            taken = repository.places_taken(session, column, ident, lease)
+            if taken >= quota:
+                return "full"
+    return "open"
+
+
+def _known_run(session: Session, link: Link, start: RunStart) -> StudyRun | None:
+    run = repository.run_of_client(session, link, str(start.client_id))
+    if run is None and link.kind == "personal":
+        run = repository.latest_run(session, link)
+    recruiter = recruiter_of(link)
+    if run is None and recruiter.kind != "generic":
+        participant = recruiter.participant(start.query)
+        run = repository.latest_run(session, link, participant) if participant else None
+    return run
+
+
+def _restarts(experiment: Experiment, run: StudyRun) -> bool:
+    """True where coming back begins anew. Before consent there is nothing to begin anew."""
+    return experiment.session.resume == "restart" and run.status == "active" and run.consented_at is not None
+
+
+def _refusal_to_resume(experiment: Experiment, run: StudyRun) -> LinkUsed | RunTooOld | None:
+    if run.status != "active" or run.preview:
+        return None
+    if now() - run.started_at > timedelta(hours=experiment.session.maximum_age_hours):
+        hours = f"{experiment.session.maximum_age_hours:g}"
+        return RunTooOld(f"This visit began more than {hours} hours ago and cannot be taken up again.")
+    if experiment.session.resume == "block" and run.consented_at is not None:
+        return LinkUsed("This study must be done in one go; a visit that was left cannot be taken up again.")
+    return None
+
+
+def _resumed(services: Services, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
+    refusal = _refusal_to_resume(experiment, run)
+    if refusal is not None:
+        raise refusal
+    run.last_seen_at = now()
+    token = derived_token(services.settings.key, RUN_PURPOSE, run.public_id)
+    run.token_hash = hash_token(token)
+    again = run.client_id != str(client_id) or run.consented_at is not None
+    return RunStarted(run_token=token, run_id=run.public_id, resumed=again)
+
+
+def _new_run(
+    services: Services,
+    session: Session,
+    link: Link,
+    study: Study,
+    version_id: int,
+    loaded: LoadedVersion,
+    start: RunStart,
+) -> tuple[StudyRun, str]:
+    """Draw slot, seed and order, and store them with the run."""
+    preview, phase = link.kind == "preview", "live" if study.status == "live" else "pilot"
+    if preview:
+        keep = timedelta(hours=services.settings.preview_keep_hours)
+        repository.delete_previews(session, study, now() - keep)
+    lease = timedelta(minutes=loaded.experiment.session.lease_minutes)
+    held = repository.held_slots(session, version_id, phase, link.synthetic, lease)
+    slot, seed = assignment.free_slot(held), secrets.randbits(SEED_BITS)
+    trials = assignment.assign(loaded.experiment, seed, slot)
+    public_id = new_public_id()
+    token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
+    own = link.label if link.kind == "personal" else recruiter_of(link).participant(start.query)
+    run = StudyRun(
+        public_id=public_id,
+        study_id=study.id,
+        version_id=version_id,
+        link_id=link.id,
+        client_id=str(start.client_id),
+        token_hash=hash_token(token),
+        participant=(own or public_id)[:200],
+        phase=phase,
+        synthetic=link.synthetic,
+        preview=preview,
+        language=start.language,
+        seed=seed,
+        slot=slot,
+        trials_total=len(trials),
+        completion_code=new_token()[:10],
+        recruiter_parameters=start.query,
+        device=start.device,
+    )
+    repository.add_all(session, [run])
+    repository.add_trials(session, _trial_rows(run, loaded, trials))
+    return run, token
+
+
+def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[assignment.Trial]) -> list[dict[str, Any]]:
+    return [
+        {
+            "study_run_id": run.id,
+            "trial_index": index,
+            "kind": trial.kind,
+            "block": trial.block,
+            "block_label": trial.block_label,
+            "version_clip_id": loaded.places[trial.clip.cell, trial.clip.exemplar] if trial.clip else None,
+            "expected_response": trial.expected_response,
+        }
+        for index, trial in enumerate(trials)
+    ]

@@ -1,0 +1,88 @@
+"""Why a participant's request is refused."""
+
+from server.errors import ApiError, Conflict, Invalid, NotFound
+
+
+class LinkUnknown(NotFound):
+    """No link has this token, or it was withdrawn."""
+
+    code = "link_unknown"
+
+
+class LinkExpired(Conflict):
+    """The link's time is over."""
+
+    code = "link_expired"
+
+
+class LinkUsed(Conflict):
+    """The link was for one visit, and that has been."""
+
+    code = "link_used"
+
+
+class StudyClosed(Conflict):
+    """The study takes no more participants."""
+
+    code = "study_closed"
+
+
+class StudyPaused(Conflict):
+    """The study takes no participants for the moment."""
+
+    code = "study_paused"
+
+
+class StudyFull(Conflict):
+    """Every place is taken."""
+
+    code = "study_full"
+
+
+class RunTooOld(Conflict):
+    """The visit began too long ago to be taken up again."""
+
+    code = "run_too_old"
+
+
+class RunUnknown(ApiError):
+    """No run has this token."""
+
+    status = 401
+    code = "run_unknown"
+
+
+class RunClosed(Conflict):
+    """The run is over."""
+
+    code = "run_closed"
+
+
+class ConsentMissing(Conflict):
+    """Nothing is stored before the participant has agreed."""
+
+    code = "consent_missing"
+
+
+class RatingsMissing(Conflict):
+    """Trials are still to be answered."""
+
+    code = "ratings_missing"
+
+
+class LanguageUnknown(Invalid):
+    """The study has no texts in this language."""
+
+    code = "language_unknown"
+
+
+class FormUnknown(NotFound):
+    """The study declares no such form."""
+
+    code = "form_unknown"
+
+
+class FormInvalid(Invalid):
+    """An answer does not fit its question."""
+
+    code = "form_invalid"

@@ -1,0 +1,176 @@
+"""Reads and writes of links and runs; no rules here."""
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import delete, func, insert, select
+from sqlalchemy.orm import Session
+
+from server.clock import now
+from server.models import (
+    AssignedTrial,
+    Calibration,
+    FormAnswer,
+    Link,
+    Rating,
+    Study,
+    StudyRun,
+    StudyVersion,
+)
+from server.tokens import hash_token
+
+
+def link_by_token(session: Session, token: str) -> Link | None:
+    """The link with this token, withdrawn ones left out."""
+    return session.scalar(select(Link).where(Link.token_hash == hash_token(token), Link.revoked_at.is_(None)))
+
+
+def run_by_token(session: Session, token: str, *, lock: bool = False) -> StudyRun | None:
+    """The run with this token; `lock` keeps other requests of the same run waiting (PostgreSQL)."""
+    query = select(StudyRun).where(StudyRun.token_hash == hash_token(token))
+    return session.scalar(query.with_for_update() if lock else query)
+
+
+def lock_study(session: Session, study_id: int) -> Study:
+    """The study, held until the transaction ends: one start or completion of it at a time."""
+    query = select(Study).where(Study.id == study_id).with_for_update(key_share=True)
+    return session.scalars(query.execution_options(populate_existing=True)).one()
+
+
+def active_version(session: Session, study: Study) -> StudyVersion:
+    """The version new runs are made with."""
+    query = select(StudyVersion).where(StudyVersion.study_id == study.id)
+    return session.scalars(query.where(StudyVersion.number == study.active_version)).one()
+
+
+def run_of_client(session: Session, link: Link, client_id: str) -> StudyRun | None:
+    """The run this browser began through this link."""
+    query = select(StudyRun).where(StudyRun.link_id == link.id, StudyRun.client_id == client_id)
+    return session.scalar(query)
+
+
+def latest_run(session: Session, link: Link, participant: str | None = None) -> StudyRun | None:
+    """The newest run of a link, or of one participant of it."""
+    query = select(StudyRun).where(StudyRun.link_id == link.id).order_by(StudyRun.id.desc()).limit(1)
+    return session.scalar(query if participant is None else query.where(StudyRun.participant == participant))
+
+
+def places_taken(session: Session, column: Any, ident: int, lease: timedelta) -> int:
+    """Runs that are complete, or active and seen within the lease, where `column` equals `ident`."""
+    query = select(func.count()).select_from(StudyRun).where(column == ident, *_holding(lease))
+    return session.scalar(query.where(StudyRun.synthetic.is_(False))) or 0
+
+
+def complete_runs(session: Session, study: Study, phase: str) -> int:
+    """Complete runs of people in this phase, excluded ones not counted."""
+    query = (
+        select(func.count())
+        .select_from(StudyRun)
+        .where(
+            StudyRun.study_id == study.id,
+            StudyRun.status == "complete",
+            StudyRun.phase == phase,
+            StudyRun.preview.is_(False),
+            StudyRun.synthetic.is_(False),
+            StudyRun.excluded.is_(False),
+        )
+    )
+    return session.scalar(query) or 0
+
+
+def held_slots(
+    session: Session, version_id: int, phase: str, synthetic: bool, lease: timedelta
+) -> Sequence[int]:
+    """Slots of runs that are complete, or active and seen within the lease."""
+    query = select(StudyRun.slot).where(
+        StudyRun.version_id == version_id,
+        StudyRun.phase == phase,
+        StudyRun.synthetic.is_(synthetic),
+        *_holding(lease),
+    )
+    return session.scalars(query).all()
+
+
+def _holding(lease: timedelta) -> tuple[Any, ...]:
+    alive = (StudyRun.status == "active") & (StudyRun.last_seen_at > now() - lease)
+    return (
+        StudyRun.preview.is_(False),
+        StudyRun.excluded.is_(False),
+        (StudyRun.status == "complete") | alive,
+    )
+
+
+def add_trials(session: Session, rows: list[dict[str, Any]]) -> None:
+    """Store a run's trials in one statement."""
+    session.execute(insert(AssignedTrial), rows)
+
+
+def trials(session: Session, run: StudyRun) -> Sequence[Any]:
+    """The run's trials in order: trial_index, kind, block, version_clip_id, expected_response."""
+    columns = (
+        AssignedTrial.trial_index,
+        AssignedTrial.kind,
+        AssignedTrial.block,
+        AssignedTrial.version_clip_id,
+        AssignedTrial.expected_response,
+    )
+    query = select(*columns).where(AssignedTrial.study_run_id == run.id)
+    return session.execute(query.order_by(AssignedTrial.trial_index)).all()
+
+
+def plays(session: Session, run: StudyRun) -> dict[int, list[tuple[int, str]]]:
+    """Play number and verdict of every stored play, by trial."""
+    query = select(Rating.trial_index, Rating.play, Rating.verdict).where(Rating.study_run_id == run.id)
+    found: dict[int, list[tuple[int, str]]] = {}
+    for trial_index, play, verdict in session.execute(query):
+        found.setdefault(trial_index, []).append((play, verdict))
+    return found
+
+
+def failed_checks(session: Session, run: StudyRun) -> int:
+    """Attention checks answered otherwise than asked."""
+    query = (
+        select(func.count())
+        .select_from(Rating)
+        .join(
+            AssignedTrial,
+            (AssignedTrial.study_run_id == Rating.study_run_id)
+            & (AssignedTrial.trial_index == Rating.trial_index),
+        )
+        .where(Rating.study_run_id == run.id, AssignedTrial.kind == "attention")
+        .where(Rating.response.is_distinct_from(AssignedTrial.expected_response))
+    )
+    return session.scalar(query) or 0
+
+
+def latest_calibration(session: Session, run: StudyRun) -> Calibration | None:
+    """The calibration that counts."""
+    query = select(Calibration).where(Calibration.study_run_id == run.id)
+    return session.scalar(query.order_by(Calibration.id.desc()).limit(1))
+
+
+def answered_forms(session: Session, run: StudyRun) -> list[str]:
+    """Names of the forms that were answered."""
+    query = select(FormAnswer.form).where(FormAnswer.study_run_id == run.id).order_by(FormAnswer.id)
+    return list(session.scalars(query))
+
+
+def form_answer(session: Session, run: StudyRun, form: str) -> FormAnswer | None:
+    """The stored answers of one form."""
+    query = select(FormAnswer).where(FormAnswer.study_run_id == run.id, FormAnswer.form == form)
+    return session.scalar(query)
+
+
+def delete_previews(session: Session, study: Study, before: datetime) -> None:
+    """Delete previews that began earlier, with everything they hold."""
+    query = delete(StudyRun).where(
+        StudyRun.study_id == study.id, StudyRun.preview.is_(True), StudyRun.started_at < before
+    )
+    session.execute(query)
+
+
+def add_all(session: Session, rows: Iterable[object]) -> None:
+    """Add rows and send them to the database, so that their ids are known."""
+    session.add_all(rows)
+    session.flush()

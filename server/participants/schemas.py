@@ -1,0 +1,228 @@
+"""What the participant's page sends and gets."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+from uuid import UUID
+
+from pydantic import BaseModel, Field, StringConstraints
+
+from server.models import STAGES
+
+Stage = Literal[
+    "consent",
+    "forms_before",
+    "calibration",
+    "instructions",
+    "practice",
+    "trials",
+    "forms_after",
+    "debrief",
+    "done",
+]
+if Stage.__args__ != STAGES:  # type: ignore[attr-defined]
+    raise RuntimeError("the stages of the API and of the database differ")
+
+RunStatus = Literal["active", "complete", "screened_out", "withdrawn"]
+Text = Annotated[str, StringConstraints(max_length=500)]
+Key = Annotated[str, StringConstraints(max_length=100)]
+LanguageTag = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}(-[A-Z]{2})?$")]
+EventType = Annotated[str, StringConstraints(pattern=r"^[a-z_]{1,30}$")]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Pixels = Annotated[int, Field(ge=0, le=100_000)]
+
+
+class Gates(BaseModel):
+    """What the device must offer before a run begins."""
+
+    minimum_width_px: int
+    minimum_height_px: int
+    allow_touch: bool
+    full_screen: bool
+    calibrate: Literal["required", "optional", "off"]
+    viewing_distance: bool
+    inter_ocular_mm: float
+
+
+class LinkedStudy(BaseModel):
+    """What a visitor may know of a study before the run begins."""
+
+    name: str
+    title: str
+    languages: list[str]
+    background: str
+    expected_minutes: float
+
+
+class LinkState(BaseModel):
+    """Where a link leads, and whether it is open."""
+
+    study: LinkedStudy
+    status: Literal["open", "closed", "expired", "full", "paused", "used"]
+    kind: Literal["general", "personal", "preview"]
+    resumable: bool = Field(description="A run of this personal link is under way and can be taken up again.")
+    gates: Gates
+
+
+class RunStart(BaseModel):
+    """Begin (or take up) a run. The same client_id gets the same run, however often it asks."""
+
+    language: LanguageTag
+    client_id: UUID
+    query: dict[Key, Text] = Field(
+        default_factory=dict, max_length=20, description="Parameters of the address, such as PROLIFIC_PID."
+    )
+    device: dict[Key, Any] = Field(default_factory=dict, max_length=40)
+
+
+class RunStarted(BaseModel):
+    """The token that stands for the run from now on."""
+
+    run_token: str
+    run_id: str
+    resumed: bool
+
+
+class BlockInfo(BaseModel):
+    """One block: its number (0 is practice) and how many trials it has."""
+
+    block: int
+    trials: int
+
+
+class TrialInfo(BaseModel):
+    """One trial as the page needs it; nothing tells the participant which cell it is."""
+
+    trial_index: int
+    kind: Literal["practice", "main", "attention"]
+    block: int
+    clip_sha256: str | None
+    clip_url: str | None
+    frames: int | None
+    fps: float | None
+    bytes: int | None
+    width_px: int | None
+    height_px: int | None
+    width_mm: float | None
+    inter_ocular_px: float | None
+    prompt: str | None = Field(description="Markdown of an attention check.")
+    plays_done: int
+    plays_wanted: int
+    answered: bool
+
+
+class CalibrationState(BaseModel):
+    """The latest calibration."""
+
+    px_per_mm: float
+    method: Literal["card", "ruler"]
+    viewing_distance_mm: float | None
+    device_pixel_ratio: float
+    zoom: float
+
+
+class RunState(BaseModel):
+    """Everything the page needs to begin or to go on."""
+
+    run_id: str
+    status: RunStatus
+    stage: Stage
+    preview: bool
+    synthetic: bool
+    language: str
+    languages: list[str]
+    texts: dict[str, str] = Field(description="Markdown of the run's language, by page.")
+    forms: list[dict[str, Any]] = Field(description="Declared forms, as in experiments/forms.py.")
+    trial: dict[str, Any] = Field(description="The declared trial: scale, views, start, confirm, comment.")
+    display: dict[str, Any]
+    playback: dict[str, Any] = Field(description="The declared playback rules.")
+    break_seconds_min: int
+    consented_at: datetime | None
+    calibration: CalibrationState | None
+    answered_forms: list[str]
+    blocks: list[BlockInfo]
+    trials: list[TrialInfo]
+    elapsed_ms_before: float
+    completion_code: str | None
+    server_time: datetime
+
+
+class Consent(BaseModel):
+    """The participant's answer on the consent page; false ends the run."""
+
+    agreed: bool
+
+
+class CalibrationResult(BaseModel):
+    """One size calibration; each is kept, the latest counts."""
+
+    px_per_mm: Annotated[float, Field(gt=0, le=200, allow_inf_nan=False)]
+    method: Literal["card", "ruler"]
+    viewing_distance_mm: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)] | None = None
+    device_pixel_ratio: Positive
+    screen_width_px: Pixels
+    screen_height_px: Pixels
+    window_width_px: Pixels
+    window_height_px: Pixels
+    zoom: Positive = 1.0
+
+
+class StageChange(BaseModel):
+    """Where the participant is."""
+
+    stage: Stage
+
+
+class LanguageChange(BaseModel):
+    """The language the participant reads from now on."""
+
+    language: LanguageTag
+
+
+class FormAnswers(BaseModel):
+    """Answers by field name."""
+
+    answers: dict[Key, Any] = Field(max_length=200)
+
+
+class Event(BaseModel):
+    """Something that happened in the page; `at` is the participant's clock."""
+
+    id: UUID
+    type: EventType
+    at: datetime | None = None
+    data: dict[Key, Any] = Field(default_factory=dict, max_length=50)
+
+
+class Events(BaseModel):
+    """Up to 100 events; those the server already has are left as they are."""
+
+    events: list[Event] = Field(max_length=100)
+
+
+class Unsupported(BaseModel):
+    """A browser or screen that failed a gate before a run began."""
+
+    link_token: Annotated[str, StringConstraints(max_length=100)]
+    reason: Key
+    data: dict[Key, Any] = Field(default_factory=dict, max_length=50)
+
+
+class Saved(BaseModel):
+    """The server has it."""
+
+    saved_at: datetime
+    stage: Stage
+    status: RunStatus
+
+
+class Completion(BaseModel):
+    """The code the participant takes away, and where to go."""
+
+    completion_code: str
+    redirect_url: str | None
+
+
+class Received(BaseModel):
+    """The server has it."""
+
+    received: int

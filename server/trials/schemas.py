@@ -1,0 +1,65 @@
+"""One rating as the page sends it, and the receipt it gets."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, Field, StrictInt, StringConstraints
+
+Milliseconds = Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=0, le=1_000_000)]
+FrameTime = tuple[
+    Annotated[int, Field(ge=0, le=1_000_000)], Annotated[float, Field(ge=-1e10, le=1e10, allow_inf_nan=False)]
+]
+
+
+class PlaybackLog(BaseModel):
+    """What the page measured while the clip played; null where it could not."""
+
+    method: Literal["webcodecs", "video", "none"]
+    clip_sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
+    key_to_first_frame_ms: Milliseconds | None = None
+    frames_drawn: Count | None = None
+    frames_late: Count | None = None
+    frames_missing: Count | None = None
+    longest_gap_ms: Milliseconds | None = None
+    stalls: Count | None = None
+    focus_lost: bool | None = None
+    refresh_rate_hz: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] | None = None
+    device_pixel_ratio: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+    drawn: Annotated[list[FrameTime], Field(max_length=5000)] | None = Field(
+        default=None, description="Index and time in ms of every drawn frame."
+    )
+
+
+class RatingIn(BaseModel):
+    """One play of one trial with its answer; `response` is null where the clip could not be rated."""
+
+    trial_index: Count
+    play: Annotated[int, Field(ge=1, le=100)] = 1
+    response: StrictInt | None
+    rt: Milliseconds | None = Field(default=None, description="From the clip's last frame to the answer, ms.")
+    rt_from_first_frame: Milliseconds | None = None
+    time_elapsed: Milliseconds | None = Field(
+        default=None, description="From the run's start to the answer, ms."
+    )
+    changes: Count = 0
+    comment: Annotated[str, StringConstraints(max_length=5000)] | None = None
+    answered_at_client: datetime | None = None
+    playback: PlaybackLog
+
+
+class Receipt(BaseModel):
+    """The rating is on disk."""
+
+    rating_id: str
+    saved_at: datetime
+    verdict: Literal["good", "flagged", "failed"]
+    rule: str = Field(description="The rule that gave the verdict, empty where good.")
+    again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
+    remaining: int = Field(description="Trials of the run that still need an answer.")
+
+
+class RatingSaved(BaseModel):
+    """The answer to a rating."""
+
+    receipt: Receipt

@@ -1,0 +1,170 @@
+"""Store a rating once, judge its playback, and write the receipt."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from server.clock import now
+from server.context import Services
+from server.errors import Conflict, Invalid, NotFound
+from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
+from server.tokens import hash_token
+from server.trials import repository
+from server.trials.schemas import PlaybackLog, RatingIn, Receipt
+from server.trials.verdict import Playback, Ruling, is_settled, judge
+from server.versions import LoadedVersion
+
+
+class TrialNotInRun(NotFound):
+    """The run has no such trial."""
+
+    code = "trial_not_in_run"
+
+
+class RatingOutOfScale(Invalid):
+    """The rating does not lie on the declared scale."""
+
+    code = "rating_out_of_scale"
+
+
+class PlayOutOfRange(Invalid):
+    """A clip may not be shown as often as this."""
+
+    code = "play_out_of_range"
+
+
+class RatingMissing(Invalid):
+    """Only a clip that failed may go without a rating."""
+
+    code = "rating_missing"
+
+
+class RatingDiffers(Conflict):
+    """Another value is stored under this id, or for this play."""
+
+    code = "rating_differs"
+
+
+def save_rating(
+    services: Services, session: Session, token: str, rating_id: str, rating: RatingIn
+) -> tuple[Receipt, bool]:
+    """Store a rating, or find it stored; return the receipt and whether it is new."""
+    run = repository.run_for_rating(session, hash_token(token))
+    if run is None:
+        raise RunUnknown("This visit is not known; please open the link you were given again.")
+    trial = repository.trial(session, run.id, rating.trial_index)
+    if trial is None:
+        raise TrialNotInRun(
+            f"Trial {rating.trial_index} is not in this run, which has trials 0 to {run.trials_total - 1}."
+        )
+    loaded = services.versions.get(session, run.version_id)
+    stored = repository.stored_ratings(session, run.id, rating.trial_index, rating_id)
+    known = _known(stored, rating_id, rating)
+    most = loaded.experiment.playback.max_repeats
+    if known is not None:
+        again = not is_settled(trial.kind, known.play, known.verdict, most)
+        left = run.trials_total - run.trials_answered
+        return _receipt(rating_id, known.saved_at, (known.verdict, known.verdict_rule), again, left), False
+    _check(run, loaded.experiment, trial.kind, rating)
+    ruling = _judge(loaded, trial.version_clip_id, rating)
+    saved_at = now()
+    repository.add_rating(session, _row(run, rating_id, rating, ruling, saved_at))
+    settles = is_settled(trial.kind, rating.play, ruling[0], most)
+    before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
+    answered = int(settles and not before)
+    elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)
+    repository.mark_seen(session, run.id, saved_at, elapsed, answered)
+    left = run.trials_total - run.trials_answered - answered
+    return _receipt(rating_id, saved_at, ruling, not settles and not before, left), True
+
+
+def _known(stored: list[Any], rating_id: str, rating: RatingIn) -> Any:
+    """The stored rating this one repeats; RatingDiffers where it says something else."""
+    for row in stored:
+        same_play = (row.trial_index, row.play) == (rating.trial_index, rating.play)
+        if row.rating_id != rating_id and not same_play:
+            continue
+        if same_play and row.response == rating.response:
+            return row
+        raise RatingDiffers(
+            f"Trial {row.trial_index}, play {row.play} is stored with the answer {row.response}; "
+            f"got {rating.response} for trial {rating.trial_index}, play {rating.play}. The first is kept.",
+            stored={"trial_index": row.trial_index, "play": row.play, "response": row.response},
+        )
+    return None
+
+
+def _check(run: Any, experiment: Experiment, kind: str, rating: RatingIn) -> None:
+    if run.status != "active":
+        raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
+    if run.consented_at is None:
+        raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
+    scale, most = experiment.trial.scale, experiment.playback.max_repeats + 1
+    if rating.response is not None and not scale.minimum <= rating.response <= scale.maximum:
+        raise RatingOutOfScale(
+            f"Expected a whole number from {scale.minimum} to {scale.maximum}, got {rating.response}."
+        )
+    if rating.response is None and kind == "attention":
+        raise RatingMissing("Expected an answer, got none; only a clip that failed may go without.")
+    if rating.play > most:
+        raise PlayOutOfRange(f"A clip is shown at most {most} times, got play {rating.play}.")
+
+
+def _playback(log: PlaybackLog) -> Playback:
+    indices = frozenset(index for index, _ in log.drawn) if log.drawn is not None else None
+    return Playback(
+        method=log.method,
+        clip_sha256=log.clip_sha256,
+        frames_drawn=log.frames_drawn,
+        frames_late=log.frames_late,
+        frames_missing=log.frames_missing,
+        longest_gap_ms=log.longest_gap_ms,
+        focus_lost=log.focus_lost,
+        drawn_indices=indices,
+    )
+
+
+def _judge(loaded: LoadedVersion, version_clip_id: int | None, rating: RatingIn) -> Ruling:
+    rules, rated = loaded.experiment.playback, rating.response is not None
+    if version_clip_id is None:
+        return judge(rules, _playback(rating.playback), None, 0, rated=rated)
+    clip = loaded.clips[version_clip_id]
+    return judge(rules, _playback(rating.playback), clip.sha256, clip.frames, rated=rated)
+
+
+def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: datetime) -> dict[str, Any]:
+    answered = rating.answered_at_client
+    if answered is not None and answered.tzinfo is None:
+        answered = answered.replace(tzinfo=UTC)
+    return {
+        "rating_id": rating_id,
+        "study_run_id": run.id,
+        "trial_index": rating.trial_index,
+        "play": rating.play,
+        "response": rating.response,
+        "rt": rating.rt,
+        "rt_from_first_frame": rating.rt_from_first_frame,
+        "time_elapsed": rating.time_elapsed,
+        "changes": rating.changes,
+        "comment": rating.comment,
+        "answered_at_client": answered,
+        **rating.playback.model_dump(),
+        "px_per_mm": run.px_per_mm,
+        "viewing_distance_mm": run.viewing_distance_mm,
+        "verdict": ruling[0],
+        "verdict_rule": ruling[1],
+        "saved_at": saved_at,
+    }
+
+
+def _receipt(rating_id: str, saved_at: datetime, ruling: Ruling, again: bool, remaining: int) -> Receipt:
+    return Receipt(
+        rating_id=rating_id,
+        saved_at=saved_at,
+        verdict=ruling[0],
+        rule=ruling[1],
+        again=again,
+        remaining=remaining,
+    )

@@ -1,0 +1,72 @@
+"""Study versions in memory: the declaration and the clips of a version never change, so each is read once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from threading import Lock
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from server.models import Clip, StudyVersion, VersionClip
+
+_MOST_KEPT = 64
+
+
+@dataclass(frozen=True)
+class PlacedClip:
+    """A clip at its place in the design, with what the page needs to show it."""
+
+    sha256: str
+    frames: int
+    fps: float
+    bytes: int
+    width_px: int
+    height_px: int
+    width_mm: float | None
+
+
+@dataclass(frozen=True)
+class LoadedVersion:
+    """A study version ready for use; `places` finds a clip's id by cell and exemplar."""
+
+    experiment: Experiment
+    inter_ocular_px: float | None
+    clips: Mapping[int, PlacedClip]
+    places: Mapping[tuple[str, int], int]
+
+
+class Versions:
+    """Loaded versions by id, shared by the threads of a worker."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[int, LoadedVersion] = {}
+        self._lock = Lock()
+
+    def get(self, session: Session, version_id: int) -> LoadedVersion:
+        """The version with this id, from memory or the database."""
+        found = self._loaded.get(version_id)
+        if found is None:
+            found = _load(session, version_id)
+            with self._lock:
+                while len(self._loaded) >= _MOST_KEPT:
+                    del self._loaded[next(iter(self._loaded))]
+                self._loaded[version_id] = found
+        return found
+
+
+def _load(session: Session, version_id: int) -> LoadedVersion:
+    version = session.get_one(StudyVersion, version_id)
+    query = (
+        select(VersionClip.id, VersionClip.cell, VersionClip.exemplar, VersionClip.width_mm, Clip)
+        .join(Clip, Clip.sha256 == VersionClip.clip_sha256)
+        .where(VersionClip.version_id == version_id)
+    )
+    clips: dict[int, PlacedClip] = {}
+    places: dict[tuple[str, int], int] = {}
+    for clip_id, cell, exemplar, width_mm, clip in session.execute(query):
+        sizes = (clip.frames, clip.fps, clip.bytes, clip.width_px, clip.height_px)
+        clips[clip_id] = PlacedClip(clip.sha256, *sizes, width_mm)
+        places[cell, exemplar] = clip_id
+    experiment = Experiment.model_validate(version.definition)
+    return LoadedVersion(experiment, version.inter_ocular_px, clips, places)
