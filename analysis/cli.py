@@ -1,0 +1,27 @@
+"""The command `analysis`: it only gathers the command groups."""
+
+import typer
+
+from experiments.command_line import run_command_line
+
+app = typer.Typer(
+    name="analysis",
+    help="From ratings to tables: within-participant ANOVA, means, pairs, figures and one report.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+
+def _gather() -> None:
+    from analysis.cli_run import register as register_run
+
+    register_run(app)
+
+
+_gather()
+
+
+def main() -> None:
+    """Run `analysis`; bad input ends in one line on stderr and exit code 2."""
+    run_command_line(app)

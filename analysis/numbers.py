@@ -1,0 +1,71 @@
+"""How numbers are printed: in tables and, in APA style, in sentences."""
+
+import math
+
+DASH = "–"
+"""Printed where a number does not exist."""
+
+
+def fixed(value: float, digits: int = 2) -> str:
+    """`value` with a fixed number of decimals; a dash where it does not exist; no negative zero."""
+    if not math.isfinite(value):
+        return DASH
+    text = f"{value:.{digits}f}"
+    return text.lstrip("-") if float(text) == 0 else text
+
+
+def share(value: float, digits: int = 3) -> str:
+    """A number that cannot exceed 1, without its leading zero, as APA has it."""
+    text = fixed(value, digits)
+    return text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
+
+
+def p_value(value: float) -> str:
+    """p with three decimals and no leading zero; `<.001` below that."""
+    if not math.isfinite(value):
+        return DASH
+    return "<.001" if value < 0.0005 else share(value)
+
+
+def paper_p(value: float) -> str:
+    """p as the paper prints it: two decimals, three below .01, `<0.001` below that."""
+    if not math.isfinite(value):
+        return DASH
+    if value < 0.001:
+        return "<0.001"
+    return fixed(value, 3 if value < 0.01 else 2)
+
+
+def apa_p(value: float) -> str:
+    """p as it stands in a sentence: `p = .020`, `p < .001`."""
+    if not math.isfinite(value):
+        return "p undefined"
+    text = p_value(value)
+    return f"p < {text[1:]}" if text.startswith("<") else f"p = {text}"
+
+
+def f_text(value: float) -> str:
+    """F with three decimals, fewer where it is large."""
+    return fixed(value, 3 if abs(value) < 1000 else 1)
+
+
+def sum_text(value: float) -> str:
+    """A sum of squares with four significant digits."""
+    if not math.isfinite(value):
+        return DASH
+    if value == 0:
+        return "0"
+    digits = max(0, 3 - math.floor(math.log10(abs(value))))
+    return fixed(value, min(digits, 4))
+
+
+def interval(bounds: tuple[float, float], digits: int = 2) -> str:
+    """A confidence interval in brackets."""
+    low, high = bounds
+    return f"[{fixed(low, digits)}, {fixed(high, digits)}]" if math.isfinite(low) else DASH
+
+
+def share_interval(bounds: tuple[float, float]) -> str:
+    """A confidence interval of a share, without leading zeros."""
+    low, high = bounds
+    return f"[{share(low, 2)}, {share(high, 2)}]" if math.isfinite(low) else DASH
