@@ -1,7 +1,275 @@
-"""`stimuli track`, `stimuli train`, `stimuli label` and `stimuli accuracy`."""
+"""`stimuli track`, `stimuli train`, `stimuli accuracy` and `stimuli label`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from stimuli_builder.tracking.learn import Lesson
+    from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
+    from stimuli_builder.video import VideoInfo
+
+Video = Annotated[Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")]
+LabelFile = Annotated[Path | None, typer.Option("--labels", help="Label file (JSON) of about 20 frames of VIDEO.")]
+OneEye = Annotated[bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points a frame.")]
+ShapeVariance = Annotated[float, typer.Option(help="Share of shape variance kept (n modes).", min=0.5, max=1.0)]
+LookVariance = Annotated[float, typer.Option(help="Share of appearance variance kept (m modes).", min=0.5, max=1.0)]
+CoupledVariance = Annotated[float, typer.Option(help="Share of coupled variance kept (l modes).", min=0.5, max=1.0)]
+FewestModes = Annotated[
+    bool, typer.Option("--paper-modes/--variance-only", help="Keep at least the paper's 8, 10 and 10 modes.")
+]
+BasePixels = Annotated[int, typer.Option(help="Pixels of the base mesh.", min=500, max=100_000)]
+Refine = Annotated[
+    bool | None,
+    typer.Option("--refine/--no-refine", help="Make labels consistent with the pictures; unset: where it helps."),
+]
+Folds = Annotated[int, typer.Option(help="Folds of the accuracy report.", min=2, max=50)]
+VariableRate = Annotated[
+    bool, typer.Option("--accept-variable-rate", help="Take a variable frame rate, with its own time stamps.")
+]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of the tracker to `app`."""
+    app.command()(track)
+    app.command()(train)
+    app.command()(accuracy)
+    app.command()(label)
+
+
+def track(
+    video: Video,
+    out: Annotated[Path, typer.Option(help="Track to write (CSV).")],
+    labels: LabelFile = None,
+    model: Annotated[Path | None, typer.Option(help="Reuse a model of 'stimuli train' instead of labels.")] = None,
+    one_eye: OneEye = False,
+    preview: Annotated[Path | None, typer.Option(help="Also draw mesh and distance trace on the video (MP4).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Also save the trace with labelled blinks (PNG, SVG, PDF).")] = None,
+    shape_variance: ShapeVariance = 0.98,
+    appearance_variance: LookVariance = 0.90,
+    coupled_variance: CoupledVariance = 0.98,
+    paper_modes: FewestModes = True,
+    base_pixels: BasePixels = 6500,
+    refine: Refine = None,
+    folds: Folds = 5,
+    accept_variable_rate: VariableRate = False,
+) -> None:
+    """Track the eyelids of a recording with the coupled active appearance model.
+
+    Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (one pair
+    distance_px with --one-eye), residual, iterations, status, reason. A frame that cannot be fitted has empty
+    points, the status 'lost' and its reason.
+
+    Examples:
+
+      stimuli track face.mp4 --labels face.labels.json --out track.csv
+
+      stimuli track eye.mp4 --labels eye.labels.json --one-eye --out track.csv --preview seen.mp4
+
+      stimuli track take2.mp4 --model actor1.npz --out track2.csv --plot track2.png
+    """
+    from experiments.errors import InputError
+    from stimuli_builder.files import temporary_beside
+    from stimuli_builder.tracking.learn import open_video
+    from stimuli_builder.tracking.track import track_video
+
+    if (labels is None) == (model is None):
+        raise InputError("expected either --labels or --model; give one of them")
+    for target in (out, preview, plot):
+        if target is not None:
+            temporary_beside(target)
+    info = open_video(video, accept_variable_rate)
+    options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
+    trained = _model(info, labels, model, options, one_eye, refine, folds)
+    with _progress() as progress:
+        task = progress.add_task("tracking", total=info.frame_count)
+        summary = track_video(
+            trained, info, out, lambda now: progress.update(task, completed=now.frames, refresh=False)
+        )
+    print(
+        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked, {summary.reinitialised:,} re-initialised, "
+        f"{summary.lost:,} lost\n{summary.fit_fps:,.0f} frames/s fit only, "
+        f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
+    )
+    _pictures(trained, info, out, preview, plot)
+
+
+def train(
+    video: Video,
+    labels: LabelFile = None,
+    out: Annotated[Path | None, typer.Option(help="Model to write (.npz).")] = None,
+    one_eye: OneEye = False,
+    shape_variance: ShapeVariance = 0.98,
+    appearance_variance: LookVariance = 0.90,
+    coupled_variance: CoupledVariance = 0.98,
+    paper_modes: FewestModes = True,
+    base_pixels: BasePixels = 6500,
+    refine: Refine = None,
+    folds: Folds = 5,
+    accept_variable_rate: VariableRate = False,
+) -> None:
+    """Train the model on labelled frames, report its accuracy by fold, and save it.
+
+    Every labelled frame is left out of training once and then found without its label. The report gives the root
+    mean square distance of the landmarks from the labels and the error of the inter-eyelid distance.
+
+    Examples:
+
+      stimuli train face.mp4 --labels face.labels.json --out actor1.npz
+
+      stimuli train eye.mp4 --labels eye.labels.json --one-eye --folds 8
+    """
+    from experiments.errors import InputError
+    from stimuli_builder.tracking.learn import learn, open_video
+    from stimuli_builder.tracking.model import save_model
+
+    if labels is None:
+        raise InputError("expected --labels with the label file of this video")
+    info = open_video(video, accept_variable_rate)
+    options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
+    lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine)
+    _report_modes(lesson)
+    _report_folds(lesson)
+    if out is not None:
+        save_model(lesson.model, out)
+        print(f"{out}: model saved")
+
+
+def accuracy(
+    track: Annotated[Path, typer.Argument(help="Track of the synthetic actor (CSV).")],
+    truth: Annotated[Path, typer.Argument(help="Truth that 'stimuli actor' wrote (CSV).")],
+) -> None:
+    """Compare a track of the synthetic actor with its exact truth.
+
+    Example:
+
+      stimuli accuracy track.csv truth.csv
+    """
+    from stimuli_builder.tracking.accuracy import compare_with_truth
+
+    report = compare_with_truth(track, truth)
+    blinks = "no blink" if report.blink_p95_px is None else f"{report.blink_p95_px:.3f} px in blinks"
+    print(
+        f"{report.frames:,} frames, {report.lost:,} lost, {report.reinitialised:,} re-initialised\n"
+        f"landmarks: RMS {report.rms_px:.3f} px, 95th percentile {report.p95_px:.3f} px, {blinks}\n"
+        f"inter-eyelid distance: error sd {report.distance_sd_px:.3f} px, bias {report.distance_bias_px:+.3f} px"
+    )
+
+
+def label(
+    video: Video,
+    out: Annotated[Path, typer.Option(help="Label file to write (JSON), to be corrected by hand.")],
+    bootstrap: Annotated[bool, typer.Option("--bootstrap", help="Propose labels with a landmark detector.")] = False,
+    weights: Annotated[
+        Path | None, typer.Option(help="Weights of the detector (face_landmarker.task); none are shipped.")
+    ] = None,
+    frames: Annotated[int, typer.Option(help="Frames to label, chosen for variety.", min=3, max=200)] = 20,
+    accept_variable_rate: VariableRate = False,
+) -> None:
+    """Propose labels for frames chosen for variety, with a face landmark detector (optional extra).
+
+    Needs the extra 'bootstrap' (MediaPipe) and a weights file of your own. A detector sets upper-lid points 1 to 2
+    pixels low on half-closed lids: review every frame on the labelling page before training.
+
+    Example:
+
+      stimuli label face.mp4 --bootstrap --weights face_landmarker.task --out face.labels.json
+    """
+    from experiments.errors import InputError
+    from stimuli_builder.tracking.bootstrap import propose_labels
+    from stimuli_builder.tracking.learn import open_video
+
+    if not bootstrap:
+        raise InputError("expected --bootstrap; to label by hand use the labelling page of the admin site")
+    info = open_video(video, accept_variable_rate)
+    labels = propose_labels(info, out, weights, frames)
+    print(f"{out}: {len(labels.frames)} frames proposed; review each one before training")
+
+
+def _options(shape: float, look: float, coupled: float, paper_modes: bool, base_pixels: int) -> "TrainingOptions":
+    from stimuli_builder.tracking.model import TrainingOptions
+
+    if paper_modes:
+        return TrainingOptions(shape, look, coupled, base_pixels=base_pixels)
+    return TrainingOptions(shape, look, coupled, 1, 1, 1, base_pixels)
+
+
+def _model(
+    info: "VideoInfo",
+    labels: Path | None,
+    model: Path | None,
+    options: "TrainingOptions",
+    one_eye: bool,
+    refine: bool | None,
+    folds: int,
+) -> "CoupledModel":
+    """Train from labels, or load a model and check that it is for as many eyes as wanted."""
+    from experiments.errors import InputError
+    from stimuli_builder.tracking.learn import learn
+    from stimuli_builder.tracking.model import load_model
+
+    if labels is not None:
+        lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine)
+        _report_modes(lesson)
+        return lesson.model
+    if model is None:
+        raise InputError("expected --labels or --model")
+    trained = load_model(model)
+    if one_eye and trained.eyes == 2:
+        raise InputError(f"{model}: a model of two eyes, --one-eye expects one; leave --one-eye out")
+    return trained
+
+
+def _progress() -> "Progress":
+    """A progress bar on stderr with frames/s and remaining time; silent where stderr is no terminal."""
+    import sys
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from stimuli_builder.tracking.speed import SpeedColumn
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        SpeedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        disable=not sys.stderr.isatty(),
+    )
+
+
+def _pictures(model: "CoupledModel", info: "VideoInfo", out: Path, preview: Path | None, plot: Path | None) -> None:
+    if preview is not None:
+        from stimuli_builder.tracking.preview import write_preview
+
+        with _progress() as progress:
+            task = progress.add_task("preview", total=info.frame_count)
+            write_preview(model, info, out, preview, lambda: progress.advance(task))
+        print(f"{preview}: preview written")
+    if plot is not None:
+        from stimuli_builder.tracking.plot import plot_track
+
+        found = plot_track(out, info.fps, plot)
+        print(f"{plot}: trace with {found} blinks")
+
+
+def _report_modes(lesson: "Lesson") -> None:
+    model = lesson.model
+    kept = [f"{share:.1%}" for share in model.variance_kept]
+    print(
+        f"trained on {len(model.examples)} frames: {model.mode_counts[0]} shape modes ({kept[0]}), "
+        f"{model.mode_counts[1]} appearance modes ({kept[1]}), {model.mode_counts[2]} coupled modes ({kept[2]}), "
+        f"{model.mesh.pixel_count:,} base pixels, labels {'refined' if lesson.refined else 'as given'}"
+    )
+
+
+def _report_folds(lesson: "Lesson") -> None:
+    from stimuli_builder.tracking.report import fold_lines
+
+    for line in fold_lines(lesson.held_out):
+        print(line)

@@ -1,0 +1,170 @@
+"""How exact a track is: against labels of frames left out of training, and against known truth."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.tracking.fit import Fit, Fitter
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
+from stimuli_builder.tracking.picture import reduced, restored_points
+from stimuli_builder.tracking.search import Finder
+from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, inter_eyelid_distances
+from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
+from stimuli_builder.video import Picture
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A labelled frame fitted by a model that never saw it, found without knowing its label.
+
+    Attributes
+    ----------
+    rms_px : root mean square distance of the landmarks from the labels; None if the frame was not found.
+    distance_errors_px : (eyes,) inter-eyelid distance minus the label's.
+    residuals : (eyes,) root mean square grey levels.
+    """
+
+    frame: int
+    fold: int
+    rms_px: float | None
+    distance_errors_px: Values | None
+    residuals: Values | None
+
+
+def cross_validate(
+    pictures: dict[int, Picture],
+    points: dict[int, Points],
+    markers: LidMarkers,
+    options: TrainingOptions,
+    folds: int,
+    *,
+    refine: bool = False,
+) -> list[HeldOut]:
+    """Train on all folds but one and fit the labelled frames of that one, for every fold.
+
+    Parameters
+    ----------
+    pictures, points : by frame number; points (9 * eyes, 2).
+    folds : frame k of the ascending labelled frames is in fold k modulo `folds`.
+    refine : refine the labels of the training frames of each fold, without sight of the frames left out.
+    """
+    frames = sorted(points)
+    folds = min(folds, len(frames))
+    results = []
+    for fold in range(folds):
+        out = [frame for place, frame in enumerate(frames) if place % folds == fold]
+        kept = [frame for frame in frames if frame not in out]
+        labels = {frame: points[frame] for frame in kept}
+        if refine:
+            labels = refined_labels(pictures, labels, markers, options)
+        model = train([pictures[f] for f in kept], np.array([labels[f] for f in kept]), markers, options)
+        finder = Finder(Fitter(model))
+        for frame in out:
+            results.append(_held_out(model, finder, frame, fold, pictures[frame], points[frame]))
+    return sorted(results, key=lambda result: result.frame)
+
+
+def _held_out(model: CoupledModel, finder: Finder, frame: int, fold: int, picture: Picture, label: Points) -> HeldOut:
+    small = reduced(picture, model.reduction)
+    middle = np.median(model.poses, axis=0)
+    fits = [fit for fit in (finder.anywhere(small), finder.near(small, middle)) if fit is not None]
+    if not fits:
+        return HeldOut(frame, fold, None, None, None)
+    fit: Fit = min(fits, key=lambda found: float(found.residuals.max()))
+    found = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
+    errors = inter_eyelid_distances(found, model.markers) - inter_eyelid_distances(label, model.markers)
+    return HeldOut(frame, fold, _rms(found - label), errors, fit.residuals)
+
+
+def _rms(differences: Points) -> float:
+    return float(np.sqrt((differences**2).sum(-1).mean()))
+
+
+def residual_limits(results: Sequence[HeldOut], eyes: int) -> Values:
+    """Residuals above which a fit is not believed: from how well unseen frames are fitted."""
+    seen = [result.residuals for result in results if result.residuals is not None]
+    if not seen:
+        return np.full(eyes, np.inf)
+    residuals = np.array(seen)
+    return np.maximum(3 * np.median(residuals, axis=0), 1.5 * np.percentile(residuals, 90, axis=0))
+
+
+def refined_labels(
+    pictures: dict[int, Picture],
+    points: dict[int, Points],
+    markers: LidMarkers,
+    options: TrainingOptions,
+    rounds: int = 3,
+) -> dict[int, Points]:
+    """Labels made consistent with the pictures: each is replaced by the fit of a one-mode model to its frame.
+
+    A person's labels scatter by a pixel; what many frames agree on does not (docs/decisions/0102).
+    """
+    plain = replace(options, shape_variance=0.0, fewest_shape_modes=1)
+    frames = sorted(points)
+    refined = {frame: points[frame] for frame in frames}
+    for _ in range(rounds):
+        model = train([pictures[f] for f in frames], np.array([refined[f] for f in frames]), markers, plain)
+        fitter = Fitter(model)
+        for place, frame in enumerate(frames):
+            small = reduced(pictures[frame], model.reduction)
+            fit = fitter.fit(small, model.examples[place], model.poses[place])
+            if fit.iterations:
+                moved = fit.vertices[: EYE_POINTS * markers.eyes].astype(np.float64)
+                refined[frame] = restored_points(moved, model.reduction)
+    return refined
+
+
+@dataclass(frozen=True)
+class TruthReport:
+    """A track against known truth; pixels. `blink_p95_px` is None where the truth has no blink."""
+
+    frames: int
+    lost: int
+    reinitialised: int
+    rms_px: float
+    p95_px: float
+    blink_p95_px: float | None
+    distance_bias_px: float
+    distance_sd_px: float
+
+
+def compare_with_truth(track: Path, truth: Path) -> TruthReport:
+    """Compare a track with the truth table of the synthetic actor, row by row."""
+    errors: list[tuple[float, float, float, bool]] = []
+    lost = again = 0
+    names, gaps = point_columns(2), distance_columns(2)
+    for row, true in zip_longest(track_rows(track), track_rows(truth)):
+        if row is None or true is None or row["frame"] != true["frame"]:
+            raise InputError(f"{track}: its frames are not those of {truth}; compare a track with its own truth")
+        again += row.get("status") == "reinitialised"
+        if row.get("status") == "lost":
+            lost += 1
+            continue
+        points = numbers(row, names, str(track)) - numbers(true, names, str(truth))
+        distances = numbers(row, gaps, str(track)) - numbers(true, gaps, str(truth))
+        errors.append((_rms(points.reshape(-1, 2)), *distances, bool(true.get("blink"))))
+    if not errors:
+        raise InputError(f"{track}: no tracked frame to compare")
+    return _truth_report(np.array(errors), lost, again)
+
+
+def _truth_report(errors: Values, lost: int, again: int) -> TruthReport:
+    blinking = errors[:, 3] > 0
+    return TruthReport(
+        frames=len(errors) + lost,
+        lost=lost,
+        reinitialised=again,
+        rms_px=float(np.sqrt((errors[:, 0] ** 2).mean())),
+        p95_px=float(np.percentile(errors[:, 0], 95)),
+        blink_p95_px=float(np.percentile(errors[blinking, 0], 95)) if blinking.any() else None,
+        distance_bias_px=float(errors[:, 1:3].mean()),
+        distance_sd_px=float(errors[:, 1:3].std()),
+    )

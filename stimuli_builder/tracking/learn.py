@@ -1,0 +1,80 @@
+"""From a video and its label file to a model that knows how well it fits frames it has not seen."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from experiments.errors import InputError
+from stimuli_builder.tracking.accuracy import HeldOut, cross_validate, refined_labels, residual_limits
+from stimuli_builder.tracking.labels import Labels, load_labels
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, believing, train
+from stimuli_builder.video import VideoInfo, read_frames, scan_video
+
+WORTH_REFINING = 0.93
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A trained model, the labelled frames left out in turn, and whether labels were refined."""
+
+    model: CoupledModel
+    labels: Labels
+    held_out: list[HeldOut]
+    refined: bool
+
+
+def open_video(path: Path, accept_variable_rate: bool = False) -> VideoInfo:
+    """Scan a video and refuse a variable frame rate unless it is accepted."""
+    info = scan_video(path)
+    if info.variable and not accept_variable_rate:
+        steps = np.diff(info.times_s) * 1000
+        raise InputError(
+            f"{path}: variable frame rate, steps of {steps.min():.1f} to {steps.max():.1f} ms; convert it to a "
+            "constant rate, or keep its own time stamps with --accept-variable-rate"
+        )
+    return info
+
+
+def learn(
+    info: VideoInfo,
+    labels_path: Path,
+    options: TrainingOptions,
+    *,
+    one_eye: bool,
+    folds: int = 5,
+    refine: bool | None = None,
+) -> Lesson:
+    """Train on the labelled frames of a video.
+
+    Parameters
+    ----------
+    refine : make labels consistent with the pictures first; None does so where frames left out of training are
+        then fitted clearly better. Accuracy is always reported against the labels as they were given.
+    """
+    labels = load_labels(labels_path, info.size_px, info.frame_count)
+    _check_eyes(labels, one_eye)
+    pictures = read_frames(info, list(labels.frames))
+    given = (pictures, labels.frames, labels.markers, options)
+    held_out = cross_validate(*given, folds, refine=bool(refine))
+    refined = bool(refine)
+    if refine is None:
+        trial = cross_validate(*given, folds, refine=True)
+        if _typical(trial) < WORTH_REFINING * _typical(held_out):
+            held_out, refined = trial, True
+    points = refined_labels(*given) if refined else labels.frames
+    frames = sorted(points)
+    model = train([pictures[f] for f in frames], np.array([points[f] for f in frames]), labels.markers, options)
+    return Lesson(believing(model, residual_limits(held_out, labels.eyes)), labels, held_out, refined)
+
+
+def _check_eyes(labels: Labels, one_eye: bool) -> None:
+    if one_eye and labels.eyes == 2:
+        raise InputError(f"{labels.path}: holds 18 points a frame, --one-eye expects 9; leave --one-eye out")
+    if not one_eye and labels.eyes == 1:
+        raise InputError(f"{labels.path}: holds 9 points a frame, the labels of one eye; add --one-eye")
+
+
+def _typical(results: list[HeldOut]) -> float:
+    residuals = [result.residuals.mean() for result in results if result.residuals is not None]
+    return float(np.median(residuals)) if residuals else float("inf")

@@ -1,0 +1,94 @@
+"""Finding the eyes again: several closures at a known place, or the whole picture by patches of labelled frames."""
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.tracking.fit import Fit, Fitter
+from stimuli_builder.tracking.picture import reduced
+from stimuli_builder.tracking.shapes import EYE_POINTS, inter_eyelid_distances
+from stimuli_builder.video import Picture
+
+Values = NDArray[np.float64]
+
+CLOSURES = 4
+SCALES = (0.85, 1.0, 1.18)
+PATCH_HEIGHT_PX = 26
+CANDIDATES = 5
+LEAST_MATCH = 0.35
+
+
+class Finder:
+    """Searches with one fitter; `residual` of what it returns is for the caller to judge."""
+
+    def __init__(self, fitter: Fitter):
+        self._fitter, model = fitter, fitter.model
+        self._model = model
+        self._closures = _spread_closures(fitter)
+        height, width = model.patches.shape[1:]
+        self._factor = max(1, height // PATCH_HEIGHT_PX)
+        self._templates = [
+            (number, scale, cv2.resize(reduced(patch, self._factor), None, fx=scale, fy=scale))
+            for number, patch in enumerate(model.patches)
+            for scale in SCALES
+            if min(height, width) * scale >= 4 * self._factor
+        ]
+
+    def near(self, picture: Picture, pose: Values) -> Fit | None:
+        """Best fit of several closures started at `pose`; None if all broke down."""
+        return self._best(picture, ((c, pose) for c in self._closures))
+
+    def anywhere(self, picture: Picture) -> Fit | None:
+        """Best fit started at the places of the whole picture most like labelled frames."""
+        return self._best(picture, self._starts(picture))
+
+    def _best(self, picture: Picture, starts: Iterator[tuple[Values, Values]]) -> Fit | None:
+        fits = [self._fitter.fit(picture, c, pose) for c, pose in starts]
+        good = [fit for fit in fits if fit.iterations and inside(fit, picture)]
+        return min(good or [fit for fit in fits if fit.iterations], key=_worst, default=None)
+
+    def _starts(self, picture: Picture) -> Iterator[tuple[Values, Values]]:
+        small = reduced(picture, self._factor)
+        found = []
+        for number, scale, template in self._templates:
+            if template.shape[0] > small.shape[0] or template.shape[1] > small.shape[1]:
+                continue
+            _, match, _, place = cv2.minMaxLoc(cv2.matchTemplate(small, template, cv2.TM_CCOEFF_NORMED))
+            if np.isfinite(match) and match > LEAST_MATCH:
+                found.append((match, number, scale, place))
+        found.sort(key=lambda entry: -entry[0])
+        for _, number, scale, place in found[:CANDIDATES]:
+            frame = int(self._model.patch_frames[number])
+            corner = (np.array(place) + 0.5) * self._factor - 0.5
+            yield self._model.examples[frame], _carried(
+                self._model.poses[frame], self._model.patch_corners[number], corner, scale
+            )
+
+
+def _carried(pose: Values, from_corner: Values, to_corner: Values, scale: float) -> Values:
+    shift = (pose[2:] - from_corner) * scale + to_corner
+    return np.array([pose[0] * scale, pose[1] * scale, shift[0], shift[1]])
+
+
+def _worst(fit: Fit) -> float:
+    return float(fit.residuals.max())
+
+
+def inside(fit: Fit, picture: Picture) -> bool:
+    """Whether every landmark lies in the picture."""
+    eyes = len(fit.residuals)
+    points = fit.vertices[: EYE_POINTS * eyes]
+    height, width = picture.shape
+    return bool((points > -0.5).all() and (points[:, 0] < width - 0.5).all() and (points[:, 1] < height - 0.5).all())
+
+
+def _spread_closures(fitter: Fitter) -> list[Values]:
+    """Parameters of labelled frames from the most closed to the most open, evenly spread."""
+    model = fitter.model
+    shapes = model.mesh.vertices + np.tensordot(model.examples, model.shape_modes, axes=1)
+    openings = [inter_eyelid_distances(shape, model.markers).mean() for shape in shapes]
+    order = np.argsort(openings)
+    chosen = np.unique(np.linspace(0, len(order) - 1, min(CLOSURES, len(order))).astype(int))
+    return [model.examples[order[place]] for place in chosen]

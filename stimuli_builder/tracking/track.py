@@ -1,0 +1,202 @@
+"""Tracking a video: every frame ends fitted, or with a status and a reason, never with a wrong number."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.tracking.fit import Fit, Fitter
+from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.picture import reduced, restored_points
+from stimuli_builder.tracking.search import Finder, inside
+from stimuli_builder.tracking.shapes import EYE_POINTS, Points, inter_eyelid_distances
+from stimuli_builder.tracking.table import TrackWriter
+from stimuli_builder.video import Picture, VideoInfo, frames
+
+Status = Literal["tracked", "reinitialised", "lost"]
+
+SCALE_RANGE = (0.5, 2.0)
+NEAR_EVERY_FRAME = 30
+NEAR_LATER_EVERY = 5
+WHOLE_EVERY = 30
+
+
+@dataclass(frozen=True)
+class TrackedFrame:
+    """One frame's outcome; `points` and `distances` are None exactly when `status` is 'lost'.
+
+    Attributes
+    ----------
+    points : (9 * eyes, 2) in pixels of the video.
+    distances : (eyes,) in pixels, image-left eye first.
+    residual : root mean square grey levels over all base pixels; None if no fit came to an end.
+    """
+
+    status: Status
+    reason: str
+    points: Points | None
+    distances: NDArray[np.float64] | None
+    residual: float | None
+    iterations: int
+
+
+@dataclass
+class TrackSummary:
+    """Counts and speeds of one run; `fit_s` is processor time of fitting alone."""
+
+    frames: int = 0
+    tracked: int = 0
+    reinitialised: int = 0
+    lost: int = 0
+    fit_s: float = 0.0
+    total_s: float = 0.0
+
+    @property
+    def fit_fps(self) -> float:
+        """Frames fitted per second of fitting."""
+        return self.frames / max(self.fit_s, 1e-9)
+
+    @property
+    def end_to_end_fps(self) -> float:
+        """Frames per second with decoding and writing."""
+        return self.frames / max(self.total_s, 1e-9)
+
+
+class Tracker:
+    """Follows the eyes from frame to frame; give it reduced pictures in order."""
+
+    def __init__(self, model: CoupledModel):
+        self.model = model
+        self._fitter = Fitter(model)
+        self._finder = Finder(self._fitter)
+        self._last: Fit | None = None
+        self._lost_frames = 0
+        self._started = False
+        self._loss = ""
+        low, high = SCALE_RANGE
+        sizes = np.hypot(model.poses[:, 0], model.poses[:, 1])
+        self._sizes = (low * sizes.min(), high * sizes.max())
+
+    def step(self, picture: Picture) -> TrackedFrame:
+        """Fit the next frame, searching for the eyes where they are not where they were."""
+        if self._last is not None and not self._lost_frames:
+            fit = self._fitter.fit(picture, self._last.c, self._last.pose)
+            fault = self._fault(fit, picture)
+            if not fault:
+                return self._found(fit, "tracked", "")
+            self._loss = fault
+        return self._search(picture)
+
+    def _search(self, picture: Picture) -> TrackedFrame:
+        best: Fit | None = None
+        fault = ""
+        for attempt in self._attempts(picture):
+            fault = self._fault(attempt, picture)
+            if not fault:
+                if self._started:
+                    return self._found(attempt, "reinitialised", f"found again after {self._loss}")
+                return self._found(attempt, "tracked", "")
+            best = attempt
+        self._lost_frames += 1
+        self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
+        residual = _overall(best) if best is not None and best.iterations else None
+        return TrackedFrame("lost", self._loss, None, None, residual, best.iterations if best else 0)
+
+    def _attempts(self, picture: Picture):  # type: ignore[no-untyped-def]
+        """Fits from likely starts: near the last place often, over the whole picture now and then."""
+        count = self._lost_frames
+        if self._last is not None and (count < NEAR_EVERY_FRAME or count % NEAR_LATER_EVERY == 0):
+            near = self._finder.near(picture, self._last.pose)
+            if near is not None:
+                yield near
+        if count & (count - 1) == 0 or count % WHOLE_EVERY == 0:
+            anywhere = self._finder.anywhere(picture)
+            if anywhere is not None:
+                yield anywhere
+
+    def _found(self, fit: Fit, status: Status, reason: str) -> TrackedFrame:
+        self._last, self._lost_frames, self._started, self._loss = fit, 0, True, ""
+        count = EYE_POINTS * self.model.eyes
+        points = restored_points(fit.vertices[:count].astype(np.float64), self.model.reduction)
+        distances = inter_eyelid_distances(points, self.model.markers)
+        return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations)
+
+    def _fault(self, fit: Fit, picture: Picture) -> str:
+        """Why a fit is not believed, or an empty string."""
+        if fit.iterations == 0:
+            return "the fit broke down"
+        if not inside(fit, picture):
+            return "the eyes left the picture"
+        size = float(np.hypot(*fit.pose[:2]))
+        if not self._sizes[0] < size < self._sizes[1]:
+            return f"the eyes would be {size / self._sizes[0] * SCALE_RANGE[0]:.2g} times their labelled size"
+        excess = fit.residuals / self.model.residual_limits
+        eye = int(excess.argmax())
+        if excess[eye] > 1:
+            name = ("left eye", "right eye")[eye] if self.model.eyes == 2 else "eye"
+            limit = self.model.residual_limits[eye]
+            return f"{name} covered or changed: residual {fit.residuals[eye]:.1f} above {limit:.1f}"
+        return ""
+
+
+def _overall(fit: Fit) -> float:
+    return float(np.sqrt((fit.residuals**2).mean()))
+
+
+def track_video(
+    model: CoupledModel, info: VideoInfo, out: Path, advance: Callable[[TrackSummary], None] | None = None
+) -> TrackSummary:
+    """Track every frame of a video into a CSV; memory does not grow with its length.
+
+    Parameters
+    ----------
+    advance : called after each frame with the counts so far, for a progress bar.
+
+    Raises
+    ------
+    InputError
+        The video differs in size from the labelled one, breaks off, or shows no such eyes at all. Nothing is
+        left under the name `out` then.
+    """
+    if model.size_px != info.size_px:
+        raise InputError(
+            f"{info.path}: {info.size_px[0]} x {info.size_px[1]} pixels, the model was trained on "
+            f"{model.size_px[0]} x {model.size_px[1]}; label frames of this video"
+        )
+    tracker, summary = Tracker(model), TrackSummary()
+    begun = time.perf_counter()
+    with TrackWriter(out, model.eyes) as writer:
+        for picture in frames(info.path, lambda full: reduced(full, model.reduction)):
+            if summary.frames >= info.frame_count:
+                break
+            before = time.thread_time()
+            frame = tracker.step(picture)
+            summary.fit_s += time.thread_time() - before
+            writer.write(summary.frames, float(info.times_s[summary.frames]), frame)
+            _count(summary, frame)
+            if advance is not None:
+                advance(summary)
+        _refuse_nothing(info, summary)
+    summary.total_s = time.perf_counter() - begun
+    return summary
+
+
+def _count(summary: TrackSummary, frame: TrackedFrame) -> None:
+    summary.frames += 1
+    summary.tracked += frame.status != "lost"
+    summary.reinitialised += frame.status == "reinitialised"
+    summary.lost += frame.status == "lost"
+
+
+def _refuse_nothing(info: VideoInfo, summary: TrackSummary) -> None:
+    if summary.frames < info.frame_count:
+        raise InputError(
+            f"{info.path}: truncated or damaged, {summary.frames} of {info.frame_count} frames can be decoded"
+        )
+    if summary.tracked == 0:
+        raise InputError(f"{info.path}: no eyes like the labelled ones in any of its {summary.frames} frames")
