@@ -1,0 +1,1 @@
+"""Synthetic participants: ratings whose analysis gives wanted figures. Never a replication, always marked."""

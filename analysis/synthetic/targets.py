@@ -1,0 +1,153 @@
+"""Wanted figures as statistics of the cell means with the window each must fall into."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from analysis.synthetic.published import Direction, PrintedPairs, PrintedTest, Published, window
+from analysis.synthetic.space import DesignSpace
+
+Floats = NDArray[np.float64]
+
+SAFETY = 0.9
+"""A printed figure's window is narrowed to this share, so that no reader's rounding differs from ours."""
+
+
+@dataclass(frozen=True)
+class MeanTarget:
+    """A weighted mean of cell means within [low, high]; `scale` is the distance that counts as one."""
+
+    name: str
+    weights: Floats = field(repr=False)
+    low: float
+    high: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class SpreadTarget:
+    """The participants' SD of a marginal mean within [low, high]."""
+
+    name: str
+    weights: Floats = field(repr=False)
+    low: float
+    high: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class TestTarget:
+    """The multivariate F (df q, N - q) of contrasts (cells, q) within [low, high]."""
+
+    name: str
+    contrasts: Floats = field(repr=False)
+    low: float
+    high: float
+    scale: float
+    wanted: float | None
+    """The F to start from; None where only a bound on p is known."""
+
+
+@dataclass(frozen=True)
+class Targets:
+    """All targets of one data set with `n` participants."""
+
+    n: int
+    means: tuple[MeanTarget, ...]
+    spreads: tuple[SpreadTarget, ...]
+    tests: tuple[TestTarget, ...]
+    pairs: tuple[TestTarget, ...]
+    directions: tuple[MeanTarget, ...]
+
+
+def place_name(place: dict[str, str]) -> str:
+    """A place in words: `blur=MB amplitude=FC`."""
+    return " ".join(f"{factor}={level}" for factor, level in place.items())
+
+
+def narrowed(printed: str) -> tuple[float, float, float]:
+    """Window of a two-sided printed figure, narrowed by SAFETY, and its half width."""
+    low, high = window(printed)
+    middle, half = (low + high) / 2, (high - low) / 2
+    return middle - SAFETY * half, middle + SAFETY * half, half
+
+
+def make_targets(published: Published, space: DesignSpace, n: int) -> Targets:
+    """Every figure of `published` as a target for `n` participants."""
+    means = tuple(
+        MeanTarget(f"mean {place_name(m.at)}", space.weights(m.at), *narrowed(m.printed))
+        for m in published.means
+    )
+    spreads = []
+    for s in published.spreads:
+        factor = np.sqrt(n) if s.kind == "se" else 1.0
+        low, high, half = (float(v * factor) for v in narrowed(s.printed))
+        spreads.append(
+            SpreadTarget(f"{s.kind.upper()} {place_name(s.at)}", space.weights(s.at), low, high, half)
+        )
+    tests = tuple(test_target(t, space, n) for t in published.tests)
+    pairs = tuple(target for p in published.pairs for target in _pair_targets(p, space, n))
+    directions = tuple(target for d in published.directions for target in _direction_targets(d, space))
+    return Targets(n, means, tuple(spreads), tests, pairs, directions)
+
+
+def test_target(test: PrintedTest, space: DesignSpace, n: int) -> TestTarget:
+    """The F window of an effect from its printed F and p."""
+    effect = space.effect_called(test.effect)
+    contrasts = space.effects[effect]
+    q = contrasts.shape[1]
+    low, high, scale = 0.0, np.inf, 1.0
+    if test.p is not None:
+        p_low, p_high = window(test.p)
+        low = float(stats.f.isf(min(p_high, 1.0), q, n - q)) * (1 + 1e-4)
+        high = float(stats.f.isf(p_low, q, n - q)) * (1 - 1e-4) if p_low > 0 else np.inf
+        scale = 0.1
+    if test.f is not None:
+        f_low, f_high, scale = narrowed(test.f)
+        low, high = max(low, f_low), min(high, f_high)
+    wanted = (low + high) / 2 if test.f is not None else None
+    return TestTarget(f"F {effect}", contrasts, low, high, scale, wanted)
+
+
+def _pair_targets(pairs: PrintedPairs, space: DesignSpace, n: int) -> Iterator[TestTarget]:
+    names = space.levels_of(pairs.factor)
+    everything = list(combinations(names, 2))
+    limit = float(stats.f.isf(pairs.all_significant_below / len(everything), 1, n - 1))
+    spared = {frozenset(pair) for pair in pairs.exceptions}
+    for a, b in everything:
+        contrast = space.weights({pairs.factor: a}) - space.weights({pairs.factor: b})
+        low, high = (0.0, limit / 1.02) if frozenset((a, b)) in spared else (limit * 1.02, np.inf)
+        yield TestTarget(f"pair {pairs.factor} {a} - {b}", contrast[:, None], low, high, 0.1, None)
+
+
+def _direction_targets(direction: Direction, space: DesignSpace) -> Iterator[MeanTarget]:
+    for higher, lower in _ordered_places(direction, space):
+        weights = space.weights(higher) - space.weights(lower)
+        name = f"{place_name(higher)} above {place_name(lower)}"
+        yield MeanTarget(name, weights, 0.006, np.inf, 0.005)
+
+
+def _ordered_places(
+    direction: Direction, space: DesignSpace
+) -> Iterator[tuple[dict[str, str], dict[str, str]]]:
+    if direction.higher is not None and direction.lower is not None:
+        yield direction.higher, direction.lower
+    for factor, order in (direction.order or {}).items():
+        outer = (
+            [{direction.within: name} for name in space.levels_of(direction.within)]
+            if direction.within
+            else [{}]
+        )
+        for place in outer:
+            for a, b in zip(order, order[1:], strict=False):
+                yield {**place, factor: a}, {**place, factor: b}
+    if direction.highest is not None:
+        varied = [direction.vary] if direction.vary else list(direction.highest)
+        for names in product(*[space.levels_of(factor) for factor in varied]):
+            other = {**direction.highest, **dict(zip(varied, names, strict=True))}
+            if other != direction.highest:
+                yield direction.highest, other
