@@ -10,7 +10,7 @@ from server.models import AuditEntry
 
 
 def record(
-    session: Session, who: Identity | None, action: str, kind: str = "", target: str = "", **details: Any
+    session: Session, who: Identity | None, action: str, kind: str = "", target: str = "", /, **details: Any
 ) -> None:
     """Add an entry in the caller's transaction, so that a change and its entry stand or fall together."""
     session.add(

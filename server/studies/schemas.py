@@ -1,0 +1,247 @@
+"""What the study endpoints take and give."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from server.participants.recruiter import Recruiter
+
+StudyName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
+TomlText = Annotated[str, StringConstraints(max_length=500_000)]
+Label = Annotated[str, StringConstraints(strip_whitespace=True, max_length=200)]
+Revision = Annotated[int, Field(ge=1, le=2**31 - 1, description="The revision this edit started from.")]
+
+
+class _In(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class DefinitionText(_In):
+    """A definition to check."""
+
+    toml: TomlText
+
+
+class ProblemOut(BaseModel):
+    """One thing wrong in a definition."""
+
+    line: int | None
+    path: str
+    message: str
+
+
+class BlockOut(BaseModel):
+    """A block of the design."""
+
+    label: str
+    trials: int
+
+
+class FactorOut(BaseModel):
+    """A factor and its levels (name, label)."""
+
+    name: str
+    label: str
+    levels: list[tuple[str, str]]
+
+
+class DesignOut(BaseModel):
+    """What a definition expands to."""
+
+    experiment: str
+    title: str
+    factors: list[FactorOut]
+    cells: int
+    exemplars: int
+    unique_clips: int
+    trials_per_participant: int
+    blocks: list[BlockOut]
+    expected_minutes: float
+
+
+class Checked(BaseModel):
+    """Whether a definition can be used, and what it expands to."""
+
+    problems: list[ProblemOut]
+    design: DesignOut | None
+
+
+class ShippedExperiment(BaseModel):
+    """An experiment that comes with the program."""
+
+    name: str
+    title: str
+    toml: str
+    clips_ready: bool = Field(description="True where `stimuli build` has made its clips on this server.")
+
+
+class LevelsTable(_In):
+    """A CSV with one row a clip: column `file`, then one column a factor; `exemplar` is optional."""
+
+    csv: Annotated[str, StringConstraints(max_length=2_000_000)]
+
+
+class LevelsPattern(_In):
+    """A pattern that file names follow, such as `{character}_{speed}_{exemplar}.mp4`."""
+
+    pattern: Annotated[str, StringConstraints(min_length=3, max_length=300)]
+
+
+class OwnClips(_In):
+    """What to ask about one's own clips, where no definition is given."""
+
+    title: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=300)]
+    question: Label = "How natural was this clip?"
+    low: Label = "very unnatural"
+    high: Label = "very natural"
+
+
+class NewStudy(_In):
+    """A study from a shipped experiment, from a definition, or from uploaded clips."""
+
+    name: StudyName
+    shipped: str | None = None
+    toml: TomlText | None = None
+    upload: str | None = None
+    levels: LevelsTable | LevelsPattern | None = None
+    own_clips: OwnClips | None = None
+
+
+class NewVersion(_In):
+    """A changed definition; it becomes a new version."""
+
+    revision: Revision
+    toml: TomlText
+    note: Label = ""
+
+
+class ChangeTexts(_In):
+    """The pages of one language; they become a new version."""
+
+    revision: Revision
+    language: Annotated[str, StringConstraints(max_length=10)]
+    texts: dict[str, Annotated[str, StringConstraints(max_length=50_000)]]
+
+
+class ChangeStatus(_In):
+    """Open or close a study."""
+
+    revision: Revision
+    status: Literal["draft", "pilot", "live", "closed"]
+
+
+class ChangeSettings(_In):
+    """Pause, quota and recruiter."""
+
+    revision: Revision
+    paused: bool
+    quota: Annotated[int, Field(ge=1, le=1_000_000)] | None
+    recruiter: Recruiter | None
+
+
+class NewLinks(_In):
+    """One general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
+
+    kind: Literal["general", "personal", "preview"]
+    label: Label = ""
+    labels: Annotated[list[Label], Field(max_length=5000)] = []
+    count: Annotated[int, Field(ge=1, le=5000)] = 1
+    quota: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    days: Annotated[int, Field(ge=1, le=3650)] | None = None
+    recruiter: Recruiter | None = None
+
+
+class LinkOut(BaseModel):
+    """A link into a study."""
+
+    id: str
+    kind: str
+    label: str
+    url: str
+    quota: int | None
+    expires_at: datetime | None
+    created_at: datetime
+    runs: int
+    complete: int
+    recruiter: dict[str, Any] | None
+
+
+class VersionOut(BaseModel):
+    """A version of a study."""
+
+    model_config = ConfigDict(from_attributes=True)
+    number: int
+    experiment: str
+    definition_sha256: str
+    note: str
+    created_at: datetime
+    runs: int = 0
+
+
+class StudySummary(BaseModel):
+    """One line of the list of studies."""
+
+    name: str
+    title: str
+    status: Literal["draft", "pilot", "live", "closed"]
+    paused: bool
+    quota: int | None
+    version: int
+    revision: int
+    complete: int
+    active: int
+    created_at: datetime
+
+
+class StudyDetail(BaseModel):
+    """A study with its declaration."""
+
+    summary: StudySummary
+    design: DesignOut
+    definition: dict[str, Any]
+    toml: str
+    definition_sha256: str
+    versions: list[VersionOut]
+    recruiter: dict[str, Any] | None
+
+
+class ClipOut(BaseModel):
+    """A clip of a study, with the curve it shows."""
+
+    clip_sha256: str
+    url: str
+    file: str
+    cell: str
+    levels: dict[str, str]
+    exemplar: int
+    profile: str
+    fps: float
+    frames: int
+    width_px: int
+    height_px: int
+    bytes: int
+    closure: list[float]
+
+
+class UploadedFile(BaseModel):
+    """One file of an upload: what it is, or why it cannot be used."""
+
+    name: str
+    bytes: int
+    sha256: str
+    fps: float | None = None
+    frames: int | None = None
+    width_px: int | None = None
+    height_px: int | None = None
+    problem: str | None = None
+
+
+class UploadOut(BaseModel):
+    """An upload waiting to become a study; it is deleted after a day."""
+
+    id: str
+    files: list[UploadedFile]
+    has_manifest: bool
+    tables: list[str] = Field(description="Names of CSV files in the upload.")
+    suggested_pattern: str | None
