@@ -16,6 +16,7 @@ from stimuli_builder.blinks.profile import (
     phase_spline,
     resample,
     resample_phases,
+    with_minimum_at_peak,
 )
 from stimuli_builder.files import whole_text
 
@@ -135,7 +136,7 @@ class BlinkModel:
             eye="both" if self.eyes == 2 else None,
             closure_other=closure[1] if self.eyes == 2 else None,
         )
-        return resample_phases(normal, down, up)
+        return with_minimum_at_peak(resample_phases(normal, down, up))
 
     def sample(
         self,

@@ -35,21 +35,24 @@ def _list_by_default(context: typer.Context) -> None:
 
 def list_profiles() -> None:
     """List the shipped profiles."""
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
 
     from stimuli_builder.blinks.library import load_library
 
     shipped = load_library()
-    table = Table("profile", "eye", "down", "up", "frames at 30 fps", "closure", "source")
+    table = Table("profile", "eye", "down", "up", "at 30 fps", "closure", "recording", box=SIMPLE_HEAD)
     for profile in shipped:
         lengths = [str(profile.down_frames), str(profile.up_frames), f"{profile.duration_frames_30fps:.1f}"]
         closure = f"{profile.closure.max():.2f}"
-        table.add_row(profile.profile_id, profile.eye or "", *lengths, closure, profile.source)
+        table.add_row(profile.profile_id, profile.eye or "", *lengths, closure, profile.recording)
     console = Console()
     console.print(table)
     pairs = len(load_library(paired=True))
-    console.print(f"{len(shipped)} eye profiles; {pairs} blinks seen in both eyes; frames are at 300 fps")
+    console.print(
+        f"{len(shipped)} eye profiles; {pairs} blinks seen in both eyes; phases in frames at 300 fps"
+    )
 
 
 def plot_profiles(

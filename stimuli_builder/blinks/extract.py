@@ -11,8 +11,10 @@ from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300, measur
 from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
 from stimuli_builder.blinks.series import BlinkSeries
 
-PLAUSIBLE_MEDIAN_MS = (100, 1000)
-"""The paper's blinks last 150-500 ms; a drowsy person's may take twice that."""
+PLAUSIBLE_MS = (120, 600)
+"""Median durations that are believed: 330 ms is usual."""
+PLAUSIBLE_SPEED = (9, 50)
+"""Peak closing velocity over amplitude, per second: 18-29 is usual at any amplitude (main sequence)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +52,17 @@ def require_blinks(eye: EyeBlinks, options: LabelOptions, *, any_duration: bool 
             f"no blink in column '{column}': its deepest dip is {deepest:.0%} of the opening, a blink needs "
             f"{options.minimum_depth:.0%} (--minimum-depth){lost}; is the column right, and --fps?"
         )
-    median_ms = float(np.median([blink.duration_ms for blink in eye.blinks]))
-    low, high = PLAUSIBLE_MEDIAN_MS
-    if not any_duration and not low <= median_ms <= high:
+    duration_ms = float(np.median([blink.duration_ms for blink in eye.blinks]))
+    speed = float(np.median([blink.peak_closing_velocity / blink.amplitude for blink in eye.blinks]))
+    usual = (
+        PLAUSIBLE_MS[0] <= duration_ms <= PLAUSIBLE_MS[1]
+        and PLAUSIBLE_SPEED[0] <= speed <= PLAUSIBLE_SPEED[1]
+    )
+    if not usual and not any_duration:
         raise InputError(
-            f"at {eye.series.fps:g} fps the median blink of '{column}' would last {median_ms:.0f} ms, but "
-            f"blinks last {low} to {high}: is --fps right? (--any-duration takes them as they are)"
+            f"at {eye.series.fps:g} fps the blinks of '{column}' last {duration_ms:.0f} ms and close at "
+            f"{speed:.1f} amplitudes a second (medians), where {PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]} and "
+            f"{PLAUSIBLE_SPEED[0]}-{PLAUSIBLE_SPEED[1]} are usual: is --fps right? --any-duration takes them"
         )
 
 

@@ -39,7 +39,7 @@ class LabelOptions:
 
     filter_frames: float = 10
     gradient_frames: float = 10
-    gradient_opening: float | None = 0.0015
+    gradient_opening: float | None = 0.001
     gradient_px: float | None = None
     opening_px: float = 60.0
     baseline_frames: float = 100
@@ -142,6 +142,7 @@ class _Piece:
         self.opening = _local_opening(self.smooth, round(scaled_frames(options.search_frames, fps)))
         steps = np.abs(box_filter(np.gradient(self.smooth), scaled_frames(options.gradient_frames, fps)))
         self.quiet = steps < _gradient_limit(self.opening, options, is_px=is_px) * (300 / fps)
+        self.half_window = round(scaled_frames(options.gradient_frames, fps) / 2)
         self.baseline_reach = round(scaled_frames(options.baseline_frames, fps))
         self.search_reach = round(scaled_frames(options.search_frames, fps))
         self.minimum_depth = options.minimum_depth
@@ -186,10 +187,16 @@ class _Piece:
         self, minimum: int, neighbour: int | None, baseline: float, step: int
     ) -> tuple[int | None, bool]:
         """First frame from the minimum on that is quiet and above the baseline, and whether it had to be
-        the highest one before a neighbouring blink."""
+        the highest one before a neighbouring blink.
+
+        The window of the gradient lies on the frame's far side from the minimum: the eye was at rest just
+        before the onset and is at rest just after the end. A centred window would reach into the blink and
+        find the onset half a window early.
+        """
         limit = minimum + step * self.search_reach
         frames = np.arange(minimum + step, min(max(limit, 0), self.smooth.size - 1) + step, step)
-        met = frames[self.quiet[frames] & (self.smooth[frames] > baseline)]
+        windows = np.clip(frames + step * self.half_window, 0, self.smooth.size - 1)
+        met = frames[self.quiet[windows] & (self.smooth[frames] > baseline)]
         reached = int(met[0]) if met.size else None
         if neighbour is None or abs(neighbour - minimum) > self.search_reach:
             return reached, False

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -69,7 +70,7 @@ def training_profiles(tables: Sequence[Path], eyes: str = "auto") -> list[BlinkP
 
 def _report_fit(model: BlinkModel, count: int) -> None:
     console = Console()
-    table = Table("component", "variance", "cumulative", "sd of coefficient")
+    table = Table("component", "variance", "cumulative", "sd of coefficient", box=SIMPLE_HEAD)
     for index, share in enumerate(model.explained):
         total = float(model.explained[: index + 1].sum())
         table.add_row(str(index + 1), f"{share:.1%}", f"{total:.1%}", f"{model.coefficient_sd[index]:.3f}")

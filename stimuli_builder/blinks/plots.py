@@ -57,13 +57,14 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
     """
     duration_s = max(eye.smooth.size / eye.series.fps for eye in eyes)
     row_s = max(SECONDS_A_ROW, duration_s / MOST_ROWS)
-    rows = int(np.ceil(duration_s / row_s - 1e-9))
+    rows = max(1, int(np.ceil(duration_s / row_s - 0.05)))
     figure = _figure(12, 0.8 + 1.5 * rows)
     grid = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(grid):
-        for eye, colour in zip(eyes, (BLUE, AMBER, GREEN, GREY) * len(eyes), strict=False):
-            _series_row(axes, eye, row * row_s, (row + 1) * row_s, colour, rejected)
-        axes.set_xlim(row * row_s, (row + 1) * row_s)
+        stop_s = duration_s if row == rows - 1 else (row + 1) * row_s
+        for place, eye in enumerate(eyes):
+            _series_row(axes, eye, row * row_s, stop_s, place, rejected)
+        axes.set_xlim(row * row_s, max(stop_s, (row + 1) * row_s))
         axes.spines[["top", "right"]].set_visible(False)
     unit = "px" if eyes[0].series.is_px else "as recorded"
     grid[-1].set_xlabel("time (s)")
@@ -74,8 +75,9 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
 
 
 def _series_row(
-    axes: "Axes", eye: EyeBlinks, start_s: float, stop_s: float, colour: str, rejected: set[tuple[str, int]]
+    axes: "Axes", eye: EyeBlinks, start_s: float, stop_s: float, place: int, rejected: set[tuple[str, int]]
 ) -> None:
+    colour = (BLUE, AMBER, GREEN, GREY)[place % 4]
     fps = eye.series.fps
     first, last = int(start_s * fps), min(int(np.ceil(stop_s * fps)) + 1, eye.smooth.size)
     step = max(1, (last - first) // 6000)
@@ -91,7 +93,14 @@ def _series_row(
         for frame, marker in ((blink.onset_frame, ">"), (blink.minimum_frame, "v"), (blink.end_frame, "<")):
             axes.plot(frame / fps, eye.smooth[frame], marker, ms=3.5, color=GREY if out else RED)
         label = f"({blink.number})" if out else f"{blink.number}"
-        axes.annotate(label, (blink.minimum_s, 1.02 * top), ha="center", fontsize=7, color=colour)
+        axes.annotate(
+            label,
+            (blink.end_s, (1.04 - 0.17 * place) * top),
+            xytext=(3, 0),
+            textcoords="offset points",
+            fontsize=7,
+            color=colour,
+        )
 
 
 def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":

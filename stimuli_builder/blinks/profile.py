@@ -188,6 +188,15 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
     )
 
 
+def with_minimum_at_peak(profile: BlinkProfile) -> BlinkProfile:
+    """Move the minimum to the sample of greatest closure; in a made blink it may lie beside its place."""
+    peak = profile.onset_index + int(profile.closure[profile.onset_index : profile.end_index + 1].argmax())
+    if not profile.onset_index < peak < profile.end_index:
+        raise InputError(f"profile {profile.profile_id} closes most at its onset or end: it is no blink")
+    down, up = peak - profile.onset_index, profile.end_index - peak
+    return replace(profile, minimum_index=peak, down_frames=down, up_frames=up)
+
+
 def split_duration(duration_frames_30fps: float, down_fraction: float) -> tuple[int, int]:
     """Share a duration, in frames at 30 fps, between the phases: whole 300 fps samples, one or more each."""
     total = round(duration_frames_30fps * SAMPLES_PER_CLIP_FRAME)

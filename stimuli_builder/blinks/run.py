@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -158,16 +159,17 @@ def _report(
     job: BlinksJob, summaries: Sequence[dict[str, Any]], frame: pd.DataFrame, lost: Sequence[Review]
 ) -> None:
     console = Console()
-    table = Table(
-        "column", "blinks", "per minute", "complete", "down ms", "up ms", "total ms", "closure", "rejected"
-    )
+    headers = ("blinks", "a minute", "complete", "rejected", "down ms", "up ms", "total ms", "closure")
+    table = Table("column", box=SIMPLE_HEAD, caption="ms and closure are medians", caption_justify="left")
+    for header in headers:
+        table.add_column(header, justify="right", no_wrap=True)
     for row in summaries:
         medians = [
             f"{row[name].get('median', float('nan')):.0f}" for name in ("down_ms", "up_ms", "duration_ms")
         ]
         closure = f"{row['closure'].get('median', float('nan')):.2f}"
         counts = [str(row["blinks"]), f"{row['rate_per_minute']:.1f}", str(row["complete"])]
-        table.add_row(row["column"], *counts, *medians, closure, str(row["rejected"]))
+        table.add_row(row["column"], *counts, str(row["rejected"]), *medians, closure)
     console.print(table)
     for row in summaries:
         for refused in row["refused"]:
