@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy import special
 
 from analysis.means import level_combinations, margin, within_participant_error
 from analysis.result import Analysis
@@ -84,14 +85,15 @@ def figures_of(analysis: Analysis) -> tuple[FigureSpec, ...]:
 def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
     """Draw one figure."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(6.4, 4.2), dpi=150, layout="constrained")
+        figure = Figure(figsize=(7.2, 4.4), dpi=150, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
-        note = "Small points: participants. Bars: ± 1 SE within participants (Cousineau-Morey)."
+        bars = "Small points: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        note = f"N = {analysis.n_participants}. {bars}"
         if analysis.synthetic:
-            note = "SYNTHETIC DATA, no person gave these ratings. " + note
+            note = "SYNTHETIC DATA: no person gave these ratings.\n" + note
         figure.supxlabel(note, fontsize=7, color="#8a1c1c" if analysis.synthetic else "#555555")
     return figure
 
@@ -108,7 +110,9 @@ def as_bytes(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
 def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     values, groups, shades = _arranged(analysis, spec)
     n_groups, n_shades = len(groups), len(shades)
-    errors = within_participant_error(values.reshape(len(values), -1)).reshape(n_groups, n_shades)
+    reach = float(special.stdtrit(len(values) - 1, 0.975))
+    flat = values.reshape(len(values), -1)
+    errors = reach * within_participant_error(flat).reshape(n_groups, n_shades)
     offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
     jitter = _jitter(len(values)) * 0.34 * _SPREAD / n_shades
     for shade in range(n_shades):
@@ -123,7 +127,7 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
                 markersize=2.6,
                 markeredgewidth=0,
                 color=colour,
-                alpha=0.28,
+                alpha=0.25,
             )
         axes.errorbar(
             at,
@@ -133,10 +137,10 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             marker=MARKERS[shade % len(MARKERS)],
             linestyle="-" if spec.style == "lines" else "none",
             linewidth=1.2,
-            markersize=6,
+            markersize=4.6,
             markeredgecolor="white",
-            markeredgewidth=0.7,
-            capsize=2.5,
+            markeredgewidth=0.5,
+            capsize=3.2,
             elinewidth=1.3,
             label=shades[shade],
             zorder=3,

@@ -47,7 +47,7 @@ METHODS = (
     "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
     "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. Marginal means "
     "and their errors come from participants' own marginal means. Pairs are paired t tests, never pooled. "
-    "Error bars of figures are within participants (Cousineau 2005, Morey 2008)."
+    "Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
 )
 
 
