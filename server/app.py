@@ -19,6 +19,8 @@ from server.participants import endpoints as participants
 from server.results import endpoints as results
 from server.runs import endpoints as runs
 from server.settings import Settings
+from server.studies import endpoints as studies
+from server.studies import link_endpoints as links
 from server.trials import endpoints as trials
 
 
@@ -31,6 +33,8 @@ def _routers() -> tuple[APIRouter, ...]:
         trials.router,
         accounts.router,
         people.router,
+        studies.router,
+        links.router,
         monitor.router,
         results.router,
         runs.router,

@@ -82,6 +82,16 @@ class Settings(BaseSettings):
         return self.data_folder / "clips"
 
     @property
+    def stimuli_folder(self) -> Path:
+        """Folder of the clip sets that `make run` builds, one a shipped experiment."""
+        return self.data_folder / "stimuli"
+
+    @property
+    def upload_folder(self) -> Path:
+        """Folder of uploads that wait to become studies."""
+        return self.data_folder / "uploads"
+
+    @property
     def resolved_database_url(self) -> str:
         """The database address, SQLite in the data folder where none is set."""
         if self.database_url:

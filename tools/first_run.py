@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BIN = ROOT / ".venv" / ("Scripts" if os.name == "nt" else "bin")
-DATA = Path(os.environ.get("PALPEBRA_DATA", ROOT / "data"))
+DATA = Path(os.environ.get("PALPEBRA_DATA_FOLDER", ROOT / "data"))
 STUDIES = ("exp3", "exp1", "exp2")
 
 
@@ -24,12 +24,12 @@ def call(*command: str) -> None:
 
 def main() -> None:
     DATA.mkdir(parents=True, exist_ok=True)
-    os.environ["PALPEBRA_DATA"] = str(DATA)
+    os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
     for study in STUDIES:
-        call("stimuli", "build", study, "--out", str(DATA / "clips" / study), "--quiet-when-current")
+        call("stimuli", "build", study, "--out", str(DATA / "stimuli" / study), "--quiet-when-current")
     call("server", "database", "upgrade")
     for study in STUDIES:
-        call("server", "study", "add", study, "--clips", str(DATA / "clips" / study), "--open")
+        call("server", "study", "add", study, "--clips", str(DATA / "stimuli" / study), "--open")
     port = os.environ.get("PORT", "8000")
     os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
 

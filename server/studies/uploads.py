@@ -46,6 +46,11 @@ def _sweep(folder: Path) -> None:
             shutil.rmtree(old, ignore_errors=True)
 
 
+def discard(place: Path) -> None:
+    """Remove an upload that was refused."""
+    shutil.rmtree(place, ignore_errors=True)
+
+
 def upload_folder(folder: Path, identifier: str) -> Path:
     """The folder of an upload; NotFound where there is none (identifiers are hexadecimal)."""
     place = folder / identifier

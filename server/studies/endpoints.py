@@ -1,0 +1,154 @@
+"""Studies on the dashboard."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, UploadFile
+from fastapi.params import File
+from fastapi.responses import PlainTextResponse
+from sqlalchemy import select
+
+from server.accounts.identity import Experimenter, Viewer
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES
+from server.models import VersionClip
+from server.studies import service, uploads
+from server.studies.lookup import active_version, find_study
+from server.studies.schemas import (
+    ChangeSettings,
+    ChangeStatus,
+    ChangeTexts,
+    Checked,
+    ClipOut,
+    DefinitionText,
+    NewStudy,
+    NewVersion,
+    ShippedExperiment,
+    StudyDetail,
+    StudySummary,
+    UploadOut,
+)
+
+router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPONSES)
+
+
+@router.get("/experiments")
+def list_experiments(services: ServicesDep, _who: Viewer) -> list[ShippedExperiment]:
+    """The experiments that come with the program."""
+    return service.shipped(services)
+
+
+@router.post("/definitions/check")
+def check_definition(_who: Viewer, body: DefinitionText) -> Checked:
+    """Check a definition: every problem with its line and the nearest right name, or what it expands to."""
+    return service.check(body.toml)
+
+
+@router.post("/uploads", status_code=201)
+def upload_clips(
+    services: ServicesDep, _who: Experimenter, files: Annotated[list[UploadFile], File()]
+) -> UploadOut:
+    """Upload clips: films, a CSV table, or a zip of them. They wait a day to become a study."""
+    identifier, place = uploads.new_upload(services.settings.upload_folder)
+    try:
+        for file in files:
+            uploads.receive(place, file.filename or "", file.file, services.settings.max_upload_bytes)
+        return uploads.describe(identifier, place)
+    except BaseException:
+        uploads.discard(place)
+        raise
+
+
+@router.get("/studies")
+def list_studies(services: ServicesDep, _who: Viewer) -> list[StudySummary]:
+    """Every study, the latest first."""
+    with services.database.read() as session:
+        return service.summaries(session)
+
+
+@router.post("/studies", status_code=201)
+def create_study(services: ServicesDep, who: Experimenter, body: NewStudy) -> StudyDetail:
+    """Create a draft from a shipped experiment, a definition, or uploaded clips."""
+    name = service.create(services, body, who)
+    return get_study(services, who, name)
+
+
+@router.get("/studies/{study}")
+def get_study(services: ServicesDep, _who: Viewer, study: str) -> StudyDetail:
+    """One study with its declaration."""
+    with services.database.read() as session:
+        return service.detail(session, study)
+
+
+@router.delete("/studies/{study}", status_code=204)
+def delete_study(services: ServicesDep, who: Experimenter, study: str) -> None:
+    """Delete a draft that nobody has taken part in."""
+    with services.database.write() as session:
+        service.delete(session, study, who)
+
+
+@router.post("/studies/{study}/versions", status_code=201)
+def add_version(services: ServicesDep, who: Experimenter, study: str, body: NewVersion) -> StudyDetail:
+    """Store a changed definition as a new version; runs keep the version they began with."""
+    service.add_definition(services, study, body, who)
+    return get_study(services, who, study)
+
+
+@router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)
+def get_version(services: ServicesDep, _who: Viewer, study: str, number: int) -> str:
+    """The TOML of one version."""
+    with services.database.read() as session:
+        return service.version_text(session, study, number)
+
+
+@router.put("/studies/{study}/texts")
+def change_texts(services: ServicesDep, who: Experimenter, study: str, body: ChangeTexts) -> StudyDetail:
+    """Change the pages of one language; they become a new version."""
+    service.change_texts(services, study, body, who)
+    return get_study(services, who, study)
+
+
+@router.put("/studies/{study}/status")
+def change_status(services: ServicesDep, who: Experimenter, study: str, body: ChangeStatus) -> StudyDetail:
+    """draft -> pilot -> live -> closed."""
+    with services.database.write() as session:
+        service.change_status(session, study, body.revision, body.status, who)
+    return get_study(services, who, study)
+
+
+@router.put("/studies/{study}/settings")
+def change_settings(
+    services: ServicesDep, who: Experimenter, study: str, body: ChangeSettings
+) -> StudyDetail:
+    """Pause, quota and recruiter."""
+    with services.database.write() as session:
+        service.change_settings(session, study, body, who)
+    return get_study(services, who, study)
+
+
+@router.get("/studies/{study}/clips")
+def list_clips(services: ServicesDep, _who: Viewer, study: str) -> list[ClipOut]:
+    """Every clip of the active version with the closure curve it shows."""
+    with services.database.read() as session:
+        version = active_version(session, find_study(session, study))
+        curves = {clip["sha256"]: clip for clip in version.manifest["clips"]}
+        query = select(VersionClip).where(VersionClip.version_id == version.id).order_by(VersionClip.id)
+        return [_clip_out(row, curves[row.clip_sha256].get("closure", [])) for row in session.scalars(query)]
+
+
+def _clip_out(row: VersionClip, closure: list[float]) -> ClipOut:
+    clip = row.clip
+    return ClipOut(
+        clip_sha256=row.clip_sha256,
+        url=f"/clips/{row.clip_sha256}.mp4",
+        file=row.file,
+        cell=row.cell,
+        levels=row.levels,
+        exemplar=row.exemplar,
+        profile=row.profile_id,
+        fps=clip.fps,
+        frames=clip.frames,
+        width_px=clip.width_px,
+        height_px=clip.height_px,
+        bytes=clip.bytes,
+        closure=closure,
+    )

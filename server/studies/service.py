@@ -1,0 +1,298 @@
+"""Studies from the dashboard: create, edit as new versions, open and close."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+from tomlkit.exceptions import ParseError
+
+from experiments import design
+from experiments.definition import Experiment
+from experiments.errors import InputError, did_you_mean
+from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
+from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
+from server.accounts.audit import record
+from server.accounts.identity import Identity
+from server.clock import now
+from server.context import Services
+from server.errors import Conflict, Invalid, NotFound
+from server.models import Study, StudyRun, StudyVersion
+from server.studies import own_clips
+from server.studies.importing import add_version, check_against_design, create_study, store_clips
+from server.studies.lookup import active_version, find_study
+from server.studies.schemas import (
+    BlockOut,
+    ChangeSettings,
+    ChangeTexts,
+    Checked,
+    DesignOut,
+    FactorOut,
+    LevelsTable,
+    NewStudy,
+    NewVersion,
+    ProblemOut,
+    ShippedExperiment,
+    StudyDetail,
+    StudySummary,
+    VersionOut,
+)
+from server.studies.uploads import FILMS, upload_folder
+
+ALLOWED = {
+    "draft": ("pilot", "live"),
+    "pilot": ("draft", "live", "closed"),
+    "live": ("closed",),
+    "closed": ("live", "pilot"),
+}
+
+
+class EditedMeanwhile(Conflict):
+    """Somebody else changed the study since this edit began."""
+
+    code = "edited_meanwhile"
+
+
+def design_out(experiment: Experiment) -> DesignOut:
+    """What a definition expands to."""
+    return DesignOut(
+        experiment=experiment.name,
+        title=experiment.title,
+        factors=[
+            FactorOut(name=f.name, label=f.label, levels=[(lv.name, lv.label) for lv in f.levels])
+            for f in experiment.factors
+        ],
+        cells=len(design.cells(experiment)),
+        exemplars=experiment.exemplars.per_cell,
+        unique_clips=len(design.clips(experiment)),
+        trials_per_participant=design.trials_per_participant(experiment),
+        blocks=[BlockOut(label=b.label, trials=len(b.clips)) for b in design.blocks(experiment)],
+        expected_minutes=design.expected_minutes(experiment),
+    )
+
+
+def check(text: str) -> Checked:
+    """Every problem of a definition with its line, or what it expands to."""
+    try:
+        experiment = parse_experiment(text)
+    except DefinitionError as error:
+        problems = [ProblemOut(line=p.line, path=p.path, message=p.message) for p in error.problems]
+        return Checked(problems=problems, design=None)
+    return Checked(problems=[], design=design_out(experiment))
+
+
+def shipped(services: Services) -> list[ShippedExperiment]:
+    """The experiments that come with the program."""
+    found = []
+    for name in SHIPPED:
+        text = locate(name).read_text(encoding="utf-8")
+        ready = (services.settings.stimuli_folder / name / MANIFEST_NAME).is_file()
+        title = parse_experiment(text).title
+        found.append(ShippedExperiment(name=name, title=title, toml=text, clips_ready=ready))
+    return found
+
+
+def create(services: Services, wanted: NewStudy, who: Identity) -> str:
+    """Create a draft study; everything is checked and every clip stored before the database changes."""
+    text, experiment, manifest, folder = _materials(services, wanted)
+    check_against_design(experiment, manifest)
+    store_clips(services.clips, manifest, folder)
+    with services.database.write() as session:
+        study = create_study(session, wanted.name, experiment, who)
+        add_version(session, study, text, experiment, manifest, who, note="created")
+        study.revision = 1
+    return wanted.name
+
+
+def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, Manifest, Path]:
+    if wanted.shipped is not None:
+        if wanted.shipped not in SHIPPED:
+            raise Invalid(
+                f"There is no shipped experiment '{wanted.shipped}'{did_you_mean(wanted.shipped, SHIPPED)}"
+            )
+        text = wanted.toml or locate(wanted.shipped).read_text(encoding="utf-8")
+        folder = services.settings.stimuli_folder / wanted.shipped
+        return text, parse_experiment(text), read_manifest(folder), folder
+    if wanted.upload is None:
+        raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
+    folder = upload_folder(services.settings.upload_folder, wanted.upload)
+    if (folder / MANIFEST_NAME).is_file():
+        if wanted.toml is None:
+            raise Invalid(
+                "The upload has a manifest; give the definition (TOML) its clips were built from too."
+            )
+        return wanted.toml, parse_experiment(wanted.toml), read_manifest(folder), folder
+    return _own(wanted, folder)
+
+
+def _own(wanted: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path]:
+    files = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in FILMS)
+    if wanted.levels is None:
+        raise Invalid("Say which levels each clip has: by a CSV table or a file-name pattern.")
+    if isinstance(wanted.levels, LevelsTable):
+        placed = own_clips.levels_from_table(wanted.levels.csv, files)
+    else:
+        placed = own_clips.levels_from_names(wanted.levels.pattern, files)
+    own_clips.check_factorial(placed)
+    if wanted.toml is None and wanted.own_clips is None:
+        raise Invalid("Give the study a title and a question, or a definition.")
+    text = wanted.toml
+    if text is None and wanted.own_clips is not None:
+        text = own_clips.definition_text(wanted.name, placed, wanted.own_clips)
+    experiment = parse_experiment(text or "")
+    return text or "", experiment, own_clips.manifest_of(experiment, placed, folder), folder
+
+
+def _for_edit(session: Session, name: str, revision: int) -> Study:
+    study = find_study(session, name)
+    if study.revision != revision:
+        raise EditedMeanwhile(
+            f"Somebody else changed this study meanwhile (revision {study.revision}, yours was {revision}); "
+            "load it again and repeat your edit.",
+            revision=study.revision,
+        )
+    return study
+
+
+def add_definition(services: Services, name: str, wanted: NewVersion, who: Identity) -> None:
+    """Store a changed definition as a new version with the same clips."""
+    experiment = parse_experiment(wanted.toml)
+    with services.database.write() as session:
+        study = _for_edit(session, name, wanted.revision)
+        manifest = Manifest.model_validate(active_version(session, study).manifest)
+        add_version(session, study, wanted.toml, experiment, manifest, who, wanted.note)
+
+
+def change_texts(services: Services, name: str, wanted: ChangeTexts, who: Identity) -> None:
+    """Change the pages of one language; the rest of the TOML keeps its form and comments."""
+    with services.database.read() as session:
+        text = active_version(session, find_study(session, name)).definition_toml
+    try:
+        document: Any = tomlkit.parse(text)
+    except ParseError as error:
+        raise InputError(f"the stored definition cannot be read ({error}); edit it as a whole") from error
+    texts = document.setdefault("texts", tomlkit.table()).setdefault(wanted.language, tomlkit.table())
+    for page, words in wanted.texts.items():
+        texts[page] = tomlkit.string(words, multiline="\n" in words)
+    fresh = NewVersion(
+        revision=wanted.revision, toml=tomlkit.dumps(document), note=f"texts in {wanted.language}"
+    )
+    add_definition(services, name, fresh, who)
+
+
+def change_status(session: Session, name: str, revision: int, status: str, who: Identity) -> None:
+    """draft -> pilot -> live -> closed, and the ways back that lose nothing."""
+    study = _for_edit(session, name, revision)
+    if status == study.status:
+        return
+    if status not in ALLOWED[study.status]:
+        raise Conflict(
+            f"A study that is {study.status} can become {' or '.join(ALLOWED[study.status])}, not {status}."
+        )
+    if study.status == "draft":
+        study.opened_at = now()
+    study.closed_at = now() if status == "closed" else None
+    record(session, who, "status changed", "study", study.name, before=study.status, after=status)
+    study.status = status
+    study.revision += 1
+
+
+def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Identity) -> None:
+    """Pause or go on, set the quota, name the recruiter."""
+    study = _for_edit(session, name, wanted.revision)
+    study.paused, study.quota = wanted.paused, wanted.quota
+    study.recruiter = wanted.recruiter.model_dump() if wanted.recruiter else None
+    study.revision += 1
+    record(
+        session, who, "settings changed", "study", name, paused=wanted.paused, quota=wanted.quota,
+        recruiter=wanted.recruiter.kind if wanted.recruiter else None,
+    )  # fmt: skip
+
+
+def delete(session: Session, name: str, who: Identity) -> None:
+    """Delete a draft that nobody has taken part in."""
+    study = find_study(session, name)
+    runs = session.scalar(
+        select(func.count()).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    )
+    if study.status != "draft" or runs:
+        raise Conflict("Only a draft without runs can be deleted; close this study instead.")
+    for run in session.scalars(select(StudyRun).where(StudyRun.study_id == study.id)):
+        session.delete(run)
+    session.flush()
+    session.delete(study)
+    record(session, who, "study deleted", "study", name)
+
+
+def summaries(session: Session) -> list[StudySummary]:
+    """Every study, the latest first."""
+    counts = _counts(session)
+    studies = session.scalars(select(Study).order_by(Study.id.desc()))
+    return [summary(study, counts) for study in studies]
+
+
+def _counts(session: Session) -> Counter[tuple[int, str]]:
+    query = select(StudyRun.study_id, StudyRun.status, func.count()).where(
+        StudyRun.preview.is_(False), StudyRun.synthetic.is_(False)
+    )
+    rows = session.execute(query.group_by(StudyRun.study_id, StudyRun.status))
+    return Counter({(study, status): number for study, status, number in rows})
+
+
+def summary(study: Study, counts: Counter[tuple[int, str]]) -> StudySummary:
+    """One line of the list of studies."""
+    return StudySummary.model_validate(
+        {
+            "name": study.name,
+            "title": study.title,
+            "status": study.status,
+            "paused": study.paused,
+            "quota": study.quota,
+            "version": study.active_version,
+            "revision": study.revision,
+            "complete": counts[study.id, "complete"],
+            "active": counts[study.id, "active"],
+            "created_at": study.created_at,
+        }
+    )
+
+
+def detail(session: Session, name: str) -> StudyDetail:
+    """A study with its declaration and versions."""
+    study = find_study(session, name)
+    version = active_version(session, study)
+    return StudyDetail(
+        summary=summary(study, _counts(session)),
+        design=design_out(Experiment.model_validate(version.definition)),
+        definition=version.definition,
+        toml=version.definition_toml,
+        definition_sha256=version.definition_sha256,
+        versions=[_version_out(row, number) for row, number in _versions(session, study)],
+        recruiter=study.recruiter,
+    )
+
+
+def _versions(session: Session, study: Study) -> list[tuple[StudyVersion, int]]:
+    query = (
+        select(StudyVersion, func.count(StudyRun.id))
+        .outerjoin(StudyRun, (StudyRun.version_id == StudyVersion.id) & StudyRun.preview.is_(False))
+        .where(StudyVersion.study_id == study.id)
+        .group_by(StudyVersion.id)
+        .order_by(StudyVersion.number.desc())
+    )
+    return [(version, number) for version, number in session.execute(query)]
+
+
+def _version_out(version: StudyVersion, runs: int) -> VersionOut:
+    return VersionOut.model_validate(version).model_copy(update={"runs": runs})
+
+
+def version_text(session: Session, name: str, number: int) -> str:
+    """The TOML of one version."""
+    study = find_study(session, name)
+    for version in study.versions:
+        if version.number == number:
+            return version.definition_toml
+    raise NotFound(f"Study '{name}' has no version {number}.")
