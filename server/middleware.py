@@ -21,7 +21,7 @@ def content_security_policy(nonce: str | None = None) -> str:
     style = f"style-src 'self' 'nonce-{nonce}'" if nonce else "style-src 'self'"
     return (
         f"default-src 'none'; script-src 'self'; {style}; img-src 'self' blob: data:; "
-        "media-src 'self' blob:; connect-src 'self'; worker-src 'self' blob:; font-src 'self'; "
+        "media-src 'self' blob:; connect-src 'self'; worker-src 'self'; font-src 'self'; "
         "manifest-src 'self'; base-uri 'none'; frame-ancestors 'none'; form-action 'self'"
     )
 

@@ -53,3 +53,9 @@ def newest_revision() -> str:
     if head is None:
         raise RuntimeError("expected at least one migration in the folder migrations, found none")
     return head
+
+
+def known_revision(revision: str) -> bool:
+    """True where this program has that revision."""
+    scripts = ScriptDirectory.from_config(alembic_config())
+    return any(script.revision == revision for script in scripts.walk_revisions())

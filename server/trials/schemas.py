@@ -23,11 +23,12 @@ class PlaybackLog(BaseModel):
     frames_missing: Count | None = None
     longest_gap_ms: Milliseconds | None = None
     stalls: Count | None = None
-    focus_lost: bool | None = None
+    focus_lost: Count | None = Field(default=None, description="How often focus was lost.")
     refresh_rate_hz: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] | None = None
     device_pixel_ratio: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
     drawn: Annotated[list[FrameTime], Field(max_length=5000)] | None = Field(
-        default=None, description="Index and time in ms of every drawn frame."
+        default=None,
+        description="Index and time in ms since the start key of every drawn frame, view after view.",
     )
 
 

@@ -13,7 +13,7 @@ from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
 from server.tokens import hash_token
 from server.trials import repository
 from server.trials.schemas import PlaybackLog, RatingIn, Receipt
-from server.trials.verdict import Playback, Ruling, is_settled, judge
+from server.trials.verdict import Playback, Ruling, frames_in_log, is_settled, judge
 from server.versions import LoadedVersion
 
 
@@ -113,7 +113,7 @@ def _check(run: Any, experiment: Experiment, kind: str, rating: RatingIn) -> Non
 
 
 def _playback(log: PlaybackLog) -> Playback:
-    indices = frozenset(index for index, _ in log.drawn) if log.drawn is not None else None
+    seen = frames_in_log(index for index, _ in log.drawn) if log.drawn is not None else None
     return Playback(
         method=log.method,
         clip_sha256=log.clip_sha256,
@@ -121,8 +121,8 @@ def _playback(log: PlaybackLog) -> Playback:
         frames_late=log.frames_late,
         frames_missing=log.frames_missing,
         longest_gap_ms=log.longest_gap_ms,
-        focus_lost=log.focus_lost,
-        drawn_indices=indices,
+        focus_lost=bool(log.focus_lost),
+        frames_seen=seen,
     )
 
 
@@ -131,7 +131,8 @@ def _judge(loaded: LoadedVersion, version_clip_id: int | None, rating: RatingIn)
     if version_clip_id is None:
         return judge(rules, _playback(rating.playback), None, 0, rated=rated)
     clip = loaded.clips[version_clip_id]
-    return judge(rules, _playback(rating.playback), clip.sha256, clip.frames, rated=rated)
+    frames = clip.frames * loaded.experiment.trial.views
+    return judge(rules, _playback(rating.playback), clip.sha256, frames, rated=rated)
 
 
 def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: datetime) -> dict[str, Any]:
@@ -151,6 +152,7 @@ def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: d
         "comment": rating.comment,
         "answered_at_client": answered,
         **rating.playback.model_dump(),
+        "focus_lost": None if rating.playback.focus_lost is None else rating.playback.focus_lost > 0,
         "px_per_mm": run.px_per_mm,
         "viewing_distance_mm": run.viewing_distance_mm,
         "verdict": ruling[0],

@@ -1,5 +1,6 @@
 """The playback verdict of one play, by the declared rules: good, flagged, or failed with the rule's name."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,7 +13,10 @@ GOOD: Ruling = ("good", "")
 
 @dataclass(frozen=True)
 class Playback:
-    """What the page measured of one play; None where it could not."""
+    """What the page measured of one play, over all its views; None where it could not.
+
+    frames_seen: different frames in the page's log of drawn frames, see `frames_in_log`.
+    """
 
     method: Literal["webcodecs", "video", "none"]
     clip_sha256: str | None
@@ -21,7 +25,7 @@ class Playback:
     frames_missing: int | None
     longest_gap_ms: float | None
     focus_lost: bool | None
-    drawn_indices: frozenset[int] | None = None
+    frames_seen: int | None = None
 
 
 def judge(
@@ -31,8 +35,9 @@ def judge(
 
     Parameters
     ----------
-    rules: as declared. playback: as measured. clip_sha256: of the clip assigned, None for trials without one.
-    frames: of that clip. rated: False where the participant could give no rating.
+    rules: as declared. playback: as measured.
+    clip_sha256: of the clip assigned, None for trials without one.
+    frames: that should have been drawn, over all views. rated: False where no rating could be given.
     """
     if clip_sha256 is None:
         return GOOD if rated else ("failed", "not_rated")
@@ -66,11 +71,21 @@ def _flagged(rules: PlaybackRules, playback: Playback, frames: int) -> str:
         return "flagged_longest_gap_ms"
     if playback.method == "video":
         return "video_fallback" if rules.flag_video_fallback else ""
-    if playback.frames_missing is None or playback.drawn_indices is None:
+    if playback.frames_missing is None or playback.frames_seen is None:
         return "no_frame_log"
     # The counts are the page's own; its log of drawn frames must tell the same.
-    seen = len([index for index in playback.drawn_indices if 0 <= index < frames])
-    return "" if frames - seen == playback.frames_missing else "frame_log_disagrees"
+    return "" if frames - playback.frames_seen == playback.frames_missing else "frame_log_disagrees"
+
+
+def frames_in_log(indices: Iterable[int]) -> int:
+    """Different frames drawn, each view counted for itself: an index below the one before begins a view."""
+    seen, latest, in_view = 0, -1, set[int]()
+    for index in indices:
+        if index < latest:
+            seen, in_view = seen + len(in_view), set()
+        in_view.add(index)
+        latest = index
+    return seen + len(in_view)
 
 
 def is_settled(kind: str, play: int, verdict: str, max_repeats: int) -> bool:

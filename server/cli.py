@@ -1,0 +1,41 @@
+"""The command `server`: it only gathers the command groups, each of which lives with its subject."""
+
+import typer
+
+from experiments.command_line import run_command_line
+from experiments.errors import InputError
+from server.errors import ApiError
+
+app = typer.Typer(
+    name="server",
+    help="Run rating studies: serve participants and experimenters, manage studies, take out the data.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+
+def _gather() -> None:
+    from server import cli_database, cli_run
+    from server.accounts import cli as accounts
+    from server.export import cli as export
+    from server.simulation import cli as simulation
+    from server.studies import cli as studies
+
+    for group in (cli_run, cli_database, studies, export, simulation, accounts):
+        group.register(app)
+
+
+_gather()
+
+
+def _call() -> None:
+    try:
+        app()
+    except ApiError as error:
+        raise InputError(error.message) from error
+
+
+def main() -> None:
+    """Run `server`; bad input ends in one line on stderr and exit code 2."""
+    run_command_line(_call)

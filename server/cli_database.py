@@ -1,0 +1,37 @@
+"""`server database`: bring the database to the newest revision, or say which one it has."""
+
+import typer
+
+from server.cli_common import migrated_services, out
+from server.db import open_database
+from server.migrate import current_revision, newest_revision
+from server.settings import Settings
+
+app = typer.Typer(help="The database's tables.", no_args_is_help=True)
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server database` to the command line."""
+    parent.add_typer(app, name="database")
+
+
+@app.command("upgrade")
+def upgrade() -> None:
+    """Make or change the tables so that they fit this program; nothing happens where they do.
+
+    The database is DATABASE_URL, or SQLite in the data folder.
+    Example: DATABASE_URL=postgresql://me@localhost/palpebra server database upgrade
+    """
+    with migrated_services() as services:
+        address = services.database.url.render_as_string(hide_password=True)
+        out.print(f"{address}: revision {current_revision(services.database)}")
+
+
+@app.command("status")
+def status() -> None:
+    """Say which revision the database has, and which this program expects."""
+    database = open_database(Settings())
+    found, expected = current_revision(database), newest_revision()
+    database.close()
+    advice = "" if found == expected else "; run `server database upgrade`"
+    out.print(f"found {found or 'no tables'}, expected {expected}{advice}")

@@ -1,0 +1,93 @@
+"""`server run`: serve participants and experimenters."""
+
+import socket
+from typing import Annotated
+
+import typer
+import uvicorn
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from experiments.errors import InputError
+from server.accounts import service as accounts
+from server.accounts.people import invitation_url
+from server.cli_common import migrated_services, out
+from server.context import Services
+from server.models import Account, Study
+from server.settings import Settings
+from server.studies.links import general_link, link_url
+
+GRACE_S = 20
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server run` to the command line."""
+    parent.command("run")(run)
+
+
+def run(
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for all.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port to listen on.")] = 8000,
+    workers: Annotated[
+        int, typer.Option(min=1, max=64, help="Processes; more than one wants PostgreSQL.")
+    ] = 1,
+    welcome: Annotated[
+        bool, typer.Option(help="Print the links of open studies and of the admin site.")
+    ] = False,
+) -> None:
+    """Serve participants and experimenters until stopped (Ctrl-C); what is under way is finished first.
+
+    Settings come from the environment, see docs/server.md. Behind https set PALPEBRA_PUBLIC_URL.
+    Example: server run --host 0.0.0.0 --port 8000 --workers 2
+    """
+    _check_free(host, port)
+    settings = Settings()
+    with migrated_services(settings) as services:
+        services.settings.key  # noqa: B018 - made now, once, before workers ask for it
+        if welcome:
+            _welcome(services)
+    # No access log: it would write every participant's internet address.
+    uvicorn.run(
+        "server.app:create_app",
+        factory=True,
+        host=host,
+        port=port,
+        workers=workers,
+        access_log=False,
+        server_header=False,
+        log_level="warning",
+        timeout_graceful_shutdown=GRACE_S,
+    )
+
+
+def _check_free(host: str, port: int) -> None:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise InputError(
+                f"cannot listen on {host}:{port} ({reason}); choose another by --port"
+            ) from error
+
+
+def _welcome(services: Services) -> None:
+    """Print where to go: participant links of open studies, the admin site, the first owner's link."""
+    settings = services.settings
+    with services.database.write() as session:
+        for study in session.scalars(
+            select(Study).where(Study.status.in_(("pilot", "live"))).order_by(Study.id)
+        ):
+            link = general_link(session, settings.key, study)
+            out.print(f"{study.name} ({study.status}): {link_url(settings.public_url, settings.key, link)}")
+        first = not _has_accounts(session)
+    out.print(f"admin site: {settings.public_url}/admin/")
+    if first:
+        _, token = accounts.invite(services.database, "owner", "first owner", None)
+        out.print(f"make the first account (once): {invitation_url(settings.public_url, token)}")
+
+
+def _has_accounts(session: Session) -> bool:
+    return bool(session.scalar(select(func.count()).select_from(Account)))

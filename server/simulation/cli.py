@@ -1,0 +1,114 @@
+"""`server simulate`: simulated participants through the real API, marked synthetic in the data."""
+
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from sqlalchemy import select
+
+from experiments.errors import InputError
+from server.app import create_app
+from server.cli_common import migrated_services, out
+from server.context import Services
+from server.models import VersionClip
+from server.settings import Settings
+from server.simulation.http import JsonClient, Refused, running_server
+from server.simulation.person import Person, Rater
+from server.studies.links import PURPOSE, create_link
+from server.studies.lookup import active_version, find_study
+from server.tokens import derived_token
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server simulate` to the command line."""
+    parent.command("simulate")(simulate)
+
+
+def simulate(
+    study: Annotated[str, typer.Argument(help="Name of a pilot or live study.")],
+    participants: Annotated[int, typer.Option(min=1, max=100_000, help="How many.")] = 3,
+    seed: Annotated[int, typer.Option(help="Seed of the people and of the effects in their answers.")] = 1,
+    at_once: Annotated[int, typer.Option(min=1, max=200, help="How many take part at the same time.")] = 2,
+    url: Annotated[
+        str, typer.Option(help="Address of a running server; one is started where not given.")
+    ] = "",
+) -> None:
+    """Let simulated participants take part through the HTTP API; their runs are marked synthetic.
+
+    Each goes through consent, forms, calibration and every trial. Answers follow a rater model with effects
+    drawn by the seed, so that an analysis has something to find; they say nothing about people.
+    Example: server simulate exp3 --participants 20
+    """
+    settings = Settings()
+    with migrated_services(settings) as services:
+        token, levels = _prepare(services, study)
+    people = range(seed * 1_000_000, seed * 1_000_000 + participants)
+    with (
+        _server(settings, url) as address,
+        ThreadPoolExecutor(at_once) as pool,
+        _bar(participants) as advance,
+    ):
+        work = [pool.submit(_one, address, token, Rater(number, seed, levels)) for number in people]
+        ratings = 0
+        for done in as_completed(work):
+            try:
+                ratings += done.result()
+            except Refused as error:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise InputError(f"the server refused a simulated participant: {error}") from error
+            advance()
+    out.print(f"study {study}: {participants} simulated participants, {ratings} ratings")
+
+
+def _prepare(services: Services, name: str) -> tuple[str, dict[str, dict[str, str]]]:
+    """A link whose runs are synthetic, and the levels of each clip."""
+    with services.database.write() as session:
+        study = find_study(session, name)
+        if study.status not in ("pilot", "live"):
+            raise InputError(
+                f"study '{name}' is {study.status}; open it by `server study status {name} pilot`"
+            )
+        query = select(VersionClip.clip_sha256, VersionClip.levels)
+        version = active_version(session, study)
+        rows = session.execute(query.where(VersionClip.version_id == version.id))
+        levels: dict[str, dict[str, str]] = dict(rows.tuples().all())
+        link = create_link(
+            session, services.settings.key, study, "general", label="simulation", synthetic=True
+        )
+        return derived_token(services.settings.key, PURPOSE, link.public_id), levels
+
+
+def _one(address: str, token: str, rater: Rater) -> int:
+    client = JsonClient(address)
+    try:
+        person = Person(client, rater)
+        person.take_part(token)
+        return person.ratings
+    finally:
+        client.close()
+
+
+@contextmanager
+def _server(settings: Settings, url: str) -> Iterator[str]:
+    if url:
+        yield url
+        return
+    with running_server(create_app(settings)) as address:
+        yield address
+
+
+@contextmanager
+def _bar(total: int) -> Iterator[Callable[[], None]]:
+    """A progress bar with remaining time on a terminal, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda: None
+        return
+    columns = (TextColumn("participants"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("participants", total=total)
+        yield lambda: progress.advance(task)

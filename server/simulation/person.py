@@ -1,0 +1,178 @@
+"""A simulated person: takes, seeded, what the API gives, and answers as a declared rater model does."""
+
+import hashlib
+import random
+import uuid
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from server.simulation.http import JsonClient
+
+LEVEL_SD, PERSON_SD, CLIP_SD, TRIAL_SD = 0.5, 0.6, 0.2, 1.0
+"""Spread of level effects, person means, exemplars and single answers, in points of a seven-point scale."""
+FLAGGED_SHARE, FAILED_SHARE = 0.03, 0.01
+"""Shares of plays with a frame lost (flagged) and with the focus lost (failed)."""
+
+
+class Rater:
+    """The rater model of one person: mean of the scale + level effects + person + exemplar + noise.
+
+    Parameters
+    ----------
+    seed: of this person. effects_seed: of the effects, shared by all people of a simulation.
+    levels_of: levels of each clip by its hash; a real participant never learns them, so the effects are
+    put in from outside.
+    """
+
+    def __init__(self, seed: int, effects_seed: int, levels_of: Mapping[str, Mapping[str, str]]) -> None:
+        self.seed, self.effects_seed, self.levels_of = seed, effects_seed, levels_of
+        self.rng = random.Random(f"{effects_seed}/person/{seed}")
+        self.shift = self.rng.gauss(0, PERSON_SD)
+
+    def answer(self, clip: str, minimum: int, maximum: int) -> int:
+        """A rating of this clip, rounded into the scale."""
+        middle, unit = (minimum + maximum) / 2, (maximum - minimum) / 6
+        levels = self.levels_of.get(clip, {}).items()
+        effects = sum(self._effect(f"{name}/{level}") for name, level in levels)
+        own = self._effect(clip) * CLIP_SD / LEVEL_SD
+        value = middle + unit * (effects + own + self.shift + self.rng.gauss(0, TRIAL_SD))
+        return min(maximum, max(minimum, round(value)))
+
+    def _effect(self, key: str) -> float:
+        digest = hashlib.sha256(f"{self.effects_seed}/{key}".encode()).digest()
+        return random.Random(digest).gauss(0, LEVEL_SD)
+
+
+class Person:
+    """One simulated participant on one connection."""
+
+    def __init__(self, client: JsonClient, rater: Rater, language: str | None = None) -> None:
+        self.client, self.rater, self.language = client, rater, language
+        self.elapsed_ms = 0.0
+        self.ratings = 0
+
+    def take_part(
+        self, link_token: str, *, stop_after: int | None = None, progress: Callable[[], None] = lambda: None
+    ) -> str | None:
+        """Go through the whole run; return the completion code, None where `stop_after` ended it."""
+        self.begin(link_token)
+        state = self.client.get("/api/run")
+        self._before(state)
+        due = [trial for trial in state["trials"] if not trial["answered"]]
+        while due:
+            trial = due.pop(0)
+            if stop_after is not None and self.ratings >= stop_after:
+                return None
+            if self.rate(trial, state["trial"]["scale"]):
+                self._offer_again(trial, due)
+            progress()
+        self._forms(state, "after")
+        self.client.put("/api/run/stage", {"stage": "debrief"})
+        return str(self.client.post("/api/run/complete")["completion_code"])
+
+    def begin(self, link_token: str) -> None:
+        """Open the link and start the run."""
+        link = self.client.get(f"/api/links/{link_token}")
+        rng = random.Random(f"{self.rater.effects_seed}/client/{self.rater.seed}")
+        client_id = uuid.UUID(int=rng.getrandbits(128), version=4)
+        start = {
+            "language": self.language or link["study"]["languages"][0],
+            "client_id": str(client_id),
+            "device": {"simulated": True},
+        }
+        self.client.token = self.client.post(f"/api/links/{link_token}/runs", start)["run_token"]
+
+    def _before(self, state: dict[str, Any]) -> None:
+        self.client.put("/api/run/consent", {"agreed": True})
+        self._forms(state, "before")
+        if state["display"]["calibrate"] != "off":
+            self.client.put("/api/run/calibration", _CALIBRATION)
+        self.client.put("/api/run/stage", {"stage": "trials"})
+
+    def _forms(self, state: dict[str, Any], when: str) -> None:
+        for form in state["forms"]:
+            if form["when"] == when:
+                answers = {item["name"]: self._field(item) for item in form["fields"]}
+                self.client.put(f"/api/run/forms/{form['name']}", {"answers": answers})
+
+    def _field(self, item: dict[str, Any]) -> Any:
+        rng = self.rater.rng
+        match item["type"]:
+            case "number":
+                return rng.randint(item["minimum"], min(item["maximum"], item["minimum"] + 60))
+            case "likert":
+                return rng.randint(1, item["points"])
+            case "choice":
+                return rng.choice(item["options"])["value"]
+            case "multiple_choice":
+                return [rng.choice(item["options"])["value"]]
+            case _:
+                return "simulated"
+
+    def rate(self, trial: dict[str, Any], scale: dict[str, Any]) -> bool:
+        """Play and rate one trial; True where the receipt asks for the clip again."""
+        body = self.rating(trial, scale)
+        receipt = self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)["receipt"]
+        self.ratings += 1
+        return bool(receipt["again"])
+
+    def rating(self, trial: dict[str, Any], scale: dict[str, Any]) -> dict[str, Any]:
+        """The rating as the page would send it."""
+        rng, clip = self.rater.rng, trial["clip_sha256"]
+        length_ms = 1000 * trial["frames"] / trial["fps"] if clip else 0.0
+        rt = rng.lognormvariate(6.5, 0.4)
+        self.elapsed_ms += length_ms + rt + 500
+        if clip:
+            response = self.rater.answer(clip, scale["minimum"], scale["maximum"])
+        else:
+            asked = [int(word) for word in trial["prompt"].replace("*", " ").split() if word.isdigit()]
+            response = asked[0]
+        return {
+            "trial_index": trial["trial_index"],
+            "play": trial["plays_done"] + 1,
+            "response": response,
+            "rt": round(rt, 2),
+            "rt_from_first_frame": round(rt + length_ms, 2),
+            "time_elapsed": round(self.elapsed_ms, 2),
+            "changes": 0,
+            "playback": self._playback(trial) if clip else {"method": "none"},
+        }
+
+    def _playback(self, trial: dict[str, Any]) -> dict[str, Any]:
+        rng, frames = self.rater.rng, trial["frames"]
+        chance, period = rng.random(), 1000 / trial["fps"]
+        lost = {rng.randrange(1, frames)} if chance < FLAGGED_SHARE and frames > 1 else set()
+        drawn = [[index, round(10 + index * period, 2)] for index in range(frames) if index not in lost]
+        return {
+            "method": "webcodecs",
+            "clip_sha256": trial["clip_sha256"],
+            "key_to_first_frame_ms": round(rng.uniform(6, 20), 2),
+            "frames_drawn": len(drawn),
+            "frames_late": 0,
+            "frames_missing": len(lost),
+            "longest_gap_ms": round(period * (2 if lost else 1), 2),
+            "stalls": 0,
+            "focus_lost": int(chance > 1 - FAILED_SHARE),
+            "refresh_rate_hz": 60.0,
+            "device_pixel_ratio": 1.0,
+            "drawn": drawn,
+        }
+
+    @staticmethod
+    def _offer_again(trial: dict[str, Any], due: list[dict[str, Any]]) -> None:
+        """Put the trial at the end of its block."""
+        place = sum(1 for other in due if other["block"] == trial["block"])
+        due.insert(place, {**trial, "plays_done": trial["plays_done"] + 1})
+
+
+_CALIBRATION = {
+    "px_per_mm": 3.78,
+    "method": "card",
+    "viewing_distance_mm": None,
+    "device_pixel_ratio": 1.0,
+    "screen_width_px": 1920,
+    "screen_height_px": 1080,
+    "window_width_px": 1920,
+    "window_height_px": 1080,
+    "zoom": 1.0,
+}

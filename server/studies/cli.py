@@ -1,0 +1,189 @@
+"""`server study` and `server link`: take studies in, open and close them, make links."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from experiments.errors import InputError, did_you_mean
+from experiments.load import definition_sha256, locate, parse_experiment
+from experiments.manifest import Manifest, read_manifest
+from server.accounts.audit import record
+from server.cli_common import migrated_services, out
+from server.clock import now
+from server.context import Services
+from server.models import Study, StudyRun, StudyVersion
+from server.studies.importing import add_version, check_against_design, create_study, store_clips
+from server.studies.links import LinkKind, create_link, general_link, link_url, links_of
+from server.studies.lookup import active_version, find_study
+
+study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
+link_app = typer.Typer(help="Links for participants.", no_args_is_help=True)
+STATUSES = ("draft", "pilot", "live", "closed")
+KINDS: dict[str, LinkKind] = {"general": "general", "personal": "personal", "preview": "preview"}
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server study` and `server link` to the command line."""
+    parent.add_typer(study_app, name="study")
+    parent.add_typer(link_app, name="link")
+
+
+@study_app.command("add")
+def add(
+    experiment: Annotated[str, typer.Argument(help="exp1, exp2, exp3, or a TOML file.")],
+    clips: Annotated[
+        Path, typer.Option(help="Folder with manifest.json and its clips (see `stimuli build`).")
+    ],
+    name: Annotated[str, typer.Option(help="Name on this server; the experiment's where not given.")] = "",
+    open_: Annotated[bool, typer.Option("--open", help="Set it live and print its general link.")] = False,
+) -> None:
+    """Take an experiment and its clips into the server: all of it, or nothing.
+
+    Doing it again changes nothing; a changed declaration or changed clips make a new version.
+    Example: server study add exp3 --clips out/exp3 --open
+    """
+    text = locate(experiment).read_text(encoding="utf-8")
+    declared = parse_experiment(text, locate(experiment).name)
+    manifest = read_manifest(clips)
+    if manifest.experiment != declared.name:
+        raise InputError(
+            f"the clips in {clips} were built for '{manifest.experiment}', not for '{declared.name}'"
+        )
+    check_against_design(declared, manifest)
+    with migrated_services() as services:
+        new = store_clips(services.clips, manifest, clips)
+        with services.database.write() as session:
+            study = session.scalar(select(Study).where(Study.name == (name or declared.name)))
+            study = study or create_study(session, name or declared.name, declared, None)
+            version = _same_version(session, study, definition_sha256(declared), manifest)
+            said = f"version {study.active_version}, nothing new"
+            if version is None:
+                version = add_version(session, study, text, declared, manifest, None)
+                said = f"version {version.number}, {len(manifest.clips)} clips ({new} new)"
+            out.print(f"study {study.name}: {said}")
+            if manifest.definition_sha256 != version.definition_sha256:
+                out.print(
+                    "note: the clips were built with another wording of the declaration; their cells agree"
+                )
+            if open_:
+                _set_status(session, study, "live")
+                out.print(_url(services, session, study))
+
+
+def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:
+    """The active version, where it has this declaration and these clips."""
+    if not study.active_version:
+        return None
+    version = active_version(session, study)
+    known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips}
+    given = {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
+    return version if version.definition_sha256 == sha256 and known == given else None
+
+
+def _url(services: Services, session: Session, study: Study) -> str:
+    link = general_link(session, services.settings.key, study)
+    return link_url(services.settings.public_url, services.settings.key, link)
+
+
+def _set_status(session: Session, study: Study, status: str) -> None:
+    if study.status == status:
+        return
+    record(session, None, "status changed", "study", study.name, old=study.status, new=status)
+    study.status, study.revision = status, study.revision + 1
+    if status in ("pilot", "live"):
+        study.opened_at, study.closed_at = study.opened_at or now(), None
+    if status == "closed":
+        study.closed_at = now()
+
+
+@study_app.command("status")
+def set_status(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    status: Annotated[str, typer.Argument(help="draft, pilot, live or closed.")],
+) -> None:
+    """Open or close a study.
+
+    Example: server study status exp3 pilot
+    """
+    if status not in STATUSES:
+        raise InputError(f"no status '{status}'{did_you_mean(status, STATUSES)}")
+    with migrated_services() as services, services.database.write() as session:
+        found = find_study(session, study)
+        _set_status(session, found, status)
+        out.print(f"study {found.name}: {found.status}")
+
+
+@study_app.command("list")
+def list_studies() -> None:
+    """List the studies with their status, version and runs.
+
+    Example: server study list
+    """
+    with migrated_services() as services, services.database.read() as session:
+        table = Table("study", "status", "version", "runs", "complete", "title")
+        counts = _run_counts(session)
+        for study in session.scalars(select(Study).order_by(Study.id)):
+            by_status = {status: number for (ident, status), number in counts.items() if ident == study.id}
+            numbers = (str(sum(by_status.values())), str(by_status.get("complete", 0)))
+            table.add_row(study.name, study.status, str(study.active_version), *numbers, study.title)
+        out.print(table if table.row_count else "no studies yet; add one by `server study add`")
+
+
+def _run_counts(session: Session) -> dict[tuple[int, str], int]:
+    query = (
+        select(StudyRun.study_id, StudyRun.status, func.count())
+        .where(StudyRun.preview.is_(False))
+        .group_by(StudyRun.study_id, StudyRun.status)
+    )
+    return {(study_id, status): number for study_id, status, number in session.execute(query)}
+
+
+@link_app.command("create")
+def create(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    kind: Annotated[str, typer.Option(help="general, personal (one person) or preview.")] = "general",
+    label: Annotated[
+        str, typer.Option(help="Whom or what it is for; personal: the participant's name.")
+    ] = "",
+    count: Annotated[int, typer.Option(min=1, max=10_000, help="How many personal links.")] = 1,
+    quota: Annotated[int | None, typer.Option(min=1, help="Most participants by this link.")] = None,
+    expires_hours: Annotated[float | None, typer.Option(min=0.0, help="Hours until it expires.")] = None,
+) -> None:
+    """Make a link (or many personal ones) and print its address, with its label where there are several.
+
+    Example: server link create exp3 --kind personal --label P --count 20 > links.csv
+    """
+    if kind not in KINDS:
+        raise InputError(f"no kind of link '{kind}'{did_you_mean(kind, KINDS)}")
+    if count > 1 and kind != "personal":
+        raise InputError(
+            "expected --count with --kind personal only; a general link serves any number of people"
+        )
+    expires = now() + timedelta(hours=expires_hours) if expires_hours is not None else None
+    with migrated_services() as services, services.database.write() as session:
+        found, settings = find_study(session, study), services.settings
+        for number in range(1, count + 1):
+            text = f"{label or 'P'}{number:03d}" if count > 1 else label
+            link = create_link(
+                session, settings.key, found, KINDS[kind], label=text, quota=quota, expires_at=expires
+            )
+            url = link_url(settings.public_url, settings.key, link)
+            out.print(f"{text},{url}" if count > 1 else url)
+        record(session, None, "links created", "study", found.name, kind=kind, count=count)
+
+
+@link_app.command("list")
+def list_links(study: Annotated[str, typer.Argument(help="Name of the study.")]) -> None:
+    """List the links of a study: kind, label, address.
+
+    Example: server link list exp3
+    """
+    with migrated_services() as services, services.database.read() as session:
+        key, public_url = services.settings.key, services.settings.public_url
+        for link in links_of(session, find_study(session, study)):
+            out.print(f"{link.kind},{link.label},{link_url(public_url, key, link)}")
