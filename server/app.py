@@ -13,6 +13,7 @@ from server.accounts import people
 from server.clips import endpoints as clips
 from server.context import open_services
 from server.errors import install_error_handlers
+from server.export import endpoints as export
 from server.middleware import BodyLimit, SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.participants import endpoints as participants
@@ -38,6 +39,7 @@ def _routers() -> tuple[APIRouter, ...]:
         monitor.router,
         results.router,
         runs.router,
+        export.router,
         pages.router,
     )
 

@@ -1,0 +1,35 @@
+"""Tables as pieces of CSV bytes, so that a download of any length takes constant memory."""
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.ratings import csv_header, csv_row
+from server.export.ratings_csv import factor_names, rating_rows
+from server.models import Study
+
+ROWS_A_PIECE = 500
+
+
+def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
+    """Rows as CSV in UTF-8, some hundred rows a piece."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    for number, row in enumerate(rows, start=1):
+        writer.writerow(row)
+        if number % ROWS_A_PIECE == 0:
+            yield stream.getvalue().encode("utf-8")
+            stream.seek(0)
+            stream.truncate()
+    yield stream.getvalue().encode("utf-8")
+
+
+def rating_table(session: Session, study: Study) -> Iterator[list[Any]]:
+    """Header and rows of the tidy ratings CSV."""
+    factors = factor_names(session, study)
+    yield csv_header(factors)
+    for row in rating_rows(session, study):
+        yield csv_row(row, factors)

@@ -1,0 +1,101 @@
+"""A study as a Psych-DS dataset (psych-ds.github.io): a zip with metadata, data and codebook, streamed."""
+
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from server.export.codebook import RUN_COLUMNS, markdown, rating_columns, variables_measured
+from server.export.pieces import csv_pieces, rating_table
+from server.export.runs import run_rows
+from server.models import Study, StudyVersion
+
+
+class _Sink(io.RawIOBase):
+    """What the zip writer writes to; `take` hands on what has come since."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+
+    def writable(self) -> bool:
+        """True: this stream only takes."""
+        return True
+
+    def write(self, piece: Any) -> int:
+        """Keep a piece until it is taken."""
+        self._pieces.append(bytes(piece))
+        return len(piece)
+
+    def take(self) -> bytes:
+        """Everything written since the last call."""
+        taken = b"".join(self._pieces)
+        self._pieces.clear()
+        return taken
+
+
+def dataset(
+    session: Session, study: Study, version: StudyVersion, definition: Experiment, made: str
+) -> Iterator[bytes]:
+    """The pieces of the zip: `dataset_description.json`, README, CHANGES, `data/`, codebook, definition."""
+    sink = _Sink()
+    keyword = _keyword(study.name)
+    texts = {
+        "dataset_description.json": json.dumps(
+            description(study, definition, made), indent=2, ensure_ascii=False
+        ),
+        "README.md": _readme(study, definition, made),
+        "CHANGES.md": f"{made} Exported from version {version.number} of the study.\n",
+        "documentation/codebook.md": markdown(definition),
+        f"materials/{definition.name}.toml": version.definition_toml,
+    }
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in texts.items():
+            archive.writestr(f"{study.name}/{name}", text)
+            yield sink.take()
+        tables: tuple[tuple[str, Iterable[Sequence[Any]]], ...] = (
+            ("ratings", rating_table(session, study)),
+            ("runs", run_rows(session, study)),
+        )
+        for table, rows in tables:
+            path = f"{study.name}/data/study-{keyword}_description-{table}_data.csv"
+            with archive.open(path, "w", force_zip64=True) as member:
+                for piece in csv_pieces(rows):
+                    member.write(piece)
+                    yield sink.take()
+            yield sink.take()
+    yield sink.take()
+
+
+def _keyword(name: str) -> str:
+    # Psych-DS file names are keyword-value pairs; values hold letters and digits only.
+    return "".join(letter for letter in name if letter.isalnum()) or "study"
+
+
+def description(study: Study, definition: Experiment, made: str) -> dict[str, Any]:
+    """The metadata file: schema.org JSON-LD with every column of every table."""
+    columns = {column.name: column for column in (*rating_columns(definition), *RUN_COLUMNS)}
+    return {
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": study.name,
+        "description": f"{definition.title}. Ratings of short clips collected with Palpebra.",
+        "schemaVersion": "Psych-DS 0.4.0",
+        "dateModified": made,
+        "citation": definition.source or "",
+        "measurementTechnique": "Rating of single clips in a web browser",
+        "variableMeasured": variables_measured(list(columns.values())),
+    }
+
+
+def _readme(study: Study, definition: Experiment, made: str) -> str:
+    return (
+        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}. One row a play in "
+        "`data/*ratings_data.csv`, one row a visit in `data/*runs_data.csv`; every column is explained in "
+        "`documentation/codebook.md`; the declared experiment is in `materials/`.\n\n"
+        "Rows with `synthetic` = 1 were not given by people. Rows with `excluded` = 1 were excluded by an "
+        "experimenter, with the reason beside them.\n"
+    )

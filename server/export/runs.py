@@ -1,0 +1,83 @@
+"""Runs as CSV rows, and everything stored as JSON lines; one run is in memory at a time."""
+
+import json
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.clock import iso
+from server.export.codebook import RUN_COLUMNS
+from server.models import FormAnswer, Study, StudyRun
+from server.runs import service
+
+AT_ONCE = 100
+
+
+def each_run(session: Session, study: Study) -> Iterator[StudyRun]:
+    """The runs of a study but previews, in the order they began."""
+    latest = 0
+    while True:
+        query = select(StudyRun).where(
+            StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.preview.is_(False)
+        )
+        runs = session.scalars(query.order_by(StudyRun.id).limit(AT_ONCE)).all()
+        if not runs:
+            return
+        latest = runs[-1].id
+        yield from runs
+        session.expunge_all()
+
+
+def run_rows(session: Session, study: Study) -> Iterator[list[Any]]:
+    """Header and rows of the runs CSV, the columns of `RUN_COLUMNS`."""
+    yield [column.name for column in RUN_COLUMNS]
+    name = study.name
+    for run in each_run(session, study):
+        values = _values(session, run) | {"study": name}
+        yield [values[column.name] for column in RUN_COLUMNS]
+
+
+def _values(session: Session, run: StudyRun) -> dict[str, Any]:
+    query = select(FormAnswer.form, FormAnswer.answers).where(FormAnswer.study_run_id == run.id)
+    answers = session.execute(query).tuples()
+    return {
+        "run": run.public_id,
+        "participant": run.participant,
+        "phase": run.phase,
+        "synthetic": int(run.synthetic),
+        "status": run.status,
+        "stage": run.stage,
+        "language": run.language,
+        "version": run.version.number,
+        "definition_sha256": run.version.definition_sha256,
+        "seed": run.seed,
+        "slot": run.slot,
+        "started_at": _time(run.started_at),
+        "consented_at": _time(run.consented_at),
+        "completed_at": _time(run.completed_at),
+        "trials": run.trials_total,
+        "excluded": int(run.excluded),
+        "exclusion_reason": run.exclusion_reason or "",
+        "erased": int(run.erased_at is not None),
+        "forms": _json(dict(answers)),
+        "device": _json(run.device),
+        "recruiter_parameters": _json(run.recruiter_parameters),
+    }
+
+
+def _time(moment: datetime | None) -> str:
+    return iso(moment) if moment else ""
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)
+
+
+def raw_lines(session: Session, study: Study) -> Iterator[str]:
+    """One JSON object a run with every play, drawn frame, event, form and calibration."""
+    query = select(StudyRun.public_id).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    for public_id in session.scalars(query.order_by(StudyRun.id)).all():
+        yield service.timeline(session, study, public_id).model_dump_json() + "\n"
