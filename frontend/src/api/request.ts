@@ -1,0 +1,72 @@
+/** One request to the server: an answer of any status, or a NetworkError where none came. */
+
+export interface Answer {
+  status: number;
+  /** The JSON body, or null where the answer had none. */
+  body: unknown;
+  /** Seconds the server asks to wait before the next try, from Retry-After. */
+  retry_after_s: number | null;
+}
+
+/** The server could not be reached, or did not answer in time. */
+export class NetworkError extends Error {
+  override name = "NetworkError";
+}
+
+/** The server refused: `code` and `message` come from its one error shape. */
+export class Refused extends Error {
+  override name = "Refused";
+  constructor(readonly status: number, readonly code: string, message: string, readonly details: unknown) {
+    super(message);
+  }
+}
+
+export interface RequestOptions {
+  token?: string | null;
+  body?: unknown;
+  timeout_ms?: number;
+  base?: string;
+}
+
+export async function request(method: string, path: string, options: RequestOptions = {}): Promise<Answer> {
+  const headers: Record<string, string> = { Accept: "application/json" };
+  if (options.token) headers["Authorization"] = `Bearer ${options.token}`;
+  if (options.body !== undefined) headers["Content-Type"] = "application/json";
+  const init: RequestInit = { method, headers, cache: "no-store", signal: AbortSignal.timeout(options.timeout_ms ?? 10_000) };
+  if (options.body !== undefined) init.body = JSON.stringify(options.body);
+  try {
+    const response = await fetch((options.base ?? "") + path, init);
+    const text = await response.text();
+    const wait = Number(response.headers.get("Retry-After"));
+    return { status: response.status, body: parsed(text), retry_after_s: wait > 0 ? wait : null };
+  } catch (error) {
+    throw new NetworkError(`no answer from ${method} ${path}: ${String(error)}`);
+  }
+}
+
+function parsed(text: string): unknown {
+  if (!text) return null;
+  try {
+    return JSON.parse(text);
+  } catch {
+    // A proxy's error page stands where JSON was expected: its status says enough.
+    return null;
+  }
+}
+
+export function isTemporary(status: number): boolean {
+  return status >= 500 || status === 408 || status === 425 || status === 429;
+}
+
+export function refusalOf(answer: Answer): Refused {
+  const body = answer.body as { error?: { code?: string; message?: string; details?: unknown } } | null;
+  const error = body?.error;
+  return new Refused(answer.status, error?.code ?? `http_${answer.status}`, error?.message ?? "", error?.details ?? null);
+}
+
+/** The body of a 2xx answer; a Refused for any other. */
+export async function call<Body>(method: string, path: string, options: RequestOptions = {}): Promise<Body> {
+  const answer = await request(method, path, options);
+  if (answer.status >= 200 && answer.status < 300) return answer.body as Body;
+  throw refusalOf(answer);
+}

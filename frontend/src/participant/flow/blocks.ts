@@ -1,0 +1,106 @@
+/** Practice and blocks: clips fetched first, trials in the stored order, failed clips again at the end. */
+import type { AssignedTrial } from "../../api/participant";
+import { trial, type Node } from "../jspsych";
+import { blockBreak } from "../screens/block-break";
+import { calibration } from "../screens/calibration";
+import { preloadPage, sourcesOf } from "../screens/preload";
+import { needsScreenSetup, screenSetup } from "../screens/screen-setup";
+import { settle } from "../screens/settle";
+import { textPage } from "../screens/text-page";
+import { counted, type Session } from "../session";
+import { trialNode } from "../trials";
+import { enterStage } from "./stages";
+
+const RECEIPTS_WITHIN_MS = 10_000;
+
+export function practiceNodes(session: Session): Node[] {
+  const { run, t } = session;
+  const trials = run.trials.filter((one) => one.kind === "practice" && !one.answered);
+  if (trials.length === 0) return [];
+  const first = run.blocks[0]?.block ?? null;
+  const text = run.texts.practice || `# ${t("practice_title")}`;
+  const total = counted(run).length;
+  const remarks = t("practice_done", { trials: total, block: run.blocks[0]?.trials ?? total });
+  return [
+    trial(textPage(session), { eyebrow: "", text, action: t("continue"), remarks: "" }),
+    {
+      timeline: [preloadNode(session, trials), ...trialNodes(session, trials)],
+      on_timeline_start: () => (enterStage(session, "practice"), fetchAhead(session, trials, first)),
+    },
+    trial(textPage(session), { eyebrow: "", text: `# ${t("practice_done_title")}`, action: t("start_study"), remarks }),
+  ];
+}
+
+export function restNodes(session: Session, block: number): Node[] {
+  const { blocks, break_seconds_min } = session.run;
+  return [trial(blockBreak(session), { block, blocks: blocks.length, seconds_min: break_seconds_min })];
+}
+
+export function blockNodes(session: Session, block: number, next: number | null): Node[] {
+  const trials = trialsOf(session, block);
+  const open = trials.filter((one) => !one.answered);
+  return [{
+    timeline: [preloadNode(session, trials), ...trialNodes(session, open), ...repetitions(session, block)],
+    on_timeline_start: () => (enterStage(session, "trials"), fetchAhead(session, trials, next)),
+  }];
+}
+
+function trialsOf({ run }: Session, block: number): AssignedTrial[] {
+  return run.trials.filter((one) => one.block === block && one.kind !== "practice");
+}
+
+/** A block keeps all its clips, since any of them may be wanted again. */
+function preloadNode(session: Session, trials: AssignedTrial[]): Node {
+  return trial(preloadPage(session), { eyebrow: "", trials });
+}
+
+function fetchAhead(session: Session, trials: AssignedTrial[], next: number | null): void {
+  const now = sourcesOf(trials);
+  const ahead = next === null ? [] : sourcesOf(trialsOf(session, next));
+  session.clips.keepOnly([...now, ...ahead]);
+  // After the clips that are needed now; what fails here is fetched again, and shown, when its turn comes.
+  void session.clips.load(now).then(() => session.clips.load(ahead));
+}
+
+function trialNodes(session: Session, trials: AssignedTrial[]): Node[] {
+  return trials.flatMap((one, place) => {
+    const next = trials[place + 1] ?? null;
+    return [...checks(session), trialNode(session, one.kind, () => ({ trial: one, play: 1, next }))];
+  });
+}
+
+/** Before a trial: full screen, room and size as they were, or put right first. */
+function checks(session: Session): Node[] {
+  const { screen, api, run } = session;
+  const setup: Node = {
+    timeline: [trial(screenSetup(session), { eyebrow: "", again: true })],
+    conditional_function: () => needsScreenSetup(session),
+  };
+  const measure: Node = {
+    timeline: [trial(calibration(session), { eyebrow: "", changed: true })],
+    conditional_function: () => {
+      const change = screen.change();
+      const calibrated = change === "zoom" ? screen.afterZoom() : null;
+      if (calibrated) void api.calibration(calibrated);
+      return run.display.calibrate !== "off" && change === "screen";
+    },
+  };
+  return [setup, measure];
+}
+
+function repetitions(session: Session, block: number): Node[] {
+  const waits = trial(settle(session), { limit_ms: RECEIPTS_WITHIN_MS });
+  const wanted = (): boolean => session.replays.peek(block) !== null;
+  const again = trialNode(session, "main", () => {
+    const next = session.replays.peek(block);
+    if (!next) throw new Error("expected a clip to show again, found none");
+    return { ...next, next: null };
+  });
+  const taken: Node = { timeline: [], on_timeline_start: () => session.replays.shift(block) };
+  const loop: Node = {
+    timeline: [...checks(session), again, taken, waits],
+    conditional_function: wanted,
+    loop_function: wanted,
+  };
+  return [waits, loop];
+}

@@ -1,0 +1,58 @@
+/** Can this browser, on this device, show the study? Reasons are message keys, worst first. */
+import type { Gates } from "../../api/participant";
+import type { MessageKey } from "../../i18n";
+import { hasVideo, hasWebCodecs } from "../playback/choose";
+
+export interface GateFinding {
+  reason: MessageKey;
+  /** False where the participant may go on all the same. */
+  closed: boolean;
+  values: Record<string, number>;
+}
+
+export interface Abilities {
+  secure: boolean;
+  web_codecs: boolean;
+  video: boolean;
+  storage: boolean;
+  /** No mouse or keyboard to be seen: a phone or a tablet. */
+  touch_only: boolean;
+  screen_width_px: number;
+  screen_height_px: number;
+}
+
+export function abilities(storage: boolean): Abilities {
+  return {
+    secure: window.isSecureContext && "subtle" in (globalThis.crypto ?? {}),
+    web_codecs: hasWebCodecs(),
+    video: hasVideo(),
+    storage,
+    touch_only: matchMedia("(pointer: coarse)").matches && !matchMedia("(any-pointer: fine)").matches,
+    screen_width_px: Math.max(screen.width, window.innerWidth),
+    screen_height_px: Math.max(screen.height, window.innerHeight),
+  };
+}
+
+export function findings(found: Abilities, gates: Gates): GateFinding[] {
+  const list: GateFinding[] = [];
+  const add = (reason: MessageKey, closed: boolean, values = {}): void => void list.push({ reason, closed, values });
+  if (!found.secure) add("gate_insecure", true);
+  else if (!found.video) add("gate_browser", true);
+  if (found.touch_only && !gates.allow_touch) add("gate_touch", true);
+  if (tooSmall(found, gates)) {
+    add("gate_screen", true, {
+      width: gates.minimum_width_px, height: gates.minimum_height_px,
+      have_width: found.screen_width_px, have_height: found.screen_height_px,
+    });
+  }
+  if (found.secure && found.video && !found.web_codecs) add("gate_video", false);
+  if (!found.storage) add("gate_storage", false);
+  return list.sort((a, b) => Number(b.closed) - Number(a.closed));
+}
+
+function tooSmall(found: Abilities, gates: Gates): boolean {
+  const long = Math.max(found.screen_width_px, found.screen_height_px);
+  const short = Math.min(found.screen_width_px, found.screen_height_px);
+  // A tablet held upright can be turned, so only the two sides count.
+  return long < Math.max(gates.minimum_width_px, gates.minimum_height_px) || short < Math.min(gates.minimum_width_px, gates.minimum_height_px);
+}

@@ -1,0 +1,67 @@
+/** From a started run to everything its screens share. */
+import type { LinkDocument, RunDocument, StartedRun } from "../../api/participant";
+import { translator } from "../../i18n";
+import { EventLog } from "../outbox/events";
+import type { Outbox } from "../outbox/outbox";
+import { choosePlayer, hasWebCodecs } from "../playback/choose";
+import { ClipCache } from "../preload/clip-cache";
+import { measureRefreshRate } from "../screen/refresh-rate";
+import { RunClock } from "../screen/run-clock";
+import { ScreenState } from "../screen/screen-state";
+import { counted, RunApi, type Session } from "../session";
+import { owed, Replays } from "./replays";
+
+const SEND_FIRST_MS = 8_000;
+const RATING_PATH = "/api/run/ratings/";
+
+/** Send what an earlier visit left, so that the run document knows of it. */
+export async function flush(outbox: Outbox, started: StartedRun): Promise<void> {
+  await outbox.open(started.run_id, started.run_token);
+  await outbox.drained(SEND_FIRST_MS);
+}
+
+export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocument, outbox: Outbox): Session {
+  const screen = new ScreenState();
+  screen.restore(run.calibration);
+  countUnsent(run, outbox);
+  const session: Session = {
+    link, run, root, outbox, screen,
+    language: run.language,
+    t: translator(run.language),
+    events: new EventLog(outbox),
+    clips: new ClipCache(),
+    player: choosePlayer(run.display.background),
+    clock: new RunClock(run.elapsed_ms_before),
+    replays: new Replays(),
+    over: new AbortController(),
+    api: new RunApi(outbox),
+    answered: counted(run).filter((trial) => trial.answered).length,
+  };
+  owed(run.trials).forEach(({ trial, play }) => session.replays.add(trial, play));
+  return session;
+}
+
+/** A rating still in the outbox counts as given, though the server does not know of it yet. */
+function countUnsent(run: RunDocument, outbox: Outbox): void {
+  for (const item of outbox.unsent().filter(({ path }) => path.startsWith(RATING_PATH))) {
+    const body = item.body as { trial_index: number; play: number };
+    const trial = run.trials.find((one) => one.trial_index === body.trial_index);
+    if (trial) Object.assign(trial, { answered: true, plays_done: Math.max(trial.plays_done, body.play) });
+  }
+}
+
+/** Measure the refresh rate, and tell the server what it deals with. */
+export async function describeDevice(session: Session, storage: boolean): Promise<void> {
+  session.screen.refresh_rate_hz = await measureRefreshRate();
+  await session.api.device({
+    refresh_rate_hz: session.screen.refresh_rate_hz,
+    user_agent: navigator.userAgent,
+    webcodecs: hasWebCodecs(),
+    indexed_db: storage,
+    touch: navigator.maxTouchPoints > 0,
+    device_pixel_ratio: window.devicePixelRatio,
+    screen_width_px: screen.width,
+    screen_height_px: screen.height,
+    languages: [...navigator.languages],
+  });
+}

@@ -1,0 +1,30 @@
+/** Clips that did not run as declared, waiting to be shown again at the end of their block. */
+import type { AssignedTrial } from "../../api/participant";
+
+export interface Replay { trial: AssignedTrial; play: number }
+
+export class Replays {
+  private readonly queue: Replay[] = [];
+
+  add(trial: AssignedTrial, play: number): void {
+    const known = this.queue.some((one) => one.trial.trial_index === trial.trial_index && one.play === play);
+    if (!known) this.queue.push({ trial, play });
+  }
+
+  /** The next one of this block or an earlier one, whose receipt came late; it stays until `shift`. */
+  peek(block: number): Replay | null {
+    return this.queue.find((one) => one.trial.block <= block) ?? null;
+  }
+
+  shift(block: number): void {
+    const next = this.peek(block);
+    if (next) this.queue.splice(this.queue.indexOf(next), 1);
+  }
+}
+
+/** What an earlier visit still owes: played, but wanted once more. */
+export function owed(trials: readonly AssignedTrial[]): Replay[] {
+  return trials
+    .filter((trial) => trial.plays_done > 0 && trial.plays_done < trial.plays_wanted)
+    .map((trial) => ({ trial, play: trial.plays_done + 1 }));
+}

@@ -1,0 +1,9 @@
+/** Tells the server how far the participant has come, once a stage. */
+import type { Stage } from "../../api/participant";
+import type { Session } from "../session";
+
+export function enterStage(session: Session, stage: Stage): void {
+  if (session.run.stage === stage) return;
+  session.run.stage = stage;
+  void session.api.stage(stage);
+}

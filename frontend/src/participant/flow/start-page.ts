@@ -1,0 +1,32 @@
+/** The first page: what this is, how long it takes, in which language. */
+import type { LinkDocument } from "../../api/participant";
+import { languageName, translator } from "../../i18n";
+import { h, uniqueId } from "../../ui/element";
+import { button, showPage } from "../../ui/page";
+import { setLanguage } from "./appearance";
+
+/** Resolves with the language chosen when the participant starts. */
+export function startPage(root: HTMLElement, link: LinkDocument, language: string): Promise<string> {
+  return new Promise((resolve) => {
+    const display = h("div", { class: "notice" });
+    root.replaceChildren(display);
+    const draw = (chosen: string): void => {
+      setLanguage(chosen);
+      const t = translator(chosen);
+      const picker = link.study.languages.length > 1 ? languagePicker(link.study.languages, chosen, t("choose_language"), draw) : null;
+      const preview = link.kind === "preview" ? h("p", { class: "help" }, t("preview_note")) : null;
+      const start = button(t("start_study"), () => resolve(chosen));
+      showPage(display, { title: link.study.title, body: [h("p", { class: "lead" }, t("minutes", { minutes: Math.ceil(link.study.expected_minutes) })), preview, picker], actions: [start] });
+    };
+    draw(language);
+  });
+}
+
+function languagePicker(languages: string[], chosen: string, label: string, pick: (language: string) => void): HTMLElement {
+  const name = uniqueId("language");
+  const rows = languages.map((language) => {
+    const input = h("input", { type: "radio", name, value: language, checked: language === chosen, onchange: () => pick(language) });
+    return h("label", { class: "tick", lang: language }, input, h("span", {}, languageName(language)));
+  });
+  return h("fieldset", { class: "field" }, h("legend", {}, label), h("div", { class: "choices choices-row" }, ...rows));
+}

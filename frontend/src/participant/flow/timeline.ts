@@ -1,0 +1,87 @@
+/** The visit as a jsPsych timeline: what is left of it, in order. */
+import type { Form } from "../../api/participant";
+import { trial, type Node } from "../jspsych";
+import { calibration } from "../screens/calibration";
+import { consent } from "../screens/consent";
+import { finish } from "../screens/finish";
+import { formPage } from "../screens/form";
+import { needsScreenSetup, screenSetup } from "../screens/screen-setup";
+import { textPage } from "../screens/text-page";
+import { counted, type Session } from "../session";
+import { blockNodes, practiceNodes, restNodes } from "./blocks";
+import { enterStage } from "./stages";
+
+export function timeline(session: Session, token: string): Node[] {
+  const steps = [...beginning(session), ...middle(session), ...ending(session)];
+  return [...steps, trial(finish(session), { token })];
+}
+
+/** Consent, questions and the screen, whichever of them is still to do. */
+function beginning(session: Session): Node[] {
+  const { run, t } = session;
+  const steps: ((eyebrow: string) => Node)[] = [];
+  if (!run.consented_at) steps.push((eyebrow) => stageNode(session, "consent", trial(consent(session), { eyebrow })));
+  for (const form of openForms(session, "before")) {
+    steps.push((eyebrow) => stageNode(session, "forms_before", trial(formPage(session), { eyebrow, form })));
+  }
+  if (trialsLeft(session)) {
+    steps.push((eyebrow) => screenNode(session, eyebrow));
+    steps.push((eyebrow) => stageNode(session, "instructions", introduction(session, eyebrow)));
+  }
+  const total = steps.length;
+  return steps.map((make, place) => make(t("step", { step: place + 1, steps: total })));
+}
+
+function screenNode(session: Session, eyebrow: string): Node {
+  const { run, screen } = session;
+  const setup: Node = {
+    timeline: [trial(screenSetup(session), { eyebrow, again: false })],
+    conditional_function: () => needsScreenSetup(session),
+  };
+  const measure: Node = {
+    timeline: [trial(calibration(session), { eyebrow, changed: false })],
+    conditional_function: () => run.display.calibrate !== "off" && screen.calibration === null,
+  };
+  return stageNode(session, "calibration", { timeline: [setup, measure] });
+}
+
+/** The instructions at first; on a later visit a word of welcome before them. */
+function introduction(session: Session, eyebrow: string): Node {
+  const { run, t } = session;
+  const total = counted(run).length;
+  const back = session.answered > 0;
+  const welcome = `# ${t("welcome_back_title")}\n\n${t("welcome_back", { done: session.answered, total })}\n\n`;
+  const text = back ? welcome + run.texts.instructions.replace(/^(\s*)# /, "$1## ") : run.texts.instructions;
+  return trial(textPage(session), { eyebrow, text, action: t("continue"), remarks: "" });
+}
+
+function middle(session: Session): Node[] {
+  const practice = practiceNodes(session);
+  const open = session.run.blocks.filter(({ block }) => blockIsOpen(session, block));
+  const blocks = open.flatMap(({ block }, place): Node[] => [
+    ...(place > 0 ? restNodes(session, block) : []),
+    ...blockNodes(session, block, open[place + 1]?.block ?? null),
+  ]);
+  return [...practice, ...blocks];
+}
+
+function blockIsOpen(session: Session, block: number): boolean {
+  return session.run.trials.some((one) => one.block === block && one.kind !== "practice" && (!one.answered || one.plays_done < one.plays_wanted));
+}
+
+function ending(session: Session): Node[] {
+  return openForms(session, "after").map((form) =>
+    stageNode(session, "forms_after", trial(formPage(session), { eyebrow: "", form })));
+}
+
+function openForms({ run }: Session, when: Form["when"]): Form[] {
+  return run.forms.filter((form) => form.when === when && !run.answered_forms.includes(form.name));
+}
+
+function trialsLeft({ run }: Session): boolean {
+  return run.trials.some((one) => !one.answered || one.plays_done < one.plays_wanted);
+}
+
+function stageNode(session: Session, stage: Parameters<typeof enterStage>[1], node: Node): Node {
+  return { timeline: [node], on_timeline_start: () => enterStage(session, stage) };
+}

@@ -1,0 +1,61 @@
+/** The outbox on disk: a write counts as kept only when its IndexedDB transaction is complete. */
+import type { OutboxItem, OutboxStore } from "./store";
+
+const DATABASE = "palpebra";
+const VERSION = 1;
+
+export class IndexedDbStore implements OutboxStore {
+  readonly durable = true;
+  private constructor(private readonly database: IDBDatabase) {}
+
+  /** Open the database, or reject where the browser keeps nothing (private window, blocked, full). */
+  static open(factory: IDBFactory = indexedDB): Promise<IndexedDbStore> {
+    return new Promise((resolve, reject) => {
+      const opening = factory.open(DATABASE, VERSION);
+      opening.onupgradeneeded = () => createStores(opening.result);
+      opening.onsuccess = () => resolve(new IndexedDbStore(opening.result));
+      opening.onerror = () => reject(opening.error ?? new Error("IndexedDB could not be opened"));
+      opening.onblocked = () => reject(new Error("IndexedDB is held by an older page"));
+    });
+  }
+
+  add(item: OutboxItem): Promise<void> {
+    return this.write(["outbox"], (stores) => stores("outbox").put(item));
+  }
+
+  async all(): Promise<OutboxItem[]> {
+    const reading = this.database.transaction("outbox").objectStore("outbox").getAll() as IDBRequest<OutboxItem[]>;
+    const items = await new Promise<OutboxItem[]>((resolve, reject) => {
+      reading.onsuccess = () => resolve(reading.result);
+      reading.onerror = () => reject(reading.error);
+    });
+    return items.sort((a, b) => a.sequence - b.sequence);
+  }
+
+  remove(ids: string[]): Promise<void> {
+    return this.write(["outbox"], (stores) => ids.forEach((id) => stores("outbox").delete(id)));
+  }
+
+  refuse(item: OutboxItem, reason: string): Promise<void> {
+    return this.write(["outbox", "refused"], (stores) => {
+      stores("refused").put({ ...item, reason });
+      stores("outbox").delete(item.id);
+    });
+  }
+
+  private write(names: string[], work: (stores: (name: string) => IDBObjectStore) => void): Promise<void> {
+    return new Promise((resolve, reject) => {
+      // "strict": the disk has it before the page says so; a crash of the machine then loses nothing either.
+      const transaction = this.database.transaction(names, "readwrite", { durability: "strict" });
+      transaction.oncomplete = () => resolve();
+      transaction.onerror = () => reject(transaction.error);
+      transaction.onabort = () => reject(transaction.error ?? new Error("IndexedDB aborted the write"));
+      work((name) => transaction.objectStore(name));
+    });
+  }
+}
+
+function createStores(database: IDBDatabase): void {
+  database.createObjectStore("outbox", { keyPath: "id" });
+  database.createObjectStore("refused", { keyPath: "id" });
+}

@@ -1,0 +1,162 @@
+/**
+ * The outbox: everything the participant says is kept first, then sent in order until it is acknowledged.
+ *
+ * `put` resolves when the item is kept. `receipt` resolves when the server has answered for good. Requests may
+ * be repeated without harm, because the server stores each id once.
+ */
+import { isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../../api/request";
+import { backoff } from "./backoff";
+import { events, type Batch, nextBatch } from "./batch";
+import type { OutboxItem, OutboxStore } from "./store";
+
+export type Outcome = { accepted: true; body: unknown } | { accepted: false; refused: Refused };
+export interface Sent { id: string; receipt: Promise<Outcome> }
+export interface OutboxState { pending: number; failures: number }
+type Send = (method: string, path: string, options: { token: string; body: unknown }) => Promise<Answer>;
+
+export interface OutboxOptions {
+  send?: Send;
+  /** Waiting, so that tests need not wait. */
+  pause?: (ms: number) => Promise<void>;
+  onChange?: (state: OutboxState) => void;
+  onUnauthorized?: () => void;
+}
+
+export class Outbox {
+  private queue: OutboxItem[] = [];
+  private readonly waiting = new Map<string, (outcome: Outcome) => void>();
+  private sequence = 0;
+  private failures = 0;
+  private running = false;
+  private stopped = false;
+  private wake: () => void = () => {};
+  private idle: (() => void)[] = [];
+  private run: { run_id: string; token: string } | null = null;
+
+  constructor(private readonly store: OutboxStore, private readonly options: OutboxOptions = {}) {}
+
+  get durable(): boolean {
+    return this.store.durable;
+  }
+
+  get state(): OutboxState {
+    return { pending: this.queue.filter((item) => item.kind === "write").length, failures: this.failures };
+  }
+
+  /** Take up what an earlier visit left unsent, and begin to send. */
+  async open(run_id: string, token: string): Promise<void> {
+    this.run = { run_id, token };
+    const left = await this.store.all();
+    this.sequence = left.reduce((last, item) => Math.max(last, item.sequence), this.sequence);
+    // A newer token of the same run replaces the one an item was kept with.
+    this.queue = left.map((item) => (item.run_id === run_id ? { ...item, token } : item));
+    void this.sendAll();
+  }
+
+  /** Keep one write; resolves when it is on disk. `id` is made here unless the path already carries one. */
+  async put(method: "PUT" | "POST", path: string, body: unknown, id: string = crypto.randomUUID()): Promise<Sent> {
+    const receipt = new Promise<Outcome>((resolve) => this.waiting.set(id, resolve));
+    await this.keep({ id, kind: "write", method, path, body });
+    return { id, receipt };
+  }
+
+  async putEvent(event: { id: string }): Promise<void> {
+    await this.keep({ id: event.id, kind: "event", method: "POST", path: events, body: event });
+  }
+
+  /** Paths of this run's writes that the server has not acknowledged. */
+  unsent(): OutboxItem[] {
+    return this.queue.filter((item) => item.kind === "write" && item.run_id === this.run?.run_id);
+  }
+
+  /** Resolves true when nothing is left to send, false after `limit_ms`. */
+  drained(limit_ms = Infinity): Promise<boolean> {
+    if (this.queue.length === 0) return Promise.resolve(true);
+    return new Promise((resolve) => {
+      const timer = limit_ms === Infinity ? undefined : setTimeout(() => resolve(false), limit_ms);
+      this.idle.push(() => {
+        clearTimeout(timer);
+        resolve(true);
+      });
+    });
+  }
+
+  /** Try at once, for instance when the connection is back. */
+  nudge(): void {
+    this.wake();
+    void this.sendAll();
+  }
+
+  stop(): void {
+    this.stopped = true;
+    this.wake();
+  }
+
+  private async keep(item: Pick<OutboxItem, "id" | "kind" | "method" | "path" | "body">): Promise<void> {
+    if (!this.run) throw new Error("expected an open outbox, got one without a run; call open() first");
+    this.sequence += 1;
+    const kept: OutboxItem = { ...item, ...this.run, sequence: this.sequence };
+    await this.store.add(kept);
+    this.queue.push(kept);
+    this.changed();
+    void this.sendAll();
+  }
+
+  private async sendAll(): Promise<void> {
+    if (this.running || this.stopped) return;
+    this.running = true;
+    while (!this.stopped) {
+      const batch = nextBatch(this.queue);
+      if (!batch) break;
+      const wait_ms = await this.sendOne(batch);
+      this.changed();
+      if (wait_ms > 0) await this.pause(wait_ms);
+    }
+    this.running = false;
+    if (this.queue.length === 0) this.idle.splice(0).forEach((resolve) => resolve());
+  }
+
+  /** Send one batch; returns how long to wait before the next. */
+  private async sendOne(batch: Batch): Promise<number> {
+    try {
+      const send = this.options.send ?? request;
+      const answer = await send(batch.method, batch.path, { token: batch.token, body: batch.body });
+      if (isTemporary(answer.status)) return this.failed(answer.retry_after_s);
+      this.failures = 0;
+      await this.settle(batch, answer);
+      return 0;
+    } catch (error) {
+      if (error instanceof NetworkError) return this.failed(null);
+      throw error;
+    }
+  }
+
+  private failed(retry_after_s: number | null): number {
+    this.failures += 1;
+    return Math.max(backoff(this.failures), (retry_after_s ?? 0) * 1000);
+  }
+
+  private async settle(batch: Batch, answer: Answer): Promise<void> {
+    const accepted = answer.status >= 200 && answer.status < 300;
+    const outcome: Outcome = accepted ? { accepted, body: answer.body } : { accepted, refused: refusalOf(answer) };
+    const ids = new Set(batch.items.map((item) => item.id));
+    if (outcome.accepted) await this.store.remove([...ids]);
+    else for (const item of batch.items) await this.store.refuse(item, outcome.refused.code);
+    this.queue = this.queue.filter((item) => !ids.has(item.id));
+    for (const id of ids) {
+      this.waiting.get(id)?.(outcome);
+      this.waiting.delete(id);
+    }
+    if (answer.status === 401 && batch.items.some((item) => item.run_id === this.run?.run_id)) this.options.onUnauthorized?.();
+  }
+
+  private async pause(ms: number): Promise<void> {
+    const woken = new Promise<void>((resolve) => (this.wake = resolve));
+    const sleep = this.options.pause ?? ((time) => new Promise<void>((resolve) => setTimeout(resolve, time)));
+    await Promise.race([sleep(ms), woken]);
+  }
+
+  private changed(): void {
+    this.options.onChange?.(this.state);
+  }
+}

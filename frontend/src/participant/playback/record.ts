@@ -1,0 +1,59 @@
+/** From the frames that were drawn to the figures stored with the rating. */
+import type { PlaybackMethod, PlaybackRecord } from "../../api/participant";
+
+/** One showing of a clip. Times are absolute, in ms. */
+export interface Showing {
+  method: PlaybackMethod;
+  key_at_ms: number;
+  ended_at_ms: number;
+  drawn: [index: number, at_ms: number][];
+  frames: number;
+  fps: number;
+  stalls: number;
+  focus_lost: boolean;
+}
+
+export interface Screen { refresh_rate_hz: number | null; device_pixel_ratio: number }
+
+const ASSUMED_REFRESH_MS = 1000 / 60;
+/** Scheduling jitter of a time stamp that is no lateness. */
+const JITTER_MS = 2;
+
+/** The record of all showings of a trial: counts are totals, `drawn` counts from each showing's start key. */
+export function playbackRecord(clip_sha256: string | null, showings: Showing[], screen: Screen): PlaybackRecord {
+  const refresh_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : ASSUMED_REFRESH_MS;
+  const first = showings[0];
+  const first_drawn = first?.drawn[0];
+  const gaps = showings.flatMap((showing) => gapsOf(showing.drawn));
+  return {
+    method: first ? worst(showings) : "none",
+    clip_sha256,
+    key_to_first_frame_ms: first && first_drawn ? round(first_drawn[1] - first.key_at_ms) : null,
+    frames_drawn: sum(showings.map((showing) => distinct(showing.drawn))),
+    frames_late: sum(showings.map((showing) => late(showing, refresh_ms))),
+    frames_missing: sum(showings.map((showing) => Math.max(0, showing.frames - distinct(showing.drawn)))),
+    longest_gap_ms: gaps.length ? round(Math.max(...gaps)) : null,
+    stalls: sum(showings.map((showing) => showing.stalls)),
+    focus_lost: showings.some((showing) => showing.focus_lost),
+    ...screen,
+    drawn: showings.flatMap(({ drawn, key_at_ms }) =>
+      drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),
+  };
+}
+
+function late({ drawn, fps }: Showing, refresh_ms: number): number {
+  const start = drawn[0];
+  if (!start) return 0;
+  const due = (index: number): number => start[1] + ((index - start[0]) * 1000) / fps;
+  return drawn.filter(([index, at_ms]) => at_ms - due(index) > refresh_ms + JITTER_MS).length;
+}
+
+function gapsOf(drawn: Showing["drawn"]): number[] {
+  return drawn.slice(1).map(([, at_ms], place) => at_ms - (drawn[place]?.[1] ?? at_ms));
+}
+
+const distinct = (drawn: Showing["drawn"]): number => new Set(drawn.map(([index]) => index)).size;
+const sum = (numbers: number[]): number => numbers.reduce((total, number) => total + number, 0);
+const round = (ms: number): number => Math.round(ms * 100) / 100;
+const worst = (showings: Showing[]): PlaybackMethod =>
+  showings.find((showing) => showing.method !== "webcodecs")?.method ?? "webcodecs";

@@ -1,0 +1,81 @@
+/** The page's side of the worker: asks, and turns its messages into promises. */
+import { ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type ShownClip } from "./player";
+import type { FromWorker, ToWorker } from "./protocol";
+
+const DECODE_LIMIT_MS = 20_000;
+
+interface Waiting { resolve: (message: FromWorker) => void; reject: (error: Error) => void }
+
+export class WorkerPlayer implements ClipPlayer {
+  readonly method = "webcodecs";
+  readonly element = document.createElement("canvas");
+  private readonly worker: Worker;
+  private readonly prepared = new Map<string, Promise<Prepared>>();
+  private readonly waiting = new Map<string, Waiting>();
+
+  constructor(background: string) {
+    this.worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.arrived(data);
+    this.worker.onerror = (event) => this.broken(event.message || "the worker could not be started");
+    const canvas = this.element.transferControlToOffscreen();
+    this.tell({ type: "canvas", canvas, background }, [canvas]);
+  }
+
+  prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared> {
+    const known = this.prepared.get(sha256);
+    if (known) return known;
+    const asked = this.ask(`prepared ${sha256}`, DECODE_LIMIT_MS);
+    // The page keeps its own copy for a second view, so the bytes are copied and not handed over.
+    this.tell({ type: "prepare", sha256, bytes, fps });
+    const result = asked.then((message) => message as FromWorker & { type: "prepared" });
+    result.catch(() => this.prepared.delete(sha256));
+    this.prepared.set(sha256, result);
+    return result;
+  }
+
+  blank(sha256: string): void {
+    void this.prepared.get(sha256)?.then(({ width, height }) => this.tell({ type: "blank", width, height }), () => {});
+  }
+
+  async play(sha256: string, options: PlayOptions): Promise<ShownClip> {
+    const { frames, fps } = (await this.prepared.get(sha256)) ?? { frames: 0, fps: 30 };
+    // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
+    const asked = this.ask(`played ${sha256}`, Infinity);
+    this.tell({ type: "play", sha256, ...options });
+    const message = (await asked) as FromWorker & { type: "played" };
+    return { method: "webcodecs", drawn: message.drawn, ended_at_ms: message.ended_at_ms, stalls: 0, frames, fps };
+  }
+
+  release(sha256: string): void {
+    this.prepared.delete(sha256);
+    this.tell({ type: "release", sha256 });
+  }
+
+  private ask(name: string, limit_ms: number): Promise<FromWorker> {
+    return new Promise((resolve, reject) => {
+      this.waiting.set(name, { resolve, reject });
+      if (limit_ms === Infinity) return;
+      setTimeout(() => this.settle(name, new ClipBroken(`no answer from the decoder in ${limit_ms} ms`)), limit_ms);
+    });
+  }
+
+  private settle(name: string, outcome: FromWorker | Error): void {
+    const waiting = this.waiting.get(name);
+    this.waiting.delete(name);
+    if (outcome instanceof Error) waiting?.reject(outcome);
+    else waiting?.resolve(outcome);
+  }
+
+  private arrived(message: FromWorker): void {
+    if (message.type !== "failed") return this.settle(`${message.type} ${message.sha256}`, message);
+    for (const step of ["prepared", "played"]) this.settle(`${step} ${message.sha256}`, new ClipBroken(message.reason));
+  }
+
+  private broken(reason: string): void {
+    for (const name of [...this.waiting.keys()]) this.settle(name, new ClipBroken(reason));
+  }
+
+  private tell(message: ToWorker, transfer: Transferable[] = []): void {
+    this.worker.postMessage(message, transfer);
+  }
+}

@@ -1,0 +1,107 @@
+/**
+ * Decodes clips ahead and draws them at screen refreshes, away from the page's own work.
+ * Every drawn frame's index and time is logged and returned.
+ */
+import { decodeClip, type DecodedClip } from "./decode";
+import { absoluteNow, type FromWorker, type ToWorker } from "./protocol";
+import { FrameSchedule } from "./schedule";
+
+interface Scope {
+  postMessage(message: FromWorker): void;
+  onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
+  requestAnimationFrame(callback: (now: number) => void): number;
+}
+const scope = self as unknown as Scope;
+
+const clips = new Map<string, DecodedClip>();
+let context: OffscreenCanvasRenderingContext2D | null = null;
+let background = "#808080";
+
+async function prepare(sha256: string, bytes: ArrayBuffer, declared_fps: number | null): Promise<void> {
+  try {
+    const clip = clips.get(sha256) ?? (await decodeClip(bytes, declared_fps));
+    clips.set(sha256, clip);
+    const { fps, width, height } = clip;
+    scope.postMessage({ type: "prepared", sha256, frames: clip.bitmaps.length, width, height, fps });
+  } catch (error) {
+    scope.postMessage({ type: "failed", sha256, reason: String(error) });
+  }
+}
+
+function release(sha256: string): void {
+  clips.get(sha256)?.bitmaps.forEach((bitmap) => bitmap.close());
+  clips.delete(sha256);
+}
+
+function blank(): void {
+  if (!context) return;
+  context.fillStyle = background;
+  context.fillRect(0, 0, context.canvas.width, context.canvas.height);
+}
+
+function cross(): void {
+  if (!context) return;
+  const { width, height } = context.canvas;
+  const arm = Math.round(height / 24);
+  const line = Math.max(2, Math.round(arm / 8));
+  context.fillStyle = "#000";
+  context.fillRect(width / 2 - arm, height / 2 - line / 2, 2 * arm, line);
+  context.fillRect(width / 2 - line / 2, height / 2 - arm, line, 2 * arm);
+}
+
+function play(sha256: string, refresh_ms: number, fixation_ms: number): void {
+  const clip = clips.get(sha256);
+  if (!clip || !context) {
+    scope.postMessage({ type: "failed", sha256, reason: "expected a prepared clip and a canvas" });
+    return;
+  }
+  if (fixation_ms === 0) return show(sha256, clip, refresh_ms);
+  const until = absoluteNow() + fixation_ms;
+  blank();
+  cross();
+  const wait = (): void => {
+    if (absoluteNow() < until) scope.requestAnimationFrame(wait);
+    else show(sha256, clip, refresh_ms);
+  };
+  scope.requestAnimationFrame(wait);
+}
+
+function show(sha256: string, clip: DecodedClip, refresh_ms: number): void {
+  const schedule = new FrameSchedule(clip.bitmaps.length, 1000 / clip.fps, refresh_ms);
+  const drawn: [number, number][] = [];
+  const tick = (now: number): void => {
+    if (schedule.isOver(now)) {
+      blank();
+      const ended_at_ms = absoluteNow();
+      scope.postMessage({ type: "played", sha256, drawn, frames: clip.bitmaps.length, fps: clip.fps, ended_at_ms });
+      return;
+    }
+    const index = schedule.next(now);
+    const bitmap = index === null ? undefined : clip.bitmaps[index];
+    if (index !== null && bitmap && context) {
+      context.drawImage(bitmap, 0, 0, context.canvas.width, context.canvas.height);
+      drawn.push([index, absoluteNow()]);
+    }
+    scope.requestAnimationFrame(tick);
+  };
+  scope.requestAnimationFrame(tick);
+}
+
+function resize(width: number, height: number): void {
+  if (!context) return;
+  const canvas = context.canvas;
+  // Setting a canvas's size clears it, so it is left alone where it fits already.
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  blank();
+}
+
+scope.onmessage = ({ data }) => {
+  if (data.type === "canvas") {
+    background = data.background;
+    context = data.canvas.getContext("2d", { alpha: false });
+    blank();
+  } else if (data.type === "prepare") void prepare(data.sha256, data.bytes, data.fps);
+  else if (data.type === "release") release(data.sha256);
+  else if (data.type === "blank") resize(data.width, data.height);
+  else play(data.sha256, data.refresh_ms, data.fixation_ms);
+};

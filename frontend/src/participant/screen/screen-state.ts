@@ -1,0 +1,34 @@
+/** What is known about this participant's screen, and whether it still holds. */
+import type { Calibration } from "../../api/participant";
+import { type ScreenChange, screenChange, screenShape, type ScreenShape, zoomed } from "./size";
+
+export class ScreenState {
+  calibration: Calibration | null = null;
+  refresh_rate_hz: number | null = null;
+
+  /** Take over a stored calibration where it was made on a screen like this one. */
+  restore(stored: Calibration | null): void {
+    if (stored && screenChange(stored, screenShape()) === "none") this.calibration = stored;
+  }
+
+  get px_per_mm(): number | null {
+    return this.calibration?.px_per_mm ?? null;
+  }
+
+  change(now: ScreenShape = screenShape()): ScreenChange {
+    return this.calibration ? screenChange(this.calibration, now) : "none";
+  }
+
+  /** The calibration as it is after a zoom, to be stored as a new one. */
+  afterZoom(now: ScreenShape = screenShape()): Calibration | null {
+    if (!this.calibration) return null;
+    const px_per_mm = zoomed(this.calibration.px_per_mm, this.calibration, now);
+    const window_size = { window_width_px: window.innerWidth, window_height_px: window.innerHeight };
+    this.calibration = { ...this.calibration, ...now, ...window_size, px_per_mm };
+    return this.calibration;
+  }
+
+  record(): { refresh_rate_hz: number | null; device_pixel_ratio: number } {
+    return { refresh_rate_hz: this.refresh_rate_hz, device_pixel_ratio: window.devicePixelRatio };
+  }
+}

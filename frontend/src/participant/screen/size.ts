@@ -1,0 +1,62 @@
+/** From calibration to the clip's size on this screen, and what a zoom or another screen does to it. */
+import type { AssignedTrial, Calibration } from "../../api/participant";
+
+export interface ScreenShape {
+  device_pixel_ratio: number;
+  screen_width_px: number;
+  screen_height_px: number;
+}
+
+export type ScreenChange = "none" | "zoom" | "screen";
+
+const SAME_SHARE = 0.01;
+
+export function screenShape(): ScreenShape {
+  return { device_pixel_ratio: window.devicePixelRatio, screen_width_px: screen.width, screen_height_px: screen.height };
+}
+
+/**
+ * What has happened between two looks at the screen. Chromium keeps the screen's size under zoom, Firefox
+ * divides it by the zoom: either way the pixel ratio has changed and nothing else has.
+ */
+export function screenChange(before: ScreenShape, now: ScreenShape): ScreenChange {
+  const same = (a: number, b: number): boolean => Math.abs(a - b) <= SAME_SHARE * Math.max(a, b);
+  const turned = same(before.screen_width_px, now.screen_height_px) && same(before.screen_height_px, now.screen_width_px);
+  const sameSize = turned || (same(before.screen_width_px, now.screen_width_px) && same(before.screen_height_px, now.screen_height_px));
+  const sameRatio = same(before.device_pixel_ratio, now.device_pixel_ratio);
+  if (sameRatio) return sameSize ? "none" : "screen";
+  const device = (shape: ScreenShape): number => shape.screen_width_px * shape.device_pixel_ratio;
+  return sameSize || same(device(before), device(now)) ? "zoom" : "screen";
+}
+
+/** CSS pixels per millimetre after a zoom: the pixel has grown, so a millimetre holds fewer. */
+export function zoomed(px_per_mm: number, before: ScreenShape, now: ScreenShape): number {
+  return (px_per_mm * before.device_pixel_ratio) / now.device_pixel_ratio;
+}
+
+/** Shown width of a clip in CSS px: inter-ocular distance as declared, else its width in mm, else its own pixels. */
+export function clipWidth(trial: AssignedTrial, inter_ocular_mm: number, px_per_mm: number | null): number {
+  const own = trial.width_px ?? 640;
+  if (px_per_mm === null) return own;
+  if (trial.inter_ocular_px) return (own * inter_ocular_mm * px_per_mm) / trial.inter_ocular_px;
+  return trial.width_mm ? trial.width_mm * px_per_mm : own;
+}
+
+export function clipHeight(trial: AssignedTrial, width: number): number {
+  return trial.width_px && trial.height_px ? (width * trial.height_px) / trial.width_px : width / 2;
+}
+
+export function calibrationBody(
+  px_per_mm: number, method: Calibration["method"], viewing_distance_mm: number | null,
+): Calibration {
+  return {
+    px_per_mm: Math.round(px_per_mm * 10_000) / 10_000,
+    method,
+    viewing_distance_mm: viewing_distance_mm === null ? null : Math.round(viewing_distance_mm),
+    ...screenShape(),
+    window_width_px: window.innerWidth,
+    window_height_px: window.innerHeight,
+    // Only a hint: the frame of the window counts in it too.
+    zoom: window.outerWidth ? Math.round((window.outerWidth / window.innerWidth) * 100) / 100 : 1,
+  };
+}

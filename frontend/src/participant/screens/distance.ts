@@ -1,0 +1,92 @@
+/**
+ * Viewing distance by the blind spot ("virtual chinrest", Li, Joo, Yeatman & Reinecke 2020,
+ * doi:10.1038/s41598-019-57204-1): with the left eye on the square, a dot going left vanishes at 13.5 degrees.
+ */
+import { h, uniqueId } from "../../ui/element";
+import { isStartKey, listenKeys } from "../../ui/keys";
+import { button, showPage, statusLine } from "../../ui/page";
+import type { Session } from "../session";
+import { choose, screenSignal, stopButton } from "./support";
+
+const BLIND_SPOT_DEGREES = 13.5;
+const ROUNDS = 5;
+const SPEED_PX_PER_MS = 0.1;
+const NEAREST_MM = 200;
+const FURTHEST_MM = 2_000;
+/** The dot starts this far from the square, well inside the blind spot's near edge. */
+const START_MM = 40;
+
+export function distanceFrom(separation_px: number, px_per_mm: number): number {
+  return separation_px / px_per_mm / Math.tan((BLIND_SPOT_DEGREES * Math.PI) / 180);
+}
+
+/** Distance from the eyes to the screen in mm: median of the rounds, or as typed in. */
+export async function measureDistance(session: Session, display: HTMLElement, px_per_mm: number): Promise<number> {
+  const found: number[] = [];
+  while (found.length < ROUNDS) {
+    const separation = await oneRound(session, display, px_per_mm, found.length + 1);
+    if (separation === "type") return typed(session, display);
+    const distance = separation === null ? 0 : distanceFrom(separation, px_per_mm);
+    if (distance >= NEAREST_MM && distance <= FURTHEST_MM) found.push(distance);
+  }
+  return found.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0;
+}
+
+async function oneRound(session: Session, display: HTMLElement, px_per_mm: number, round: number): Promise<number | "type" | null> {
+  const { t } = session;
+  const dot = h("span", { class: "blind-dot" });
+  const field = h("div", { class: "blind-field", dir: "ltr", "aria-hidden": "true" }, dot, h("span", { class: "blind-square" }));
+  const footer = h("footer", { class: "actions" });
+  const status = statusLine();
+  const body = [h("p", {}, t("distance_text", { times: ROUNDS })), field, status, footer];
+  const section = showPage(display, { title: t("distance_title"), eyebrow: t("distance_round", { round, times: ROUNDS }), body, wide: true });
+  section.classList.add("calibration");
+  section.append(stopButton(session));
+  const step = await choose(session, footer, [{ label: t("distance_start"), value: "go" }, { label: t("distance_type"), value: "type", kind: "plain" }], true);
+  if (step === "type") return "type";
+  footer.replaceChildren();
+  const separation = await moveDot(session, dot, field, footer, START_MM * px_per_mm);
+  if (separation === null) status.textContent = t("distance_missed");
+  return separation;
+}
+
+/** The dot goes left until a press; resolves with its distance from the square, or null at the edge. */
+function moveDot(session: Session, dot: HTMLElement, field: HTMLElement, footer: HTMLElement, start_px: number): Promise<number | null> {
+  const { signal, done } = screenSignal(session);
+  return new Promise((resolve) => {
+    const room = field.clientWidth - 40;
+    const began = performance.now();
+    const separation = (): number => start_px + (performance.now() - began) * SPEED_PX_PER_MS;
+    const end = (value: number | null): void => (done(), resolve(value));
+    const move = (): void => {
+      if (signal.aborted) return;
+      if (separation() > room) return end(null);
+      dot.style.insetInlineEnd = `${separation()}px`;
+      requestAnimationFrame(move);
+    };
+    footer.append(button(session.t("distance_gone"), () => end(separation())));
+    listenKeys((event) => {
+      if (!isStartKey(event)) return;
+      event.preventDefault();
+      end(separation());
+    }, signal);
+    move();
+  });
+}
+
+async function typed(session: Session, display: HTMLElement): Promise<number> {
+  const { t } = session;
+  const id = uniqueId("distance");
+  const fault = h("p", { class: "fault", id: `${id}-fault`, role: "alert" });
+  const input = h("input", { id, type: "text", inputmode: "numeric", class: "short", "aria-describedby": `${id}-fault`, value: "60" });
+  const footer = h("footer", { class: "actions" });
+  const field = h("div", { class: "field" }, h("label", { for: id }, t("distance_cm")), input, fault);
+  showPage(display, { title: t("distance_title"), body: [field, footer] }).classList.add("calibration");
+  for (;;) {
+    footer.replaceChildren();
+    await choose(session, footer, [{ label: t("continue"), value: true }]);
+    const distance_mm = Number(input.value.trim().replace(",", ".")) * 10;
+    if (distance_mm >= NEAREST_MM && distance_mm <= FURTHEST_MM) return distance_mm;
+    fault.textContent = t("distance_bad", { minimum: NEAREST_MM / 10, maximum: FURTHEST_MM / 10 });
+  }
+}

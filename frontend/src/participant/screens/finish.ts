@@ -1,0 +1,78 @@
+/** The end: the completion code appears only when the server has every answer. */
+import type { Completion } from "../../api/participant";
+import { call, NetworkError, Refused, isTemporary } from "../../api/request";
+import { h } from "../../ui/element";
+import { markdown } from "../../ui/markdown";
+import { button, showPage } from "../../ui/page";
+import { backoff } from "../outbox/backoff";
+import { STRING, plugin, type PluginClass } from "../jspsych";
+import { leaveFullScreen } from "../screen/full-screen";
+import type { Session } from "../session";
+
+interface Parameters { token: string }
+interface Data { completion_code: string }
+
+/** The server still lacks answers: the run must be taken up again. */
+export class RatingsMissing extends Error {
+  override name = "RatingsMissing";
+}
+
+export function finish(session: Session): PluginClass<Parameters> {
+  return plugin<Parameters, Data>({
+    name: "finish",
+    parameters: { token: { type: STRING, description: "the run's token" } },
+    data: { completion_code: { type: STRING, description: "as given by the server" } },
+    show: (display, { token }) => complete(session, display, token),
+    async simulate({ token }) {
+      await session.outbox.drained();
+      const done = await completed(token);
+      return { completion_code: done.completion_code ?? "" };
+    },
+    act: () => {},
+  });
+}
+
+async function complete(session: Session, display: HTMLElement, token: string): Promise<Data> {
+  const { t } = session;
+  const count = h("p", { class: "count", role: "status" });
+  showPage(display, { title: t("finishing_title"), body: [count] });
+  const tell = setInterval(() => {
+    const { pending, failures } = session.outbox.state;
+    count.textContent = (pending ? t("finishing_wait", { count: pending }) : "") + (failures > 1 ? ` ${t("saving_offline")}` : "");
+  }, 500);
+  await session.outbox.drained();
+  const done = await completed(token);
+  clearInterval(tell);
+  showCompletion(session, display, done);
+  await leaveFullScreen();
+  return { completion_code: done.completion_code ?? "" };
+}
+
+/** Ask until the server answers. Safe to repeat. */
+export async function completed(token: string): Promise<Completion> {
+  for (let failures = 1; ; failures += 1) {
+    try {
+      return await call<Completion>("POST", "/api/run/complete", { token });
+    } catch (error) {
+      if (error instanceof Refused && error.code === "ratings_missing") throw new RatingsMissing(error.message);
+      const again = error instanceof NetworkError || (error instanceof Refused && isTemporary(error.status));
+      if (!again) throw error;
+      await new Promise((resolve) => setTimeout(resolve, backoff(failures)));
+    }
+  }
+}
+
+export function showCompletion(session: Pick<Session, "t" | "run">, display: HTMLElement, done: Completion, extra: HTMLElement[] = []): void {
+  const { t, run } = session;
+  const code = done.completion_code && h("div", { class: "code" }, h("p", { class: "help" }, t("done_code")), codeRow(t("done_copy"), t("done_copied"), done.completion_code));
+  const back = done.redirect_url && h("a", { class: "button primary", href: done.redirect_url, rel: "noreferrer" }, t("done_return"));
+  const prose = h("div", { class: "prose" }, ...markdown(run.texts.debrief));
+  showPage(display, { body: [prose, code, h("p", { class: "status", role: "status" }, t("done_close"))], actions: [back, ...extra] });
+}
+
+function codeRow(copy: string, copied: string, code: string): HTMLElement {
+  const press = button(copy, () => {
+    void navigator.clipboard?.writeText(code).then(() => (press.textContent = copied), () => {});
+  }, "quiet");
+  return h("p", { class: "row" }, h("output", {}, code), press);
+}

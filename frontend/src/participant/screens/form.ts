@@ -1,0 +1,56 @@
+/** A declared questionnaire on one page. */
+import type { Form, FormAnswers } from "../../api/participant";
+import { pick } from "../../i18n";
+import { h } from "../../ui/element";
+import { alertLine, button, showPage, statusLine } from "../../ui/page";
+import { plugin, OBJECT, STRING, type PluginClass } from "../jspsych";
+import type { Session } from "../session";
+import { fieldView, type FieldView } from "./fields";
+import { simulatedAnswer, fillIn } from "./simulated-form";
+import { saveShown, stopButton } from "./support";
+
+interface Parameters { eyebrow: string; form: Form }
+interface Data { answers: FormAnswers }
+
+export function formPage(session: Session): PluginClass<Parameters> {
+  return plugin<Parameters, Data>({
+    name: "form",
+    parameters: {
+      eyebrow: { type: STRING, description: "small line above the title" },
+      form: { type: OBJECT, description: "the declared form" },
+    },
+    data: { answers: { type: OBJECT, description: "answers by field name, null where left open" } },
+    show: (display, { form, eyebrow }) => new Promise((resolve) => showForm(session, display, form, eyebrow, resolve)),
+    async simulate({ form }) {
+      const answers = Object.fromEntries(form.fields.map((field) => [field.name, simulatedAnswer(field)]));
+      await session.api.form(form.name, answers);
+      return { answers };
+    },
+    act(display) {
+      fillIn(display);
+      display.querySelector<HTMLButtonElement>(".primary")?.click();
+    },
+  });
+}
+
+function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: string, done: (data: Data) => void): void {
+  const { t, language } = session;
+  const views = form.fields.map((field) => fieldView(field, language, t));
+  const [alert, status] = [alertLine(), statusLine()];
+  const go = button(t("continue"), () => {
+    const bad = views.filter((view) => view.check() !== null);
+    alert.textContent = bad.length ? t("form_fix") : "";
+    if (bad.length) return bad[0]?.focus();
+    go.disabled = true;
+    const answers = answersOf(views);
+    void saveShown(session, status, session.api.form(form.name, answers)).then((outcome) =>
+      outcome.accepted ? done({ answers }) : (go.disabled = false));
+  });
+  const body = h("form", { class: "form", novalidate: true, onsubmit: (event) => (event.preventDefault(), go.click()) }, ...views.map((view) => view.element));
+  const section = showPage(display, { title: pick(form.title, language), eyebrow, body: [body, alert, status], actions: [go] });
+  section.append(stopButton(session));
+}
+
+function answersOf(views: FieldView[]): FormAnswers {
+  return Object.fromEntries(views.map((view) => [view.name, view.answer()]));
+}

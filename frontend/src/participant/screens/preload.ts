@@ -1,0 +1,69 @@
+/** Waits until a block's clips are here, with progress, another try, and a way out. */
+import type { AssignedTrial } from "../../api/participant";
+import { h } from "../../ui/element";
+import { showPage } from "../../ui/page";
+import { progressBar } from "../../ui/progress";
+import { plugin, INT, OBJECT, STRING, type PluginClass } from "../jspsych";
+import type { ClipUnavailable } from "../preload/fetch-clip";
+import type { ClipSource } from "../preload/fetch-clip";
+import type { Session } from "../session";
+import { choose, stopButton } from "./support";
+
+interface Parameters { eyebrow: string; trials: AssignedTrial[] }
+interface Data { clips: number; failed: number; waited_ms: number }
+
+export function sourcesOf(trials: readonly AssignedTrial[]): ClipSource[] {
+  return trials.flatMap(({ clip_sha256, clip_url }) => (clip_sha256 && clip_url ? [{ clip_sha256, clip_url }] : []));
+}
+
+export function preloadPage(session: Session): PluginClass<Parameters> {
+  return plugin<Parameters, Data>({
+    name: "preload-clips",
+    parameters: {
+      eyebrow: { type: STRING, description: "small line above the title" },
+      trials: { type: OBJECT, description: "trials whose clips must be here" },
+    },
+    data: {
+      clips: { type: INT, description: "clips of the block" },
+      failed: { type: INT, description: "clips that could not be had" },
+      waited_ms: { type: INT, description: "time on the screen in ms" },
+    },
+    show: (display, { eyebrow, trials }) => waitForClips(session, display, eyebrow, sourcesOf(trials)),
+    simulate: ({ trials }) => ({ clips: sourcesOf(trials).length, failed: 0, waited_ms: 0 }),
+    act: () => {},
+  });
+}
+
+async function waitForClips(session: Session, display: HTMLElement, eyebrow: string, sources: ClipSource[]): Promise<Data> {
+  const started = performance.now();
+  const result = (failed: number): Data => ({ clips: sources.length, failed, waited_ms: Math.round(performance.now() - started) });
+  if (sources.every((source) => session.clips.get(source.clip_sha256))) return result(0);
+  for (;;) {
+    const failed = await loadShown(session, display, eyebrow, sources);
+    if (failed.length === 0 || !(await askAgain(session, display, failed))) return result(failed.length);
+  }
+}
+
+function loadShown(session: Session, display: HTMLElement, eyebrow: string, sources: ClipSource[]): Promise<ClipUnavailable[]> {
+  const { t } = session;
+  const bar = progressBar(t("preload_title"));
+  const count = h("p", { class: "count", role: "status" });
+  const section = showPage(display, { title: t("preload_title"), eyebrow, body: [h("p", {}, t("preload_text")), bar.element, count] });
+  section.append(stopButton(session));
+  return session.clips.load(sources, ({ done, total }) => {
+    bar.set(done, total);
+    count.textContent = t("preload_progress", { done, total });
+  });
+}
+
+/** True: try again. False: go on without the clips that the server itself cannot give. */
+async function askAgain(session: Session, display: HTMLElement, failed: ClipUnavailable[]): Promise<boolean> {
+  const { t } = session;
+  for (const { sha256, fault } of failed) session.events.add("clip_unavailable", { clip_sha256: sha256, fault });
+  const footer = h("footer", { class: "actions" });
+  const section = showPage(display, { title: t("preload_failed_title"), body: [h("p", { role: "alert" }, t("preload_failed")), footer] });
+  section.append(stopButton(session));
+  const gone = failed.every(({ fault }) => fault !== "offline");
+  const without = gone ? [{ label: t("preload_without"), value: false }] : [];
+  return choose(session, footer, [{ label: t("try_again"), value: true }, ...without]);
+}

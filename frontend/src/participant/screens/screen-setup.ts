@@ -1,0 +1,75 @@
+/** Full screen and a window that is large enough: before the size is measured, and whenever it is lost. */
+import { h } from "../../ui/element";
+import { showPage, statusLine } from "../../ui/page";
+import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
+import { canFullScreen, enterFullScreen, isFullScreen } from "../screen/full-screen";
+import type { Session } from "../session";
+import { choose, stopButton } from "./support";
+
+interface Parameters { eyebrow: string; again: boolean }
+interface Data { full_screen: boolean }
+
+/** True where the page must ask: full screen is wanted and lost, or the window is too small. */
+export function needsScreenSetup(session: Session): boolean {
+  return lacksFullScreen(session) || lacksRoom(session);
+}
+
+export function screenSetup(session: Session): PluginClass<Parameters> {
+  return plugin<Parameters, Data>({
+    name: "screen-setup",
+    parameters: {
+      eyebrow: { type: STRING, description: "small line above the title" },
+      again: { type: BOOL, description: "true where full screen was left during the trials" },
+    },
+    data: { full_screen: { type: BOOL, description: "whether the page fills the screen" } },
+    async show(display, { eyebrow, again }) {
+      if (lacksFullScreen(session)) await askFullScreen(session, display, eyebrow, again);
+      while (lacksRoom(session)) await askRoom(session, display, eyebrow);
+      return { full_screen: isFullScreen() };
+    },
+    simulate: () => ({ full_screen: false }),
+    act: (display) => display.querySelector<HTMLButtonElement>(".primary")?.click(),
+  });
+}
+
+const denied = new WeakSet<Session>();
+function lacksFullScreen(session: Session): boolean {
+  return session.run.display.full_screen && !isFullScreen() && canFullScreen() && !denied.has(session);
+}
+
+function lacksRoom({ run: { display } }: Session): boolean {
+  return window.innerWidth < display.minimum_width_px || window.innerHeight < display.minimum_height_px;
+}
+
+async function askFullScreen(session: Session, display: HTMLElement, eyebrow: string, again: boolean): Promise<void> {
+  const { t } = session;
+  const footer = h("footer", { class: "actions" });
+  const title = t(again ? "full_screen_again_title" : "screen_title");
+  const text = h("p", {}, t(again ? "full_screen_again" : "full_screen_text"));
+  showPage(display, { title, eyebrow, body: [text, footer] }).append(stopButton(session));
+  await choose(session, footer, [{ label: t("full_screen_enter"), value: true }]);
+  if (await enterFullScreen()) return settled();
+  denied.add(session);
+  session.events.add("fullscreen_left", { denied: true });
+  text.textContent = t("full_screen_denied");
+  footer.replaceChildren();
+  await choose(session, footer, [{ label: t("continue"), value: true }]);
+}
+
+/** The window's size is right only some frames after full screen was granted. */
+function settled(): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, 300));
+}
+
+async function askRoom(session: Session, display: HTMLElement, eyebrow: string): Promise<void> {
+  const { t, run } = session;
+  const values = {
+    width: run.display.minimum_width_px, height: run.display.minimum_height_px,
+    have_width: window.innerWidth, have_height: window.innerHeight,
+  };
+  const status = statusLine();
+  const footer = h("footer", { class: "actions" });
+  showPage(display, { title: t("window_small_title"), eyebrow, body: [h("p", {}, t("window_small", values)), status, footer] })
+    .append(stopButton(session));
+  await choose(session, footer, [{ label: t("try_again"), value: true }]);
+}

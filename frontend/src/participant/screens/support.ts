@@ -1,0 +1,48 @@
+/** What several screens need: a way to wait for one press, to save with a word about it, and to stop. */
+import { h } from "../../ui/element";
+import { isStartKey, listenKeys } from "../../ui/keys";
+import { button } from "../../ui/page";
+import type { Outcome } from "../outbox/outbox";
+import type { Session } from "../session";
+
+const SLOW_MS = 400;
+const OFFLINE_MS = 4_000;
+
+/** A signal for listeners of one screen: ends with `done`, and with the whole visit. */
+export function screenSignal(session: Session): { signal: AbortSignal; done: () => void } {
+  const own = new AbortController();
+  return { signal: AbortSignal.any([own.signal, session.over.signal]), done: () => own.abort() };
+}
+
+export interface Choice<Value> { label: string; value: Value; kind?: "primary" | "quiet" | "plain" }
+
+/** Buttons for `choices`; resolves with the one pressed. Enter presses the first where no field has the focus. */
+export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], withSpace = false): Promise<Value> {
+  const { signal, done } = screenSignal(session);
+  return new Promise((resolve) => {
+    const take = (value: Value): void => (done(), resolve(value));
+    const buttons = choices.map(({ label, value, kind }, place) => button(label, () => take(value), kind ?? (place ? "quiet" : "primary")));
+    footer.append(...buttons);
+    listenKeys((event) => {
+      if (event.key !== "Enter" && !(withSpace && isStartKey(event))) return;
+      event.preventDefault();
+      buttons[0]?.click();
+    }, signal);
+  });
+}
+
+/** Wait for the server's answer to a write and say so in `status` where it takes long. */
+export async function saveShown(session: Session, status: HTMLElement, saving: Promise<Outcome>): Promise<Outcome> {
+  const slow = setTimeout(() => (status.textContent = session.t("saving")), SLOW_MS);
+  const offline = setTimeout(() => (status.textContent = session.t("saving_offline")), OFFLINE_MS);
+  const outcome = await saving;
+  clearTimeout(slow);
+  clearTimeout(offline);
+  status.textContent = outcome.accepted ? "" : session.t("not_saved", { message: outcome.refused.message });
+  return outcome;
+}
+
+/** The quiet way out, in the corner of pages between the trials. */
+export function stopButton(session: Session): HTMLElement {
+  return h("div", { class: "corner" }, button(session.t("stop"), () => void session.root.dispatchEvent(new CustomEvent("stop")), "plain"));
+}

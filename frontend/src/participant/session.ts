@@ -1,0 +1,64 @@
+/** All that the screens of one visit share. */
+import type { AssignedTrial, Calibration, LinkDocument, Receipt, RunDocument, Stage } from "../api/participant";
+import type { Translate } from "../i18n";
+import type { EventLog } from "./outbox/events";
+import type { Outbox, Outcome } from "./outbox/outbox";
+import type { ClipPlayer } from "./playback/player";
+import type { ClipCache } from "./preload/clip-cache";
+import type { RunClock } from "./screen/run-clock";
+import type { ScreenState } from "./screen/screen-state";
+import type { Replays } from "./flow/replays";
+
+export interface Session {
+  link: LinkDocument;
+  run: RunDocument;
+  language: string;
+  t: Translate;
+  root: HTMLElement;
+  outbox: Outbox;
+  events: EventLog;
+  clips: ClipCache;
+  player: ClipPlayer;
+  screen: ScreenState;
+  clock: RunClock;
+  replays: Replays;
+  /** Aborted when this page must do nothing more: another tab took over, or the participant stopped. */
+  over: AbortController;
+  api: RunApi;
+  /** Answered main and attention trials so far. */
+  answered: number;
+}
+
+/** The writes of a run, each kept in the outbox first. */
+export class RunApi {
+  constructor(private readonly outbox: Outbox) {}
+
+  consent(): Promise<Outcome> {
+    return this.write("/api/run/consent", { agreed: true });
+  }
+  calibration(body: Calibration): Promise<Outcome> {
+    return this.write("/api/run/calibration", body);
+  }
+  form(name: string, answers: object): Promise<Outcome> {
+    return this.write(`/api/run/forms/${encodeURIComponent(name)}`, { answers });
+  }
+  device(body: object): Promise<Outcome> {
+    return this.write("/api/run/device", body);
+  }
+  stage(stage: Stage): Promise<Outcome> {
+    return this.write("/api/run/stage", { stage });
+  }
+
+  private async write(path: string, body: unknown): Promise<Outcome> {
+    return (await this.outbox.put("PUT", path, body)).receipt;
+  }
+}
+
+/** Trials of the main part and attention checks: what progress counts. */
+export function counted(run: RunDocument): AssignedTrial[] {
+  return run.trials.filter((trial) => trial.kind !== "practice");
+}
+
+export function receiptOf(outcome: Outcome): Receipt | null {
+  return outcome.accepted ? ((outcome.body as { receipt?: Receipt } | null)?.receipt ?? null) : null;
+}

@@ -1,0 +1,146 @@
+/** The single-clip rating: ready, the clip at actual size, then the scale. The rating is kept before it ends. */
+import type { AssignedTrial, RatingBody } from "../../../api/participant";
+import { pick } from "../../../i18n";
+import { h } from "../../../ui/element";
+import { BOOL, FLOAT, INT, OBJECT, plugin, type PluginClass } from "../../jspsych";
+import { ClipBroken } from "../../playback/player";
+import { playbackRecord } from "../../playback/record";
+import { clipHeight, clipWidth } from "../../screen/size";
+import { screenSignal } from "../../screens/support";
+import { counted, type Session } from "../../session";
+import { saveRating } from "../save-rating";
+import { showBroken } from "./broken";
+import { procedureFeedback } from "./feedback";
+import { prepareClip } from "./prepare";
+import { askScale, type Rated } from "./scale";
+import { showOnce, type Shown, waitForStart } from "./showing";
+import { simulatedRating } from "./simulated";
+import { stage, type Stage } from "./stage";
+
+export interface ClipRatingParameters { trial: AssignedTrial; play: number; next: AssignedTrial | null; number: number; total: number }
+export interface ClipRatingData { response: number | null; rt: number | null; frames_missing: number; key_to_first_frame_ms: number | null; again: boolean }
+
+export function clipRating(session: Session): PluginClass<ClipRatingParameters> {
+  return plugin<ClipRatingParameters, ClipRatingData>({
+    name: "clip-rating",
+    parameters: {
+      trial: { type: OBJECT, description: "the assigned trial" },
+      play: { type: INT, description: "1, or more where a failed clip is shown again" },
+      next: { type: OBJECT, description: "the trial after this one, decoded while this one is rated" },
+      number: { type: INT, description: "place of this trial among those counted, from 1" },
+      total: { type: INT, description: "how many there are" },
+    },
+    data: {
+      response: { type: INT, description: "the rating, null where the clip could not be shown" },
+      rt: { type: FLOAT, description: "from the last frame to the answer, ms" },
+      frames_missing: { type: INT, description: "frames never drawn" },
+      key_to_first_frame_ms: { type: FLOAT, description: "from the start key to the first frame, ms" },
+      again: { type: BOOL, description: "true where this was a repetition" },
+    },
+    show: (display, parameters) => runTrial(session, display, parameters),
+    simulate: (parameters) => simulatedRating(session, parameters),
+    act: (display) => actTrial(display),
+  });
+}
+
+async function runTrial(session: Session, display: HTMLElement, parameters: ClipRatingParameters): Promise<ClipRatingData> {
+  const { trial } = parameters;
+  const place = placeFor(session, display, trial);
+  const body = await watchAndRate(session, place, parameters).catch(async (error: unknown) => {
+    if (!(error instanceof ClipBroken)) throw error;
+    session.events.add("clip_unavailable", { clip_sha256: trial.clip_sha256, reason: error.message });
+    await showBroken(session, display);
+    return emptyBody(session, parameters);
+  });
+  await saveRating(session, trial, body);
+  if (trial.clip_sha256 && trial.clip_sha256 !== parameters.next?.clip_sha256) session.player.release(trial.clip_sha256);
+  const { frames_missing, key_to_first_frame_ms } = body.playback;
+  return { response: body.response, rt: body.rt, frames_missing, key_to_first_frame_ms, again: parameters.play > 1 };
+}
+
+function placeFor(session: Session, display: HTMLElement, trial: AssignedTrial): Stage {
+  const wanted = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
+  // Only where calibration is optional can it be too wide: it is then as wide as the window.
+  const width = Math.min(wanted, window.innerWidth);
+  const place = stage(session.player.element, width, clipHeight(trial, width), session.t("trial_of", { number: 1, total: 1 }));
+  display.replaceChildren(place.element);
+  return place;
+}
+
+async function watchAndRate(session: Session, place: Stage, parameters: ClipRatingParameters): Promise<RatingBody> {
+  const { trial, next } = parameters;
+  const sha256 = await prepareClip(session, trial, place);
+  const showings = await watch(session, place, parameters, sha256);
+  const rating = rate(session, place);
+  if (next) void prepareClip(session, next, null).catch(() => {});
+  const rated = await rating;
+  const body = ratingBody(session, parameters, showings, rated);
+  if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
+  return body;
+}
+
+async function watch(session: Session, place: Stage, { number, total, play, trial }: ClipRatingParameters, sha256: string): Promise<Shown[]> {
+  const { t } = session;
+  const { views } = session.run.trial;
+  const showings: Shown[] = [];
+  const key = trial.kind === "practice" ? "practice_note" : "trial_of";
+  for (let view = 1; view <= views; view += 1) {
+    const first = matchMedia("(pointer: coarse)").matches ? t("ready_touch") : t("ready");
+    const prompt = view > 1 ? t("ready_again", { view, views }) : first;
+    const note = play > 1 ? t("ready_replay") : t(key, { number, total });
+    const key_at_ms = await waitForStart(session, place, prompt, note);
+    showings.push(await showOnce(session, place, sha256, key_at_ms));
+    if (showings.some((shown) => shown.focus_lost)) session.events.add("focus_lost", { trial_index: trial.trial_index });
+  }
+  return showings;
+}
+
+async function rate(session: Session, place: Stage): Promise<Rated> {
+  const { signal, done } = screenSignal(session);
+  const { run: { trial }, language, t } = session;
+  const question = h("h1", { class: "question" }, pick(trial.scale.question, language));
+  const rated = await askScale(place.below, { trial, language, t, signal, question });
+  done();
+  return rated;
+}
+
+function ratingBody(session: Session, { trial, play }: ClipRatingParameters, showings: Shown[], rated: Rated): RatingBody {
+  const last = showings.at(-1);
+  const since = (start: number | undefined): number | null => (start === undefined ? null : Math.round((rated.answered_at_ms - start) * 100) / 100);
+  return {
+    trial_index: trial.trial_index,
+    play,
+    response: rated.response,
+    rt: since(last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms),
+    rt_from_first_frame: since(last?.drawn[0]?.[1]),
+    time_elapsed: session.clock.elapsed(),
+    changes: rated.changes,
+    comment: rated.comment,
+    answered_at_client: new Date().toISOString(),
+    playback: playbackRecord(trial.clip_sha256, showings, session.screen.record()),
+  };
+}
+
+function emptyBody(session: Session, { trial, play }: ClipRatingParameters): RatingBody {
+  return {
+    trial_index: trial.trial_index, play, response: null, rt: null, rt_from_first_frame: null,
+    time_elapsed: session.clock.elapsed(), changes: 0, comment: null, answered_at_client: new Date().toISOString(),
+    playback: { ...playbackRecord(trial.clip_sha256, [], session.screen.record()), frames_missing: trial.frames ?? 0 },
+  };
+}
+
+export function placeIn(session: Session, trial: AssignedTrial): { number: number; total: number } {
+  const kind = trial.kind === "practice" ? session.run.trials.filter((one) => one.kind === "practice") : counted(session.run);
+  return { number: kind.findIndex((one) => one.trial_index === trial.trial_index) + 1, total: kind.length };
+}
+
+/** Presses start, then a middle key, then whatever goes on. */
+function actTrial(display: HTMLElement): void {
+  const timer = setInterval(() => {
+    const keys = [...display.querySelectorAll<HTMLButtonElement>(".key")];
+    const press = keys[Math.floor(keys.length / 2)] ?? display.querySelector<HTMLButtonElement>(".primary");
+    press?.click();
+    if (!display.querySelector(".trial, .page")) clearInterval(timer);
+  }, 250);
+}
+

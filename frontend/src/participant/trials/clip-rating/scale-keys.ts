@@ -1,0 +1,20 @@
+/** Which keys mean what on the scale. */
+import type { Scale } from "../../../api/participant";
+
+type Range = Pick<Scale, "minimum" | "maximum">;
+
+/** The value a key stands for, or null. 0 means ten on a scale that ends there and does not begin at zero. */
+export function valueOf(key: string, { minimum, maximum }: Range): number | null {
+  if (!/^\d$/.test(key)) return null;
+  const digit = Number(key);
+  if (digit >= minimum && digit <= maximum) return digit;
+  return digit === 0 && minimum > 0 && maximum === 10 ? 10 : null;
+}
+
+/** Step along the scale for an arrow key, in the direction of reading. */
+export function keyFor(key: string, right_to_left: boolean): -1 | 0 | 1 {
+  const forward = right_to_left ? "ArrowLeft" : "ArrowRight";
+  const backward = right_to_left ? "ArrowRight" : "ArrowLeft";
+  if (key === forward || key === "ArrowUp") return 1;
+  return key === backward || key === "ArrowDown" ? -1 : 0;
+}

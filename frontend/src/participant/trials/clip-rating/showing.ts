@@ -1,0 +1,58 @@
+/** One showing of a clip: waits for the start key, plays, and notes what disturbed it. */
+import { isStartKey, listenKeys } from "../../../ui/keys";
+import { h } from "../../../ui/element";
+import { button } from "../../../ui/page";
+import type { Showing } from "../../playback/record";
+import { watchFocus } from "../../screen/attention";
+import { screenSignal } from "../../screens/support";
+import type { Session } from "../../session";
+import type { Stage } from "./stage";
+
+export interface Shown extends Showing { early_keys: number }
+
+const FALLBACK_REFRESH_MS = 1000 / 60;
+
+/** The ready screen; resolves with the time of the press that starts the clip (absolute, ms). */
+export function waitForStart(session: Session, place: Stage, prompt: string, note: string): Promise<number> {
+  const { signal, done } = screenSignal(session);
+  const { t } = session;
+  return new Promise((resolve) => {
+    const start = (event: Event): void => {
+      done();
+      resolve(performance.timeOrigin + event.timeStamp);
+    };
+    const go = button(t("start_clip"), () => {});
+    go.addEventListener("click", start, { signal });
+    place.below.replaceChildren(h("p", { class: "ready" }, prompt), go, h("p", { class: "count" }, note));
+    place.element.querySelector(".clip")?.addEventListener("click", start, { signal });
+    listenKeys((event) => {
+      if (!isStartKey(event)) return;
+      event.preventDefault();
+      start(event);
+    }, signal);
+    go.focus({ preventScroll: true });
+  });
+}
+
+/** Play the prepared clip once, with nothing else on the screen. */
+export async function showOnce(session: Session, place: Stage, sha256: string, key_at_ms: number): Promise<Shown> {
+  const { run: { trial }, player, screen, t } = session;
+  const { signal, done } = screenSignal(session);
+  let early_keys = 0;
+  document.addEventListener("keydown", (event) => {
+    if (!event.repeat && event.key.length === 1) early_keys += 1;
+    if (event.key === " ") event.preventDefault();
+  }, { signal });
+  place.setPlaying(true);
+  place.below.replaceChildren(h("p", { class: "spoken", role: "status" }, t("clip_playing")));
+  const focus = watchFocus();
+  const refresh_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : FALLBACK_REFRESH_MS;
+  try {
+    const shown = await player.play(sha256, { fixation_ms: trial.start === "fixation" ? trial.fixation_ms : 0, refresh_ms });
+    return { ...shown, key_at_ms, focus_lost: focus.stop(), early_keys };
+  } finally {
+    focus.stop();
+    done();
+    place.setPlaying(false);
+  }
+}

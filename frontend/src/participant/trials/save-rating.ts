@@ -1,0 +1,19 @@
+/** Keeps a rating, and acts on its receipt whenever that comes: a failed clip joins the repetitions. */
+import type { AssignedTrial, RatingBody } from "../../api/participant";
+import { receiptOf, type Session } from "../session";
+
+/** Resolves when the rating is on disk; where nothing is kept there, when the server has it. */
+export async function saveRating(session: Session, trial: AssignedTrial, body: RatingBody): Promise<void> {
+  const id = crypto.randomUUID();
+  const { receipt } = await session.outbox.put("PUT", `/api/run/ratings/${id}`, body, id);
+  trial.plays_done = body.play;
+  if (trial.kind !== "practice" && !trial.answered) session.answered += 1;
+  trial.answered = true;
+  const shift_ms = session.clock.shift();
+  if (shift_ms !== 0) session.events.add("clock_changed", { shift_ms });
+  const handled = receipt.then((outcome) => {
+    if (receiptOf(outcome)?.again) session.replays.add(trial, body.play + 1);
+    if (!outcome.accepted && outcome.refused.status === 409) session.root.dispatchEvent(new CustomEvent("taken-over"));
+  });
+  if (!session.outbox.durable) await handled;
+}
