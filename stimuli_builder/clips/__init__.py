@@ -1,0 +1,1 @@
+"""From cells and characters to clips: curves, motion blur, encoding, manifest, checks."""

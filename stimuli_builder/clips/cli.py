@@ -1,0 +1,168 @@
+"""`stimuli plan`, `stimuli build`, `stimuli clip` and `stimuli verify`."""
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from stimuli_builder.clips.build import Progress, Report
+
+ExperimentName = Annotated[str, typer.Argument(help="exp1, exp2, exp3 or a TOML file.", show_default=False)]
+PLAN_HELP = """
+Print an experiment's design: factors, cells, clips, trials, blocks and expected minutes.
+
+Also printed: which 'real' exemplars show a recording for the second time.
+
+The keys of --json: name, title, participants, factors, cells, exemplars_per_cell, unique_clips,
+trials_per_participant, practice_trials, blocks, order, expected_minutes, repeated_profiles.
+
+Examples:
+
+  stimuli plan exp1
+
+  stimuli plan my_study.toml --json
+"""
+BUILD_HELP = """
+Build an experiment's clips (H.264 in MP4) and manifest.json.
+
+Only what is missing or has changed is rendered; after an interruption the same command goes on. The same
+seed gives the same bytes on one machine and the same curves on any.
+
+Examples:
+
+  stimuli build exp3 --out clips/exp3
+
+  stimuli build my_study.toml --out clips/mine --workers 4 --preview
+
+  stimuli build exp1 --out clips/exp1 --dask tcp://scheduler:8786
+"""
+VERIFY_HELP = """
+Check a folder of clips against its manifest: presence, hashes, frame counts, timing and eyelid opening.
+
+The opening is measured in the decoded pixels of every frame and compared with the closure curve. Clips whose
+lower lid moves, whose eyes move apart, or whose character has changed since, are checked for the rest alone.
+
+Examples:
+
+  stimuli verify clips/exp3
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of the clip builder to `app`."""
+    from stimuli_builder.clips.cli_clip import CLIP_HELP, clip_command
+
+    app.command("plan", help=PLAN_HELP)(plan_command)
+    app.command("build", help=BUILD_HELP)(build_command)
+    app.command("clip", help=CLIP_HELP)(clip_command)
+    app.command("verify", help=VERIFY_HELP)(verify_command)
+
+
+def plan_command(
+    experiment: ExperimentName,
+    as_json: Annotated[bool, typer.Option("--json", help="Machine-readable output.")] = False,
+) -> None:
+    """Print the design of an experiment."""
+    from experiments.load import load_experiment
+    from stimuli_builder.clips.plan import summary
+    from stimuli_builder.clips.plan_table import print_plan
+
+    plan = summary(load_experiment(experiment))
+    if as_json:
+        print(json.dumps(plan, indent=2, ensure_ascii=False))
+    else:
+        print_plan(plan)
+
+
+def build_command(
+    experiment: ExperimentName,
+    out: Annotated[Path, typer.Option(help="Folder for the clips; made if it is not there.")],
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to render on.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed in place of the declared one.")] = None,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Also write preview.png (contact sheet) and preview.html.")
+    ] = False,
+    barcode: Annotated[
+        bool, typer.Option("--test-barcode", help="Draw each frame's number into its corner, for tests.")
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet-when-current", help="Print nothing when no clip had to be built.")
+    ] = False,
+) -> None:
+    """Build the clips of an experiment."""
+    from experiments.load import load_experiment
+    from stimuli_builder.clips.build import Machines, build
+    from stimuli_builder.clips.design_clips import Options
+    from stimuli_builder.clips.plan import experiment_folder
+
+    declared = load_experiment(experiment)
+    options = Options(seed=seed, barcode=barcode, beside=experiment_folder(experiment))
+    with progress_bar(f"building {declared.name}") as progress:
+        report = build(declared, out, options, Machines(workers, dask), progress)
+    if preview:
+        from stimuli_builder.clips.preview import write_preview
+
+        for written in write_preview(report.manifest, out):
+            print(f"wrote {written}")
+    if not (quiet and report.built == 0):
+        _print_report(report, out)
+
+
+def _print_report(report: "Report", out: Path) -> None:
+    clips, manifest = len(report.manifest.clips), report.manifest
+    size_mb = sum({clip.file: clip.bytes for clip in manifest.clips}.values()) / 1e6
+    removed = f", {len(report.removed)} old ones removed" if report.removed else ""
+    print(
+        f"{manifest.experiment}: {clips} clips in {out} ({size_mb:.1f} MB); "
+        f"{report.built} built, {report.reused} already there{removed}"
+    )
+    for note in manifest.notes:
+        if note.startswith("exemplar "):
+            print(f"  {note}")
+
+
+def verify_command(
+    folder: Annotated[Path, typer.Argument(help="Folder with manifest.json.", show_default=False)],
+    characters: Annotated[Path | None, typer.Option(help="Folder that holds characters of your own.")] = None,
+) -> None:
+    """Check built clips."""
+    from stimuli_builder.clips.verify import verify
+
+    with progress_bar("checking") as progress:
+        verdict = verify(folder, characters, progress)
+    for finding in verdict.findings:
+        print(finding)
+    if verdict.findings:
+        wrong = len({finding.clip.file for finding in verdict.findings})
+        raise InputError(
+            f"{wrong} of {verdict.clips} clips are not what the manifest says; build them again with "
+            "`stimuli build`"
+        )
+    measured = "the opening was measured in none"
+    if verdict.opening_checked:
+        measured = (
+            f"opening measured in {verdict.opening_checked}, "
+            f"at most {verdict.worst_opening_mm:.2f} mm from the curve"
+        )
+    print(f"{verdict.clips} clips: hashes, frames and timing are right; {measured}")
+
+
+@contextmanager
+def progress_bar(what: str) -> "Iterator[Progress]":
+    """Show clips done and time left on stderr; nothing where stderr is no terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    hidden = not sys.stderr.isatty()
+    with Progress(*columns, console=Console(stderr=True), disable=hidden, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, wanted: bar.update(task, completed=done, total=wanted)

@@ -1,0 +1,97 @@
+"""`stimuli clip`: one clip, without an experiment."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from experiments.rendering import RenderSettings
+
+CLIP_HELP = """
+Render one clip from a blink profile and a character.
+
+PROFILE is real, model, SL, AL, SL_ease, AL_ease, the name of a shipped recording (`stimuli profiles`), or a
+CSV file of closure samples at 300 fps (0 open, 1 closed; docs/clips.md).
+
+Examples:
+
+  stimuli clip --profile real --character photorealistic --out blink.mp4
+
+  stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
+
+  stimuli clip --profile mine.csv --character my_renders/ --size 1920x720 --fps 60 --out big.mp4
+"""
+Amplitude = Literal["full", "natural"]
+LowerLid = Literal["both", "vertical", "horizontal", "none"]
+Eyes = Literal["alike", "separate"]
+
+
+def clip_command(
+    out: Annotated[Path, typer.Option(help="MP4 file to write.")],
+    profile: Annotated[str, typer.Option(help="Blink to show, see above.")] = "model",
+    character: Annotated[
+        str, typer.Option(help="photorealistic, cartoon or a character folder.")
+    ] = "cartoon",
+    duration: Annotated[float | None, typer.Option(help="Blink length in frames at 30 fps.")] = None,
+    amplitude: Annotated[
+        Amplitude, typer.Option(help="full: the eye shuts (FC); natural: as measured (NC).")
+    ] = "full",
+    blur: Annotated[bool, typer.Option("--blur/--no-blur", help="Motion blur (MB) or none (NB).")] = True,
+    lower_lid: Annotated[LowerLid, typer.Option(help="Lower-lid signals that move.")] = "none",
+    eyes: Annotated[
+        Eyes, typer.Option(help="One signal for both eyes, or left and right recorded.")
+    ] = "alike",
+    exemplar: Annotated[int, typer.Option(min=1, help="Which blink of that kind.")] = 1,
+    seed: Annotated[int, typer.Option(help="Decides every random choice.")] = 2011,
+    fps: Annotated[int, typer.Option(min=24, max=60, help="Frame rate.")] = 30,
+    size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x720.")] = "960x360",
+    clip_frames: Annotated[int | None, typer.Option(min=1, help="Length of the clip in frames.")] = None,
+    barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
+) -> None:
+    """Render one clip."""
+    from stimuli_builder.clips.single import SingleClip, render_single
+
+    width, height = parse_size(size)
+    settings = settings_from(
+        character=character,
+        profile=profile if profile.endswith(".csv") else "real",
+        duration_frames=duration,
+        amplitude=amplitude,
+        motion_blur=blur,
+        lower_lid=lower_lid,
+        eyes=eyes,
+        fps=fps,
+        width_px=width,
+        height_px=height,
+    )
+    wanted = SingleClip(settings, profile, exemplar, seed, clip_frames, barcode)
+    made = render_single(wanted, out)
+    print(
+        f"wrote {out}: {made.frames} frames at {fps} fps, profile {made.curve.profile_id}, "
+        f"{made.curve.duration_frames:g} frames at 30 fps from frame {made.onset_frame}"
+    )
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """(width, height) of `960x360`."""
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(part.strip().isdigit() for part in parts):
+        raise InputError(f"--size: expected WIDTHxHEIGHT such as 960x360, got '{text}'")
+    return int(parts[0]), int(parts[1])
+
+
+def settings_from(**values: object) -> "RenderSettings":
+    """Make settings; a value out of range ends in one line that names the option."""
+    from pydantic import ValidationError
+
+    from experiments.rendering import RenderSettings
+
+    try:
+        return RenderSettings.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        option = str(first["loc"][-1]) if first["loc"] else "value"
+        raise InputError(f"{option}: {first['msg']}, got {first.get('input')!r}") from error

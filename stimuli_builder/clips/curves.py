@@ -1,0 +1,140 @@
+"""From a cell and an exemplar to the closure curve of its clip, sample by sample at 300 fps."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.lower_lid import lower_lid
+from stimuli_builder.blinks.profile import BlinkProfile, to_full_closure, to_natural_closure
+from stimuli_builder.clips.motion_blur import samples_per_frame
+from stimuli_builder.clips.seeds import generator
+
+Array = NDArray[np.float64]
+
+LEAD_IN_S = (0.35, 0.80)
+LEAD_OUT_S = (0.35, 0.60)
+"""Shortest and longest open-eye time before and after a blink; drawn for every clip by its seed."""
+DECIMALS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class ClipCurve:
+    """What a clip shows over time, at 300 fps.
+
+    Attributes
+    ----------
+    closure : float64 array (n,)
+        0 open, 1 closed; of the left eye where `closure_other` holds the right one's.
+    lower_vertical_mm, lower_horizontal_mm : float64 array (n,) or None
+        The lower lid's lift and its slide towards the nose; None leaves the lower lid to the character.
+    onset_sample : int
+        Where the blink begins.
+    """
+
+    closure: Array
+    onset_sample: int
+    profile_id: str = ""
+    duration_frames: float = 0.0
+    closure_other: Array | None = None
+    lower_vertical_mm: Array | None = None
+    lower_horizontal_mm: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("closure", "closure_other", "lower_vertical_mm", "lower_horizontal_mm"):
+            values = getattr(self, name)
+            if values is None:
+                continue
+            if len(values) != len(self.closure) or not np.isfinite(values).all():
+                raise InputError(f"{self.profile_id}: {name} needs {len(self.closure)} finite samples")
+            if name.startswith("closure") and (values.min() < 0 or values.max() > 1):
+                raise InputError(
+                    f"{self.profile_id}: closure must lie between 0 and 1, "
+                    f"got {values.min():g} to {values.max():g}"
+                )
+
+    def motion(self, samples: NDArray[np.int64]) -> Array:
+        """(signals, samples) of all that moves, for comparing and resting frames."""
+        signals = (self.closure, self.closure_other, self.lower_vertical_mm, self.lower_horizontal_mm)
+        return np.stack([signal[samples] for signal in signals if signal is not None])
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How a blink is laid into a clip: whole frames of open eye around it, and its sub-frame start.
+
+    `phase_samples` samples pass after the last lead-in frame until the onset, so that blinks begin
+    anywhere within a frame, as recorded ones do.
+    """
+
+    lead_in_frames: int
+    lead_out_frames: int
+    phase_samples: int
+    fps: float
+
+    @classmethod
+    def drawn(cls, fps: float, phase_samples: int, *seed: str | int) -> "Timing":
+        """Draw lead-in and lead-out lengths evenly from their ranges."""
+        rng = generator("timing", *seed)
+        lead_in, lead_out = (
+            int(rng.integers(round(low * fps), round(high * fps) + 1))
+            for low, high in (LEAD_IN_S, LEAD_OUT_S)
+        )
+        return cls(lead_in, lead_out, phase_samples, fps)
+
+
+def amplitude_of(profile: BlinkProfile, amplitude: str) -> BlinkProfile:
+    """The profile in the condition `full` (FC) or `natural` (NC)."""
+    return to_full_closure(profile) if amplitude == "full" else to_natural_closure(profile)
+
+
+def clip_curve(
+    profile: BlinkProfile, timing: Timing, lower: str, clip_frames: int | None = None
+) -> ClipCurve:
+    """Lay a blink into a clip: its first level before it, its last level after it.
+
+    Parameters
+    ----------
+    lower : {"both", "vertical", "horizontal", "none"}
+        Which lower-lid signals move; `none` leaves the lower lid at rest.
+    clip_frames : int, optional
+        Fixed length of the clip; the lead-out gives way.
+
+    Raises
+    ------
+    InputError
+        The blink does not fit into `clip_frames`.
+    """
+    step = samples_per_frame(timing.fps)
+    onset = round(timing.lead_in_frames * step) + timing.phase_samples
+    end = onset + len(profile.closure)
+    frames = clip_frames or int(np.ceil(end / step - 1e-9)) + timing.lead_out_frames
+    total = int(np.ceil(frames * step - 1e-9))
+    if end > total:
+        raise InputError(
+            f"profile {profile.profile_id} ends at frame {end / step:.1f}, "
+            f"{onset / step:.1f} frames of open eye included: longer than the clip "
+            f"of {frames} frames; ask for a longer clip"
+        )
+
+    def laid(values: Array) -> Array:
+        held = np.pad(values, (onset, total - end), mode="edge")
+        return np.round(held, DECIMALS)
+
+    curve = ClipCurve(
+        closure=laid(profile.closure),
+        closure_other=None if profile.closure_other is None else laid(profile.closure_other),
+        onset_sample=onset + profile.onset_index,
+        profile_id=profile.profile_id,
+        duration_frames=round(profile.duration_frames_30fps, 3),
+    )
+    if lower == "none":
+        return curve
+    vertical, horizontal = (laid(signal) for signal in lower_lid(profile))
+    still = np.zeros(total)
+    return replace(
+        curve,
+        lower_vertical_mm=vertical if lower in ("both", "vertical") else still,
+        lower_horizontal_mm=horizontal if lower in ("both", "horizontal") else still,
+    )

@@ -1,0 +1,70 @@
+"""Planes to H.264 in MP4: the same planes give the same bytes on the same machine."""
+
+import tempfile
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+
+CRF = 12
+PRESET = "faster"
+X264 = (
+    "threads=1:lookahead-threads=1:sliced-threads=0:bframes=0:keyint=infinite:scenecut=0:"
+    "colorprim=bt709:transfer=bt709:colormatrix=bt709:range=tv:log-level=error"
+)
+BT709, LIMITED_RANGE = 1, 1
+
+
+def encoder_signature() -> str:
+    """Everything of the encoder that decides a clip's bytes."""
+    codec = ".".join(str(part) for part in av.library_versions["libavcodec"])
+    return f"libx264 via libavcodec {codec}; crf {CRF}; preset {PRESET}; {X264}"
+
+
+def encode_clip(frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], fps: float) -> bytes:
+    """Encode 4:2:0 planes, each (height * 3 / 2, width), as an MP4 file.
+
+    One GOP, no B-frames, constant rate, index in front of the data (fast start), BT.709 limited range.
+
+    Raises
+    ------
+    InputError
+        The temporary folder cannot take the file (disk full).
+    """
+    # Fast start rewrites the file from its beginning, so it needs a real one.
+    with tempfile.TemporaryDirectory(prefix="palpebra-clip-") as folder:
+        path = Path(folder) / "clip.mp4"
+        try:
+            _write(path, frames, size_px, fps)
+            return path.read_bytes()
+        except OSError as error:
+            raise InputError(
+                f"the clip cannot be written in {folder} ({error.strerror}); free space there or set TMPDIR"
+            ) from error
+
+
+def _write(path: Path, frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], fps: float) -> None:
+    rate = Fraction(fps).limit_denominator(1001)
+    container_options = {"movflags": "+faststart", "fflags": "+bitexact"}
+    with av.open(str(path), "w", format="mp4", options=container_options) as container:
+        stream: Any = container.add_stream("libx264", rate=rate)
+        stream.width, stream.height = size_px
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": str(CRF), "preset": PRESET, "profile": "high", "x264-params": X264}
+        context = stream.codec_context
+        context.thread_count = 1
+        context.time_base = 1 / rate
+        context.color_range = LIMITED_RANGE
+        context.colorspace = context.color_primaries = context.color_trc = BT709
+        for number, planes in enumerate(frames):
+            frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
+            frame.pts, frame.time_base = number, 1 / rate
+            frame.color_range, frame.colorspace = LIMITED_RANGE, BT709
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))

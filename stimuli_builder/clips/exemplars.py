@@ -1,0 +1,109 @@
+"""Which blink an exemplar shows: recorded, drawn from the model, a textbook curve, or from a file."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+from experiments.errors import InputError
+from experiments.rendering import RenderSettings
+from stimuli_builder.blinks.blink_model import BlinkModel, default_model
+from stimuli_builder.blinks.library import load_library, recorded_rests
+from stimuli_builder.blinks.profile import SAMPLES_PER_CLIP_FRAME, BlinkProfile, resample
+from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, TextbookKind, textbook_profile
+from stimuli_builder.clips.curves import amplitude_of
+from stimuli_builder.clips.profile_files import read_closure_file
+from stimuli_builder.clips.seeds import generator
+
+
+@dataclass(frozen=True, eq=False)
+class Exemplar:
+    """A blink in its condition, and whether its recording already stands for another exemplar."""
+
+    profile: BlinkProfile
+    repeated: bool
+    phase_samples: int
+
+
+def exemplar(
+    settings: RenderSettings, family: str, number: int, seed: int, beside: Path | None = None
+) -> Exemplar:
+    """Return exemplar `number` (from 1) of a family of exemplars.
+
+    Parameters
+    ----------
+    family : str
+        Key shared by all cells that show the same blinks (their levels of the factors in `own_per`);
+        with `seed` it decides every random choice.
+    beside : Path, optional
+        Folder that profile files are relative to.
+    """
+    profile, repeated = _blink(settings, family, number, seed, beside)
+    if settings.duration_frames is not None and settings.profile not in TEXTBOOK_KINDS:
+        profile = resample(profile, settings.duration_frames)
+    if settings.eyes == "alike" and profile.closure_other is not None:
+        profile = replace(profile, closure_other=None)
+    phases = generator("phase", seed, family).permutation(SAMPLES_PER_CLIP_FRAME)
+    phase = int(phases[(number - 1) % len(phases)])
+    return Exemplar(amplitude_of(profile, settings.amplitude), repeated, phase)
+
+
+def recorded_order(
+    count: int, seed: int, family: str, *, paired: bool = False
+) -> list[tuple[BlinkProfile, bool]]:
+    """The recorded blinks of `count` exemplars, each with whether it came before.
+
+    Every recording is used once, in an order drawn by the seed, before any is used twice.
+    """
+    return _in_turn(load_library(paired=paired), count, seed, family)
+
+
+def _in_turn(
+    profiles: Sequence[BlinkProfile], count: int, seed: int, family: str
+) -> list[tuple[BlinkProfile, bool]]:
+    order = generator("recorded", seed, family).permutation(len(profiles))
+    return [(profiles[order[i % len(order)]], i >= len(order)) for i in range(count)]
+
+
+def _blink(
+    settings: RenderSettings, family: str, number: int, seed: int, beside: Path | None
+) -> tuple[BlinkProfile, bool]:
+    separate = settings.eyes == "separate"
+    kind = settings.profile
+    if kind == "real":
+        return recorded_order(number, seed, family, paired=separate)[-1]
+    if kind == "model":
+        rng = generator("model", seed, family, number)
+        return (_paired_model() if separate else default_model()).sample(rng=rng), False
+    for textbook in TEXTBOOK_KINDS:
+        if kind == textbook:
+            return _textbook(textbook, settings, family, number, seed), False
+    profiles = read_closure_file(_beside(kind, beside))
+    if separate and any(profile.closure_other is None for profile in profiles):
+        raise InputError(f"{kind}: eyes = 'separate' needs a column closure_other for the right eye")
+    return _in_turn(profiles, number, seed, family)[-1]
+
+
+def _textbook(
+    kind: TextbookKind, settings: RenderSettings, family: str, number: int, seed: int
+) -> BlinkProfile:
+    """A textbook blink between resting levels drawn from the recordings (see decision 0151)."""
+    rests = recorded_rests()
+    drawn = generator("rests", seed, family).permutation(len(rests))
+    start, end = (float(level) for level in rests[drawn[(number - 1) % len(rests)]])
+    rng = generator("textbook", seed, family, number)
+    recorded = load_library()[int(rng.integers(len(load_library())))]
+    peak = 1.0 if settings.amplitude == "full" else float(recorded.closure.max())
+    duration = settings.duration_frames or recorded.duration_frames_30fps
+    start, end = min(start, 0.9 * peak), min(end, 0.9 * peak)
+    return textbook_profile(kind, duration, start_level=start, end_level=end, peak_closure=peak)
+
+
+@lru_cache(maxsize=1)
+def _paired_model() -> BlinkModel:
+    """The model of both eyes together, fitted to the blinks seen in both."""
+    return BlinkModel.fit(load_library(paired=True))
+
+
+def _beside(file: str, folder: Path | None) -> Path:
+    return (folder or Path()) / file

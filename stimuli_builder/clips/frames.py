@@ -1,0 +1,127 @@
+"""From a clip's curve to its pictures: blended in linear light, as planes ready for the encoder."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.clips.barcode import draw_barcode
+from stimuli_builder.clips.curves import ClipCurve
+from stimuli_builder.clips.kernels import GAMMA, blend, to_yuv
+from stimuli_builder.clips.levels import LevelSet
+from stimuli_builder.clips.motion_blur import frame_weights
+
+Planes = NDArray[np.uint8]
+Light = NDArray[np.float32]
+SEAM_MM = 4.0
+"""Where the eyes move apart, the picture changes over from one to the other within this width."""
+
+
+class FramePainter:
+    """Paints the frames of clips of one character at one size."""
+
+    def __init__(self, character: LevelSet) -> None:
+        self.character = character
+        self._flat = character.levels.reshape(len(character.levels), -1)
+        width, height = character.size_px
+        self._base = np.empty((height * 3 // 2, width), np.uint8)
+        to_yuv(character.base.astype(np.float32), GAMMA, *_split(self._base, width, height))
+
+    def frames(self, curve: ClipCurve, fps: float, blur: bool, barcode: bool = False) -> Iterator[Planes]:
+        """Yield each frame as a (height * 3 / 2, width) array of 4:2:0 planes, fresh each time."""
+        if curve.lower_vertical_mm is not None and self.character.lower is None:
+            raise InputError(
+                f"character '{self.character.name}' has no lower-lid layer: use lower_lid = 'none'"
+            )
+        rows = frame_weights(len(curve.closure), fps, blur)
+        width, height = self.character.size_px
+        memory: dict[bytes, Planes] = {}
+        for number, row in enumerate(rows):
+            used = np.flatnonzero(row)
+            key = _same_picture(curve, used, row[used])
+            if key not in memory:
+                memory[key] = self._paint(curve, used, row[used])
+            planes = memory[key].copy()
+            if barcode:
+                draw_barcode(*_split(planes, width, height), number)
+            yield planes
+
+    def light(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Light:
+        """(h, w, 3) linear light (of 65535) of the window: weighted mean over samples of the curve."""
+        light = self._eye_light(curve, curve.closure, samples, weights)
+        if curve.closure_other is None:
+            return light
+        # The participant sees the character's left eye at the right; `closure` is the left eye's.
+        other = self._eye_light(curve, curve.closure_other, samples, weights)
+        left_eye = self._seam()[None, :, None]
+        return np.asarray(left_eye * light + (1 - left_eye) * other, np.float32)
+
+    def _paint(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Planes:
+        character, window = self.character, self.character.window
+        width, height = character.size_px
+        planes = self._base.copy()
+        if not np.any(curve.motion(samples)):
+            return planes
+        luma, blue, red = _split(planes, width, height)
+        rows, columns = window.slices
+        half_rows = slice(window.y // 2, (window.y + window.height) // 2)
+        half_columns = slice(window.x // 2, (window.x + window.width) // 2)
+        first_column = blue[half_rows, half_columns.start].copy(), red[half_rows, half_columns.start].copy()
+        to_yuv(
+            self.light(curve, samples, weights),
+            GAMMA,
+            luma[rows, columns],
+            blue[half_rows, half_columns],
+            red[half_rows, half_columns],
+        )
+        # This chroma column also weighs a luma column outside the window; nothing moves at the edge.
+        blue[half_rows, half_columns.start], red[half_rows, half_columns.start] = first_column
+        return planes
+
+    def _eye_light(
+        self,
+        curve: ClipCurve,
+        closure: NDArray[np.float64],
+        samples: NDArray[np.int64],
+        weights: NDArray[np.float64],
+    ) -> Light:
+        character = self.character
+        level_weights = weights @ character.level_weights(closure[samples])
+        chosen = np.flatnonzero(level_weights > 1e-7)
+        light = np.empty(self._flat.shape[1], np.float32)
+        blend(self._flat, chosen, level_weights[chosen].astype(np.float32), light)
+        picture: Light = light.reshape(character.levels.shape[1:])
+        vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
+        if character.lower is not None and vertical is not None and horizontal is not None:
+            character.lower.add(
+                picture,
+                weights,
+                closure[samples],
+                vertical[samples],
+                horizontal[samples],
+            )
+        return np.asarray(picture, np.float32)
+
+    def _seam(self) -> Light:
+        window = self.character.window
+        from_middle = np.arange(window.x, window.x + window.width) + 0.5 - self.character.size_px[0] / 2
+        share = from_middle / (SEAM_MM * self.character.px_per_mm) + 0.5
+        return np.clip(share, 0.0, 1.0).astype(np.float32)
+
+
+def _same_picture(curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> bytes:
+    """Equal for frames that look alike: resting frames are painted once."""
+    motion = curve.motion(samples)
+    if np.all(motion == motion[:, :1]):
+        return motion[:, 0].tobytes()
+    return motion.tobytes() + np.round(weights, 12).tobytes()
+
+
+def _split(planes: Planes, width: int, height: int) -> tuple[Planes, Planes, Planes]:
+    """Luma, blue-difference and red-difference views of one (height * 3 / 2, width) array."""
+    quarter = height // 2 * (width // 2)
+    chroma = planes.reshape(-1)[height * width :]
+    blue = chroma[:quarter].reshape(height // 2, width // 2)
+    red = chroma[quarter:].reshape(height // 2, width // 2)
+    return planes[:height], blue, red

@@ -1,0 +1,92 @@
+"""One clip to be rendered: all that decides its bytes, the hash of that, and the rendering itself."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stimuli_builder.blinks.profile import PROFILE_FPS
+from stimuli_builder.clips.curves import ClipCurve
+
+if TYPE_CHECKING:
+    from stimuli_builder.clips.frames import FramePainter
+
+RENDER_VERSION = 1
+"""Raise this when the same inputs come to give other pictures; every clip is then built again."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a clip is rendered, apart from what moves in it.
+
+    `character` is a name or a folder; `beside` the folder it may be relative to. `fingerprint` is the
+    SHA-256 of all its pictures, `encoder` names the encoder and its settings.
+    """
+
+    character: str
+    fingerprint: str
+    encoder: str
+    size_px: tuple[int, int]
+    fps: float
+    motion_blur: bool
+    barcode: bool = False
+    beside: Path | None = None
+
+
+@dataclass(frozen=True)
+class ClipJob:
+    """A clip to render."""
+
+    look: Look
+    curve: ClipCurve
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of the clip."""
+        return int(len(self.curve.closure) * self.look.fps / PROFILE_FPS + 1e-9)
+
+    @property
+    def input_hash(self) -> str:
+        """SHA-256 over everything that decides the clip's bytes; paths do not count."""
+        look = asdict(self.look) | {"beside": None, "character": None, "render_version": RENDER_VERSION}
+        digest = hashlib.sha256(json.dumps(look, sort_keys=True).encode())
+        curve = self.curve
+        for name in ("closure", "closure_other", "lower_vertical_mm", "lower_horizontal_mm"):
+            values = getattr(curve, name)
+            digest.update(name.encode())
+            if values is not None:
+                # Whole millionths: the same on every machine, whatever its last bits of rounding.
+                digest.update(np.round(values * 1e6).astype("<i8").tobytes())
+        return digest.hexdigest()
+
+
+def render(job: ClipJob) -> bytes:
+    """Render and encode a clip; returns the bytes of its MP4 file."""
+    from stimuli_builder.clips.encode import encode_clip
+
+    look = job.look
+    painter = _painter(look.character, look.fingerprint, look.size_px, look.beside)
+    frames = painter.frames(job.curve, look.fps, look.motion_blur, look.barcode)
+    return encode_clip(frames, look.size_px, look.fps)
+
+
+# A process holds one character at a time: two at the largest size would pass 1.5 GB.
+@lru_cache(maxsize=1)
+def _painter(
+    character: str,
+    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
+    size_px: tuple[int, int],
+    beside: Path | None,
+) -> "FramePainter":
+    import cv2
+
+    from stimuli_builder.clips.frames import FramePainter
+    from stimuli_builder.clips.levels import load_levels
+
+    # The pool already uses every core.
+    cv2.setNumThreads(1)
+    return FramePainter(load_levels(character, size_px, beside))

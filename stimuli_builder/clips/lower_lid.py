@@ -1,0 +1,97 @@
+"""The lower lid's layer at one picture size, added to blended frames for many samples at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.characters.atlas import Character
+from stimuli_builder.clips.kernels import FULL_SCALE, add_products
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class LowerLid:
+    """Changes of the open eye by lower-lid pose, and how much of them shows at each closure.
+
+    I(w, v, h) = I(w) + factor(w) change(v, h), bilinear in pose and linear in closure; so the mean over
+    the samples of a shutter time is a sum over few (pose, matte) pairs.
+
+    Attributes
+    ----------
+    vertical_mm, horizontal_mm, closures : ascending grids of poses and mattes.
+    changes : float32 array (vertical x horizontal, h, w, 3), of 65535.
+    factors : float32 array (mattes, h, w, 3).
+    rows, columns : place in the character's window.
+    """
+
+    vertical_mm: Array
+    horizontal_mm: Array
+    closures: Array
+    changes: Picture
+    factors: Picture
+    rows: slice
+    columns: slice
+
+    @classmethod
+    def of_character(cls, character: Character, to_window: Callable[[Picture], Picture]) -> "LowerLid":
+        """Decode a character's layer; `to_window` brings a picture of its crop to the size in use."""
+        layer = character.lower_lid_layer
+        vertical, horizontal, closures = layer.vertical_mm, layer.horizontal_mm, layer.matte_closures
+        shape = (character.declaration.crop[3], character.declaration.crop[2], 3)
+
+        def placed(part: Picture) -> Picture:
+            whole = np.zeros(shape, np.float32)
+            whole[layer.window] = part
+            return to_window(whole)
+
+        changes = np.stack([placed(change) for row in layer.changes for change in row])
+        rows, columns = _where_any(changes)
+        factors = np.stack([placed(layer.factor_at(i))[rows, columns] for i in range(len(closures))])
+        changes = np.ascontiguousarray(changes[:, rows, columns]) * np.float32(FULL_SCALE)
+        return cls(vertical, horizontal, closures, changes, factors, rows, columns)
+
+    def limited(self, vertical_mm: Array, horizontal_mm: Array) -> tuple[Array, Array]:
+        """The signals held within the poses that exist."""
+        return (
+            np.clip(vertical_mm, self.vertical_mm[0], self.vertical_mm[-1]),
+            np.clip(horizontal_mm, self.horizontal_mm[0], self.horizontal_mm[-1]),
+        )
+
+    def add(
+        self, light: Picture, weights: Array, closure: Array, vertical_mm: Array, horizontal_mm: Array
+    ) -> None:
+        """Add the weighted mean over samples of the moved lower lid to `light` (h, w, 3), of 65535."""
+        vertical, horizontal = self.limited(vertical_mm, horizontal_mm)
+        across = _hat(self.vertical_mm, vertical)
+        along = _hat(self.horizontal_mm, horizontal)
+        covered = _hat(self.closures, np.clip(closure, self.closures[0], self.closures[-1]))
+        shares = np.einsum("s,sv,sh,sm->vhm", weights, across, along, covered)
+        table = shares.reshape(-1, shares.shape[2]).astype(np.float32)
+        part = np.zeros((*self.changes.shape[1:3], 3), np.float32)
+        add_products(self.changes, self.factors, table, part)
+        light[self.rows, self.columns] += part
+
+
+def _hat(grid: Array, values: Array) -> Array:
+    """(samples, grid) shares of the two neighbours of each value."""
+    if len(grid) == 1:
+        return np.ones((len(values), 1))
+    index = np.clip(np.searchsorted(grid, values, side="right") - 1, 0, len(grid) - 2)
+    share = (values - grid[index]) / (grid[index + 1] - grid[index])
+    hat = np.zeros((len(values), len(grid)))
+    rows = np.arange(len(values))
+    hat[rows, index] = 1.0 - share
+    hat[rows, index + 1] = share
+    return hat
+
+
+def _where_any(changes: Picture) -> tuple[slice, slice]:
+    seen = np.any(changes != 0.0, axis=(0, 3))
+    if not seen.any():
+        return slice(0, 1), slice(0, 1)
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

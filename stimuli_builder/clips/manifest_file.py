@@ -1,0 +1,103 @@
+"""What `manifest.json` says of each clip and of the whole set. It holds no time and no path."""
+
+import json
+from importlib.metadata import PackageNotFoundError, version
+
+from experiments.definition import Experiment
+from experiments.manifest import Clip, Manifest
+from stimuli_builder.clips.design_clips import Options, PlannedClip
+from stimuli_builder.clips.motion_blur import samples_per_frame
+from stimuli_builder.clips.state import RENDER_KEY, BuildState
+
+CONVENTIONS = (
+    "closure: 300 samples a second, 0 open, 1 closed, over the whole clip; output frame k at 30 fps stands "
+    "at sample 10 k + 5 and with motion blur is the mean of samples 10 k to 10 k + 9 in linear light",
+    "an exemplar of a textbook profile differs from the others in its sub-frame onset and in its resting "
+    "levels, both as drawn from the recorded blinks",
+)
+
+
+def program_version() -> str:
+    """The installed version of the program."""
+    try:
+        return version("palpebra")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def assemble(
+    experiment: Experiment,
+    definition_hash: str,
+    options: Options,
+    planned: list[PlannedClip],
+    state: BuildState,
+) -> Manifest:
+    """The manifest of a finished build, clips in design order."""
+    seed = options.seed_for(experiment)
+    clips = tuple(_clip(clip, state, seed) for clip in planned)
+    ocular = {
+        round(c.geometry.inter_ocular_mm * c.geometry.px_per_mm_at(c.settings.width_px), 4) for c in planned
+    }
+    return Manifest(
+        experiment=experiment.name,
+        definition_sha256=definition_hash,
+        program_version=program_version(),
+        seed=seed,
+        inter_ocular_px=ocular.pop() if len(ocular) == 1 else None,
+        notes=(*CONVENTIONS, *repetition_notes(planned)),
+        clips=clips,
+    )
+
+
+def repetition_notes(planned: list[PlannedClip]) -> tuple[str, ...]:
+    """A line for each recorded profile that stands for more than one exemplar of a cell."""
+    repeated = sorted({(c.job.curve.profile_id, c.spec.exemplar) for c in planned if c.repeated})
+    return tuple(
+        f"exemplar {number} shows the recorded profile {profile} for the second time in its cell"
+        for profile, number in repeated
+    )
+
+
+def manifest_text(manifest: Manifest) -> str:
+    """JSON with one line a clip; equal manifests give equal text."""
+    content = manifest.model_dump(mode="json")
+    clips = content.pop("clips")
+    head = json.dumps(content, indent=1, ensure_ascii=False)
+    lines = ",\n  ".join(json.dumps(clip, ensure_ascii=False, separators=(",", ":")) for clip in clips)
+    return f'{head[:-2]},\n "clips": [\n  {lines}\n ]\n}}\n'
+
+
+def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
+    job, settings, curve = clip.job, clip.settings, clip.job.curve
+    built = state[job.input_hash]
+    return Clip(
+        levels=dict(clip.spec.levels),
+        cell=clip.spec.cell,
+        exemplar=clip.spec.exemplar,
+        file=built.file,
+        sha256=built.sha256,
+        bytes=built.bytes,
+        fps=settings.fps,
+        frames=built.frames,
+        width_px=settings.width_px,
+        height_px=settings.height_px,
+        width_mm=round(settings.width_px / clip.geometry.px_per_mm_at(settings.width_px), 4),
+        profile=curve.profile_id,
+        profile_repeated=clip.repeated,
+        duration_frames=curve.duration_frames,
+        onset_frame=int(curve.onset_sample / samples_per_frame(settings.fps)),
+        closure=tuple(curve.closure.tolist()),
+        closure_other=() if curve.closure_other is None else tuple(curve.closure_other.tolist()),
+        inputs={
+            RENDER_KEY: job.input_hash,
+            "character": clip.geometry.name,
+            "character_sha256": job.look.fingerprint,
+            "profile": settings.profile,
+            "amplitude": settings.amplitude,
+            "motion_blur": str(settings.motion_blur).lower(),
+            "lower_lid": settings.lower_lid,
+            "eyes": settings.eyes,
+            "encoder": job.look.encoder,
+        },
+        seed=seed,
+    )

@@ -1,0 +1,72 @@
+"""`stimuli plan`: what an experiment's declaration expands to, before anything is rendered."""
+
+from pathlib import Path
+from typing import Any
+
+from experiments import design
+from experiments.definition import Experiment
+from stimuli_builder.clips.exemplars import recorded_order
+
+
+def summary(experiment: Experiment) -> dict[str, Any]:
+    """The design as plain values.
+
+    Keys
+    ----
+    name, title, participants : as declared.
+    factors : list of {name, label, levels: list of {name, label}}.
+    cells : list of cell labels, last factor fastest.
+    exemplars_per_cell, unique_clips, trials_per_participant, practice_trials : counts.
+    blocks : list of {label, trials} in declared order; order : how a participant's order is drawn.
+    expected_minutes : length of a visit.
+    repeated_profiles : list of {exemplar, profile, group}: recordings that stand for a second exemplar.
+    """
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "participants": experiment.participants,
+        "factors": [
+            {
+                "name": factor.name,
+                "label": factor.label,
+                "levels": [{"name": level.name, "label": level.label} for level in factor.levels],
+            }
+            for factor in experiment.factors
+        ],
+        "cells": ["/".join(level for _, level in cell) for cell in design.cells(experiment)],
+        "exemplars_per_cell": experiment.exemplars.per_cell,
+        "unique_clips": len(design.clips(experiment)),
+        "trials_per_participant": design.trials_per_participant(experiment),
+        "practice_trials": experiment.practice.trials,
+        "blocks": [{"label": block.label, "trials": len(block.clips)} for block in design.blocks(experiment)],
+        "order": experiment.blocks.order,
+        "expected_minutes": design.expected_minutes(experiment),
+        "repeated_profiles": repeated_profiles(experiment),
+    }
+
+
+def repeated_profiles(experiment: Experiment, seed: int | None = None) -> list[dict[str, Any]]:
+    """Exemplars whose recorded profile already stands for an earlier exemplar of the same cells."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for spec in design.clips(experiment):
+        settings = design.render_settings(experiment, spec)
+        group = design.exemplar_key(experiment, spec).rpartition("/")[0]
+        if settings.profile == "real" and group not in found:
+            order = recorded_order(
+                experiment.exemplars.per_cell,
+                experiment.exemplars.seed if seed is None else seed,
+                group,
+                paired=settings.eyes == "separate",
+            )
+            found[group] = [
+                {"exemplar": number, "profile": profile.profile_id, "group": group}
+                for number, (profile, repeated) in enumerate(order, start=1)
+                if repeated
+            ]
+    return [entry for entries in found.values() for entry in entries]
+
+
+def experiment_folder(name_or_path: str) -> Path | None:
+    """Folder that the files named in a TOML are relative to; None for a shipped experiment."""
+    path = Path(name_or_path)
+    return path.resolve().parent if path.is_file() else None

@@ -1,0 +1,97 @@
+"""What a folder of clips looks like: a contact sheet (PNG) and a page that plays every clip."""
+
+import json
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from jinja2 import Environment, PackageLoader
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from experiments.manifest import Clip, Manifest
+from stimuli_builder.clips.motion_blur import samples_per_frame
+from stimuli_builder.files import whole_file, whole_text
+
+Rgb = NDArray[np.uint8]
+THUMBNAIL_PX = (200, 75)
+LABEL_PX = 230
+PAPER, INK = (245, 244, 241), (40, 38, 36)
+PAGE_NAME, SHEET_NAME = "preview.html", "preview.png"
+
+
+def write_preview(manifest: Manifest, folder: Path) -> tuple[Path, Path]:
+    """Write `preview.png` and `preview.html` beside the clips; returns their paths."""
+    sheet, page = folder / SHEET_NAME, folder / PAGE_NAME
+    picture = Image.fromarray(contact_sheet(manifest, folder))
+    with whole_file(sheet) as temporary:
+        picture.save(temporary, "PNG", optimize=True)
+    with whole_text(page) as stream:
+        stream.write(page_text(manifest))
+    return sheet, page
+
+
+def contact_sheet(manifest: Manifest, folder: Path) -> Rgb:
+    """One row a cell: the blink of its first exemplar, frame by frame."""
+    firsts = [next(clips) for _, clips in groupby(manifest.clips, key=lambda clip: clip.cell)]
+    rows = [blink_frames(folder / clip.file, clip) for clip in firsts]
+    columns = max(len(frames) for frames in rows)
+    width, height = THUMBNAIL_PX
+    sheet = Image.new("RGB", (LABEL_PX + columns * (width + 2), len(rows) * (height + 2)), PAPER)
+    draw = ImageDraw.Draw(sheet)
+    font = ImageFont.load_default(15)
+    for number, (clip, frames) in enumerate(zip(firsts, rows, strict=True)):
+        top = number * (height + 2)
+        draw.multiline_text((8, top + 10), _label(clip), fill=INK, font=font, spacing=4)
+        for place, frame in enumerate(frames):
+            small = Image.fromarray(frame).resize(THUMBNAIL_PX, Image.Resampling.LANCZOS)
+            sheet.paste(small, (LABEL_PX + place * (width + 2), top))
+    return np.asarray(sheet)
+
+
+def blink_frames(path: Path, clip: Clip) -> list[Rgb]:
+    """The frames of a clip from the one before the blink to the one after it."""
+    start = max((clip.onset_frame or 0) - 1, 0)
+    length = (clip.duration_frames or 0) * clip.fps / 30
+    stop = start + int(np.ceil(length)) + 3
+    with av.open(str(path)) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    return frames[start:stop]
+
+
+def _label(clip: Clip) -> str:
+    length = f"{clip.duration_frames:g} frames" if clip.duration_frames else ""
+    return f"{clip.cell}\n{clip.profile}\n{length}"
+
+
+def page_text(manifest: Manifest) -> str:
+    """The page; it plays the files beside it and needs nothing from elsewhere."""
+    environment = Environment(loader=PackageLoader("stimuli_builder.clips", "templates"), autoescape=True)
+    # Inside a script element only "</" could end it early.
+    encoded = partial(json.dumps, ensure_ascii=True, separators=(",", ":"))
+    data = encoded([_clip_data(clip) for clip in manifest.clips]).replace("</", "<\\/")
+    factors = {
+        name: sorted({clip.levels[name] for clip in manifest.clips}) for name in manifest.clips[0].levels
+    }
+    template = environment.get_template("preview.html.j2")
+    return template.render(manifest=manifest, factors=factors, data=data)
+
+
+def _clip_data(clip: Clip) -> dict[str, Any]:
+    step = max(1, round(samples_per_frame(clip.fps) / 5))
+    return {
+        "file": clip.file,
+        "levels": clip.levels,
+        "cell": clip.cell,
+        "exemplar": clip.exemplar,
+        "profile": clip.profile,
+        "repeated": clip.profile_repeated,
+        "frames": clip.frames,
+        "fps": clip.fps,
+        "duration": clip.duration_frames,
+        "curve": [round(value, 3) for value in clip.closure[::step]],
+        "other": [round(value, 3) for value in clip.closure_other[::step]],
+    }

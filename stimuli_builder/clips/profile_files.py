@@ -1,0 +1,96 @@
+"""Blinks from files of closure samples at 300 fps: a table of profiles, or one blink alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.blinks.profile import Array, BlinkProfile
+from stimuli_builder.blinks.profile_table import read_profile_table
+
+COLUMNS = ("closure", "closure_other", "lower_up_mm", "lower_nasal_mm")
+
+
+def read_closure_file(path: Path) -> list[BlinkProfile]:
+    """Read blinks from a CSV file.
+
+    A file with a column `profile_id` is a table of profiles as `stimuli blinks` writes it. Any other
+    holds one blink: a column `closure` (0 open, 1 closed) at 300 fps, and where wanted `closure_other`
+    (right eye), `lower_up_mm` and `lower_nasal_mm`; or numbers alone, one a line.
+
+    Raises
+    ------
+    InputError
+        The file is missing, has no closure, or a sample is no number between 0 and 1.
+    """
+    table = _table(path)
+    if "profile_id" in table.columns:
+        return read_profile_table(path)
+    unknown = [str(name) for name in table.columns if name not in COLUMNS]
+    if "closure" not in table.columns:
+        raise InputError(f"{path.name}: no column 'closure'{did_you_mean('closure', unknown)}")
+    signals = {name: _numbers(path, table, name) for name in COLUMNS if name in table.columns}
+    closure = signals["closure"]
+    for name, values in signals.items():
+        if name.startswith("closure"):
+            _require_closure(path, name, values)
+    minimum = int(np.argmax(closure))
+    if not 0 < minimum < len(closure) - 1:
+        raise InputError(
+            f"{path.name}: the greatest closure must lie inside the blink, it is sample {minimum + 1} "
+            f"of {len(closure)}; add the closing and the opening"
+        )
+    return [
+        BlinkProfile(
+            profile_id=f"file-{path.stem}",
+            closure=closure,
+            minimum_index=minimum,
+            down_frames=minimum,
+            up_frames=len(closure) - 1 - minimum,
+            amplitude=float(np.ptp(closure)),
+            source=f"file {path.name}",
+            eye="both" if "closure_other" in signals else None,
+            closure_other=signals.get("closure_other"),
+            lower_up_mm=signals.get("lower_up_mm"),
+            lower_nasal_mm=signals.get("lower_nasal_mm"),
+        )
+    ]
+
+
+def _table(path: Path) -> pd.DataFrame:
+    if not path.is_file():
+        raise InputError(f"{path}: expected a CSV file of closure samples, found none; check the path")
+    try:
+        table = pd.read_csv(path)
+        if all(_is_number(str(name)) for name in table.columns):
+            table = pd.read_csv(path, header=None, names=["closure"])
+    except (ValueError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path.name}: not a CSV file that can be read ({error})") from error
+    return table
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(path: Path, table: pd.DataFrame, name: str) -> Array:
+    values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        found = table[name].iloc[int(wrong[0])]
+        raise InputError(f"{path.name}: {name} must be a number, sample {wrong[0] + 1} is {found!r}")
+    return values
+
+
+def _require_closure(path: Path, name: str, values: Array) -> None:
+    outside = np.flatnonzero((values < 0) | (values > 1))
+    if len(outside):
+        raise InputError(
+            f"{path.name}: {name} must lie between 0 (open) and 1 (closed), sample {outside[0] + 1} is "
+            f"{values[outside[0]]:g}"
+        )

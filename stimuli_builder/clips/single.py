@@ -1,0 +1,69 @@
+"""One clip outside any experiment."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from experiments.errors import InputError, did_you_mean
+from experiments.rendering import PROFILES, RenderSettings
+from stimuli_builder.blinks.library import load_library
+from stimuli_builder.blinks.profile import resample
+from stimuli_builder.clips.characters import geometry
+from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve
+from stimuli_builder.clips.design_clips import Options, check_look, look_of
+from stimuli_builder.clips.exemplars import Exemplar, exemplar
+from stimuli_builder.clips.jobs import ClipJob, render
+from stimuli_builder.clips.motion_blur import samples_per_frame
+from stimuli_builder.files import whole_file
+
+
+@dataclass(frozen=True)
+class SingleClip:
+    """What `stimuli clip` was asked for; `profile` may also be the name of a shipped recording."""
+
+    settings: RenderSettings
+    profile: str
+    exemplar: int = 1
+    seed: int = 2011
+    clip_frames: int | None = None
+    barcode: bool = False
+
+
+@dataclass(frozen=True)
+class Made:
+    """A clip that was written."""
+
+    curve: ClipCurve
+    frames: int
+    onset_frame: int
+
+
+def render_single(wanted: SingleClip, out: Path) -> Made:
+    """Render one clip into `out`, whole or not at all."""
+    settings = wanted.settings
+    check_look(settings, geometry(settings.character))
+    shown = _blink(wanted)
+    timing = Timing.drawn(settings.fps, shown.phase_samples, wanted.seed, wanted.profile, wanted.exemplar)
+    curve = clip_curve(shown.profile, timing, settings.lower_lid, wanted.clip_frames)
+    job = ClipJob(look_of(settings, Options(barcode=wanted.barcode)), curve)
+    with whole_file(out) as temporary:
+        temporary.write_bytes(render(job))
+    return Made(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))
+
+
+def _blink(wanted: SingleClip) -> Exemplar:
+    settings = wanted.settings
+    if wanted.profile in PROFILES or wanted.profile.endswith(".csv"):
+        chosen = settings.model_copy(update={"profile": wanted.profile})
+        return exemplar(chosen, wanted.profile, wanted.exemplar, wanted.seed)
+    shipped = {p.profile_id: p for paired in (False, True) for p in load_library(paired=paired)}
+    if wanted.profile not in shipped:
+        names = [*PROFILES, *shipped]
+        raise InputError(f"no blink profile '{wanted.profile}'{did_you_mean(wanted.profile, names)}")
+    profile = shipped[wanted.profile]
+    if settings.duration_frames is not None:
+        profile = resample(profile, settings.duration_frames)
+    if settings.eyes == "separate" and profile.closure_other is None:
+        raise InputError(f"profile {wanted.profile} shows one eye; --eyes separate needs one of both eyes")
+    if settings.eyes == "alike":
+        profile = replace(profile, closure_other=None)
+    return Exemplar(amplitude_of(profile, settings.amplitude), repeated=False, phase_samples=0)

@@ -1,0 +1,145 @@
+"""`stimuli verify`: are the clips what the manifest says, byte for byte and pixel for pixel?"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from experiments.manifest import MANIFEST_NAME, Clip, file_sha256, read_manifest
+from stimuli_builder.clips.build import Progress, silent
+from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
+from stimuli_builder.clips.levels import load_levels
+from stimuli_builder.clips.opening import OpeningMeter
+
+TOLERANCE_MM = 0.3
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong with a clip."""
+
+    clip: Clip
+    problem: str
+
+    def __str__(self) -> str:
+        return f"{self.clip.file[:12]}... ({self.clip.cell}, exemplar {self.clip.exemplar}): {self.problem}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check of a folder found.
+
+    `opening_checked` counts the clips whose eyelid opening was measured in the pixels; clips of a
+    character that has changed since, or that is not here, cannot be measured. `worst_opening_mm` is the
+    largest distance between measured and promised opening.
+    """
+
+    clips: int
+    findings: tuple[Finding, ...]
+    opening_checked: int
+    worst_opening_mm: float
+
+
+def verify(folder: Path, beside: Path | None = None, progress: Progress = silent) -> Verdict:
+    """Check every clip of a folder's manifest: presence, hash, size, frames, timing, opening in pixels.
+
+    Raises
+    ------
+    InputError
+        There is no manifest that can be read.
+    """
+    manifest = read_manifest(folder)
+    clips = sorted(manifest.clips, key=lambda clip: (clip.inputs.get("character", ""), clip.width_px))
+    meters = _Meters(beside)
+    findings: list[Finding] = []
+    checked, worst = 0, 0.0
+    for number, clip in enumerate(clips, start=1):
+        problems, error_mm = _check(clip, folder, meters)
+        findings += [Finding(clip, problem) for problem in problems]
+        if error_mm is not None:
+            checked, worst = checked + 1, max(worst, error_mm)
+        progress(number, len(clips))
+    return Verdict(len(clips), tuple(findings), checked, worst)
+
+
+def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], float | None]:
+    path = folder / clip.file
+    if not path.is_file():
+        return [f"missing from {folder}"], None
+    if file_sha256(path) != clip.sha256:
+        return [f"its bytes are not those of the {MANIFEST_NAME} (another sha256)"], None
+    try:
+        pictures, problems = _decoded(path, clip)
+    except (av.error.FFmpegError, InputError, ValueError) as error:
+        return [f"cannot be decoded ({error})"], None
+    meter = meters.of(clip)
+    if problems or meter is None or not clip.closure or clip.closure_other:
+        return problems, None
+    off = np.abs(meter.measured_mm(pictures) - meter.promised_mm(clip))
+    worst = float(off.max())
+    if worst > TOLERANCE_MM:
+        problems.append(
+            f"frame {int(off.argmax())}: the eye is open {worst:.2f} mm more or less than the curve says"
+        )
+    return problems, worst
+
+
+def _decoded(path: Path, clip: Clip) -> tuple[NDArray[np.uint8], list[str]]:
+    """Luma of every frame, and what is wrong with number, size and timing."""
+    with av.open(str(path)) as container:
+        stream: Any = container.streams.video[0]
+        frames = list(container.decode(stream))
+    problems = list(_timing_problems(stream, frames, clip))
+    if not frames:
+        raise InputError("no frame")
+    luma = [frame.to_ndarray(format="yuv420p")[: frame.height] for frame in frames]
+    return np.stack(luma), problems
+
+
+def _timing_problems(stream: Any, frames: list[Any], clip: Clip) -> Iterator[str]:
+    if len(frames) != clip.frames:
+        yield f"expected {clip.frames} frames, got {len(frames)}"
+    if (stream.width, stream.height) != (clip.width_px, clip.height_px):
+        yield f"expected {clip.width_px} x {clip.height_px} px, got {stream.width} x {stream.height}"
+    wanted = 1 / Fraction(clip.fps).limit_denominator(1001)
+    times = [frame.pts * frame.time_base for frame in frames if frame.pts is not None]
+    if len(times) != len(frames) or any(abs(t - k * wanted) > wanted / 100 for k, t in enumerate(times)):
+        yield f"its frames are not spaced evenly at {clip.fps:g} fps"
+    if stream.codec_context.has_b_frames:
+        yield "it holds B-frames"
+
+
+class _Meters:
+    """One opening meter at a time: clips come sorted by character and size."""
+
+    def __init__(self, beside: Path | None) -> None:
+        self._beside = beside
+        self._key: tuple[str, str, int, int] | None = None
+        self._meter: OpeningMeter | None = None
+
+    def of(self, clip: Clip) -> OpeningMeter | None:
+        """The meter of a clip's character; None where it is not here or looks different now."""
+        name, wanted = clip.inputs.get("character", ""), clip.inputs.get("character_sha256", "")
+        key = (name, wanted, clip.width_px, clip.height_px)
+        if key != self._key:
+            self._key, self._meter = key, self._made(name, wanted, (clip.width_px, clip.height_px))
+        return self._meter
+
+    def _made(self, name: str, wanted: str, size_px: tuple[int, int]) -> OpeningMeter | None:
+        place = name if name in shipped_names() else self._found_beside(name)
+        if place is None or fingerprint(place, self._beside) != wanted:
+            return None
+        return OpeningMeter(
+            load_levels(place, size_px, self._beside), geometry(place, self._beside).opening_mm
+        )
+
+    def _found_beside(self, name: str) -> str | None:
+        folders = (self._beside or Path()).glob("*/character.toml")
+        matching = (file.parent.name for file in folders if f'name = "{name}"' in file.read_text("utf-8"))
+        return next(matching, None)
