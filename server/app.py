@@ -15,8 +15,10 @@ from server.context import open_services
 from server.errors import install_error_handlers
 from server.export import endpoints as export
 from server.middleware import BodyLimit, SecurityHeaders
+from server.library import endpoints as library
 from server.monitor import endpoints as monitor
 from server.participants import endpoints as participants
+from server.reports import endpoints as reports
 from server.results import endpoints as results
 from server.runs import endpoints as runs
 from server.settings import Settings
@@ -40,6 +42,8 @@ def _routers() -> tuple[APIRouter, ...]:
         results.router,
         runs.router,
         export.router,
+        reports.router,
+        library.router,
         pages.router,
     )
 

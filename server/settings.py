@@ -40,6 +40,10 @@ class Settings(BaseSettings):
         default=REPOSITORY / "frontend" / "dist",
         description="Folder of the built pages (participant, admin).",
     )
+    library_folder: Path = Field(
+        default=REPOSITORY / "stimuli_builder" / "blinks" / "library",
+        description="Folder of the shipped blink profiles and model, for the figures page.",
+    )
     max_body_bytes: int = Field(default=512 * 1024, ge=1024, description="Largest request of a participant.")
     max_upload_bytes: int = Field(
         default=2 * 1024**3, ge=1024, description="Largest request of an experimenter, clip uploads included."

@@ -1,0 +1,71 @@
+"""The shipped blinks, recorded and modelled, for the figures page. Read from the files that ship with `stimuli`."""
+
+import csv
+import json
+from collections import defaultdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from server.accounts.identity import Viewer
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES, NotFound
+
+router = APIRouter(prefix="/api/admin/blinks", tags=["blinks"], responses=ERROR_RESPONSES)
+
+
+class RecordedProfile(BaseModel):
+    """One recorded blink of one eye at 300 fps."""
+
+    profile_id: str
+    recording: str
+    person: str
+    eye: str
+    down_frames: int
+    up_frames: int
+    amplitude: float
+    minimum_index: int
+    source: str
+    licence: str
+    closure: list[float] = Field(description="Closure per frame at `fps`: 0 open, 1 closed.")
+
+
+class BlinkLibrary(BaseModel):
+    """The recorded profiles, and the PCA model as `stimuli model fit` wrote it."""
+
+    fps: float
+    profiles: list[RecordedProfile]
+    model: dict[str, Any]
+
+
+@router.get("/library")
+def get_library(services: ServicesDep, _who: Viewer) -> BlinkLibrary:
+    """Recorded profiles and the PCA model."""
+    folder = services.settings.library_folder
+    if not (folder / "profiles.csv").is_file():
+        raise NotFound("The blink library is not on this server.")
+    return _library(folder, (folder / "profiles.csv").stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=2)
+def _library(folder: Path, _changed_ns: int) -> BlinkLibrary:
+    curves: dict[str, list[float]] = defaultdict(list)
+    for row in _rows(folder / "closures.csv"):
+        curves[row["profile_id"]].append(float(row["closure"]))
+    profiles = [
+        RecordedProfile.model_validate(
+            {name: row[name] for name in RecordedProfile.model_fields if name in row}
+            | {"closure": curves[row["profile_id"]]}
+        )
+        for row in _rows(folder / "profiles.csv")
+    ]
+    model = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    return BlinkLibrary(fps=float(model.get("fps", 300)), profiles=profiles, model=model)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return [row for row in csv.DictReader(stream)]

@@ -1,0 +1,149 @@
+"""Build a study's report: export its ratings, run `analysis run` as a process of its own, keep what it wrote."""
+
+import shutil
+import subprocess
+import sys
+import threading
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.accounts.audit import record
+from server.accounts.identity import Identity
+from server.clock import now
+from server.context import Services
+from server.errors import Conflict, NotFound
+from server.export.pieces import csv_pieces, rating_table
+from server.models import Job, Study
+from server.reports.schemas import NewReport, ReportOut
+from server.studies.lookup import active_version, find_study
+from server.tokens import new_public_id
+
+KIND = "report"
+LONGEST_S = 1800
+_one_at_a_time = threading.Lock()
+
+
+def start(services: Services, name: str, wanted: NewReport, who: Identity) -> ReportOut:
+    """Queue a report and begin it in the background; Conflict where one of this study is under way."""
+    with services.database.write() as session:
+        study = find_study(session, name)
+        for job in _jobs(session, study):
+            if job.status in ("queued", "running") and not _abandoned(job):
+                raise Conflict("A report of this study is being built already; wait for it.")
+        job = Job(
+            public_id=new_public_id(),
+            kind=KIND,
+            study_id=study.id,
+            message="waiting",
+            parameters=wanted.model_dump(),
+            created_by=who.account_id,
+        )
+        session.add(job)
+        record(session, who, "report asked for", "study", name, **wanted.model_dump())
+        session.flush()
+        shown = report_out(services, job)
+    threading.Thread(target=_build, args=(services, name, shown.id, wanted), daemon=True).start()
+    return shown
+
+
+def _abandoned(job: Job) -> bool:
+    # The server that ran it was stopped: no report takes this long.
+    return now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
+
+
+def _jobs(session: Session, study: Study) -> list[Job]:
+    query = select(Job).where(Job.study_id == study.id, Job.kind == KIND)
+    return list(session.scalars(query.order_by(Job.id.desc()).limit(20)))
+
+
+def reports(services: Services, session: Session, name: str) -> list[ReportOut]:
+    """The latest reports of a study."""
+    return [report_out(services, job) for job in _jobs(session, find_study(session, name))]
+
+
+def report_out(services: Services, job: Job) -> ReportOut:
+    """A report as the page shows it."""
+    folder = report_folder(services, job.public_id)
+    done = job.status == "done" and folder.is_dir()
+    stale = job.status in ("queued", "running") and _abandoned(job)
+    return ReportOut.model_validate(
+        {
+            "id": job.public_id,
+            "status": "failed" if stale else job.status,
+            "progress": job.progress,
+            "message": "the server was stopped while it was built" if stale else job.message,
+            "phase": job.parameters.get("phase", "live"),
+            "created_at": job.created_at,
+            "finished_at": job.finished_at,
+            "files": sorted(path.name for path in folder.iterdir() if path.is_file()) if done else [],
+        }
+    )
+
+
+def report_folder(services: Services, public_id: str) -> Path:
+    """Where the files of a report lie."""
+    return services.settings.data_folder / "reports" / public_id
+
+
+def report_file(services: Services, session: Session, name: str, public_id: str, file: str) -> Path:
+    """One file of a finished report; NotFound where it is not one of its files."""
+    study = find_study(session, name)
+    job = session.scalar(select(Job).where(Job.study_id == study.id, Job.public_id == public_id))
+    if job is None or file not in report_out(services, job).files:
+        raise NotFound("There is no such report, or it has no such file.")
+    return report_folder(services, public_id) / file
+
+
+def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> None:
+    """The background thread: every end, good or bad, is written to the job."""
+    folder = report_folder(services, public_id)
+    inputs = folder.with_name(f".{public_id}.input")
+    try:
+        with _one_at_a_time:
+            _note(services, public_id, status="running", progress=0.05, message="exporting", started_at=now())
+            _export(services, name, inputs)
+            _note(services, public_id, progress=0.2, message="analysing")
+            message = _analyse(inputs, folder, wanted)
+        status = "failed" if message else "done"
+        _note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
+    except (OSError, subprocess.SubprocessError, NotFound) as error:
+        _note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
+    finally:
+        shutil.rmtree(inputs, ignore_errors=True)
+
+
+def _export(services: Services, name: str, inputs: Path) -> None:
+    inputs.mkdir(parents=True, exist_ok=True)
+    with services.database.read() as session:
+        study = find_study(session, name)
+        toml = active_version(session, study).definition_toml
+        (inputs / "definition.toml").write_text(toml, encoding="utf-8")
+        with (inputs / "ratings.csv").open("wb") as stream:
+            for piece in csv_pieces(rating_table(session, study)):
+                stream.write(piece)
+
+
+def _analyse(inputs: Path, folder: Path, wanted: NewReport) -> str:
+    """Run the analysis; return its own error line where it failed, else an empty text."""
+    program = Path(sys.executable).with_name("analysis")
+    command = [str(program), "run", str(inputs / "definition.toml"), "--csv", str(inputs / "ratings.csv")]
+    command += ["--phase", wanted.phase, "--out", str(folder)]
+    command += [] if wanted.sensitivity else ["--no-sensitivity"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603
+    if done.returncode == 0:
+        return ""
+    lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
+    shutil.rmtree(folder, ignore_errors=True)
+    return (lines[-1] if lines else f"the analysis ended with code {done.returncode}")[:500]
+
+
+def _note(services: Services, public_id: str, **values: Any) -> None:
+    with services.database.write() as session:
+        job = session.scalar(select(Job).where(Job.public_id == public_id))
+        if job is not None:
+            for name, value in values.items():
+                setattr(job, name, value)
