@@ -1,0 +1,12 @@
+"""Every server test runs on SQLite and PostgreSQL; see tests/helpers."""
+
+from tests.helpers.databases import (  # noqa: F401 - fixtures
+    database_url,
+    empty_database_url,
+    postgres_server,
+    postgres_template,
+    services,
+    settings,
+    sqlite_template,
+)
+from tests.helpers.studies import client, participant, study  # noqa: F401 - fixtures

