@@ -14,8 +14,8 @@ from server.clips import endpoints as clips
 from server.context import open_services
 from server.errors import install_error_handlers
 from server.export import endpoints as export
-from server.middleware import BodyLimit, SecurityHeaders
 from server.library import endpoints as library
+from server.middleware import BodyLimit, SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.participants import endpoints as participants
 from server.reports import endpoints as reports

@@ -1,4 +1,4 @@
-"""The shipped blinks, recorded and modelled, for the figures page. Read from the files that ship with `stimuli`."""
+"""The shipped blinks, recorded and modelled, read from the files that come with `stimuli`."""
 
 import csv
 import json
@@ -68,4 +68,4 @@ def _library(folder: Path, _changed_ns: int) -> BlinkLibrary:
 
 def _rows(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as stream:
-        return [row for row in csv.DictReader(stream)]
+        return list(csv.DictReader(stream))
