@@ -117,6 +117,10 @@ class CalibrationState(BaseModel):
     method: Literal["card", "ruler"]
     viewing_distance_mm: float | None
     device_pixel_ratio: float
+    screen_width_px: int
+    screen_height_px: int
+    window_width_px: int
+    window_height_px: int
     zoom: float
 
 
