@@ -81,7 +81,9 @@ class _Search:
         """Make a few random moves, to leave a dead end."""
         for _ in range(KICK):
             person, cell = self.rng.integers(self.sums.shape[0]), self.rng.integers(self.sums.shape[1])
-            self.sums[person, cell] = np.clip(self.sums[person, cell] + self.rng.choice(self.signs), self.low, self.high)
+            self.sums[person, cell] = np.clip(
+                self.sums[person, cell] + self.rng.choice(self.signs), self.low, self.high
+            )
 
     def two_moves(self, below: float) -> float:
         """Make the best pair of moves met that brings the loss under `below`; the loss reached."""
@@ -110,7 +112,7 @@ def repair(
     targets: Targets,
     rng: np.random.Generator,
     progress: Callable[[int, int], None] | None = None,
-    maximum_steps: int = 3000,
+    maximum_steps: int = 80,
 ) -> Repaired:
     """Find whole sums of `trials` ratings near `cell_means` (n, cells) that hit every target.
 

@@ -1,0 +1,142 @@
+"""The REML criterion of crossed participants and items from cross-products, with its gradient.
+
+Model: y = X b + U_p a + U_c c + e with a_i = Lp u_i (p random coefficients of participant i), c = lambda v, u, v standard
+normal times sigma. theta are the free entries of Lp, then lambda (relative to sigma), as in lme4 (Bates et al. 2015,
+doi:10.18637/jss.v067.i01). Everything after the cross-products is independent of the number of trials.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class CrossProducts:
+    """Sums over trials: N participants with p coefficients, J items, f fixed effects.
+
+    `pp` (N, p, p), `pc` (N, p, J), `cc` (J,), `pb` (N, p, f + 1), `cb` (J, f + 1), `bb` (f + 1, f + 1); the last
+    column of b is y. `patterns` (m, p, p): Lp = sum of theta_k patterns_k.
+    """
+
+    n: int
+    pp: Floats = field(repr=False)
+    pc: Floats = field(repr=False)
+    cc: Floats = field(repr=False)
+    pb: Floats = field(repr=False)
+    cb: Floats = field(repr=False)
+    bb: Floats = field(repr=False)
+    patterns: Floats = field(repr=False)
+
+    @property
+    def f(self) -> int:
+        """Number of fixed effects."""
+        return self.bb.shape[0] - 1
+
+
+def cross_products(
+    x: Floats, z: Floats, y: Floats, participant: Integers, item: Integers, patterns: Floats
+) -> CrossProducts:
+    """Cross-products of trials: x (n, f), z (n, p), y (n,), codes (n,)."""
+    n, people, items = len(y), int(participant.max()) + 1, int(item.max()) + 1
+    b = np.column_stack([x, y])
+    ones, trial = np.ones(n), np.arange(n)
+    by_person = sparse.csr_matrix((ones, (participant, trial)), shape=(people, n))
+    by_item = sparse.csr_matrix((ones, (item, trial)), shape=(items, n))
+    by_pair = sparse.csr_matrix((ones, (participant * items + item, trial)), shape=(people * items, n))
+    p, width = z.shape[1], b.shape[1]
+    pp = (by_person @ (z[:, :, None] * z[:, None, :]).reshape(n, -1)).reshape(people, p, p)
+    pc = (by_pair @ z).reshape(people, items, p).transpose(0, 2, 1).copy()
+    pb = np.stack([by_person @ (z[:, [k]] * b) for k in range(p)], axis=1).reshape(people, p, width)
+    return CrossProducts(
+        n, pp, pc, np.bincount(item, minlength=items).astype(np.float64), pb, by_item @ b, b.T @ b, patterns
+    )
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """The model at one theta: deviance parts, estimates, and their derivatives.
+
+    `h` = log|M| + log|X'V^-1 X|, `r2` the penalised residual sum of squares; `grad_h`, `grad_r2` (m + 1,).
+    `unscaled` (f, f) is the covariance of beta over sigma^2, `unscaled_grad` (m + 1, f, f) its derivative.
+    """
+
+    n: int
+    h: float
+    r2: float
+    grad_h: Floats = field(repr=False)
+    grad_r2: Floats = field(repr=False)
+    beta: Floats = field(repr=False)
+    unscaled: Floats = field(repr=False)
+    unscaled_grad: Floats = field(repr=False)
+
+    @property
+    def sigma(self) -> float:
+        """Residual standard deviation at this theta."""
+        return float(np.sqrt(self.r2 / (self.n - len(self.beta))))
+
+    @property
+    def value(self) -> float:
+        """The REML criterion (-2 log restricted likelihood) profiled over beta and sigma."""
+        nu = self.n - len(self.beta)
+        return float(self.h + nu * (1 + np.log(2 * np.pi * self.r2 / nu)))
+
+    @property
+    def gradient(self) -> Floats:
+        """Gradient of `value`, (m + 1,)."""
+        return self.grad_h + (self.n - len(self.beta)) * self.grad_r2 / self.r2
+
+
+def criterion(c: CrossProducts, theta: Floats) -> Criterion:
+    """Evaluate the REML criterion and its exact gradient at theta (m + 1,)."""
+    f, lp, lam = c.f, np.tensordot(theta[:-1], c.patterns, 1), float(theta[-1])
+    p, items = lp.shape[0], len(c.cc)
+    gl = c.pp @ lp
+    mp = lp.T @ gl + np.eye(p)
+    vc, vb = lp.T @ c.pc, lp.T @ c.pb
+    solved = np.linalg.solve(mp, np.concatenate([vc, vb], axis=2))
+    wc, wb = solved[:, :, :items], solved[:, :, items:]
+    # kc: U_c' (I + U_p Lp Lp' U_p')^-1 U_c, the items' cross-product with participants taken out
+    kc = np.diag(c.cc) - vc.reshape(-1, items).T @ wc.reshape(-1, items)
+    kb = c.cb - np.einsum("ipj,ipb->jb", vc, wb, optimize=True)
+    factor = linalg.cho_factor(np.eye(items) + lam**2 * kc)
+    inverse = linalg.cho_solve(factor, np.eye(items))
+    xc = lam * (inverse @ kb)
+    xp = wb - lam * (wc @ xc)
+    d = c.bb - np.einsum("ipa,ipb->ab", vb, xp, optimize=True) - lam * c.cb.T @ xc
+    a, unscaled = d[:f, :f], np.linalg.inv(d[:f, :f])
+    beta = unscaled @ d[:f, f]
+    r2 = float(d[f, f] - d[f, :f] @ beta)
+    log_m = np.linalg.slogdet(mp)[1].sum() + 2 * np.log(np.diag(factor[0])).sum()
+    h = float(log_m + np.linalg.slogdet(a)[1])
+    # t: U' V^-1 [X y] of participants (N, p, f + 1) and of items (J, f + 1)
+    tp = c.pb - gl @ xp - lam * (c.pc @ xc)
+    tc = inverse @ kb
+    q = c.pc - gl @ wc
+    within = c.pp - gl @ np.linalg.solve(mp, gl.transpose(0, 2, 1))
+    k = within.sum(axis=0) - lam**2 * np.einsum(
+        "ipj,ijr->pr", q, inverse @ q.transpose(0, 2, 1), optimize=True
+    )
+    k -= np.einsum("ipa,ab,irb->pr", tp[:, :, :f], unscaled, tp[:, :, :f], optimize=True)
+    k_item = float(np.vdot(inverse, kc)) - float(np.vdot(tc[:, :f] @ unscaled, tc[:, :f]))
+    up, uc = tp[:, :, f] - tp[:, :, :f] @ beta, tc[:, f] - tc[:, :f] @ beta
+    grad_h = np.r_[2 * np.tensordot(c.patterns, k @ lp, 2), 2 * lam * k_item]
+    grad_r2 = np.r_[-2 * np.tensordot(c.patterns, up.T @ up @ lp, 2), -2 * lam * float(uc @ uc)]
+    return Criterion(
+        c.n, h, r2, grad_h, grad_r2, beta, unscaled, _unscaled_grad(c, lp, lam, tp, tc, unscaled)
+    )
+
+
+def _unscaled_grad(
+    c: CrossProducts, lp: Floats, lam: float, tp: Floats, tc: Floats, unscaled: Floats
+) -> Floats:
+    """Derivative of (X'V^-1 X)^-1 by every theta: A^-1 X'V^-1 dV V^-1 X A^-1."""
+    f = len(unscaled)
+    scaled, items = tp[:, :, :f] @ unscaled, tc[:, :f] @ unscaled
+    rotated = lp.T @ scaled
+    half = np.stack([np.einsum("ipa,pr,irb->ab", scaled, s, rotated, optimize=True) for s in c.patterns])
+    return np.concatenate([half + half.transpose(0, 2, 1), 2 * lam * (items.T @ items)[None]])

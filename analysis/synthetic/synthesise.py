@@ -1,0 +1,147 @@
+"""Make the ratings of synthetic participants that give published (or wished) figures."""
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.synthetic.feasible import GivenWay, make_feasible
+from analysis.synthetic.moves import value_of
+from analysis.synthetic.population import Population, draw, make_population
+from analysis.synthetic.published import Published, load_published
+from analysis.synthetic.repair import Missed, Repaired, repair
+from analysis.synthetic.space import DesignSpace
+from analysis.synthetic.targets import Targets, make_targets
+from analysis.synthetic.trials import rating_rows
+from analysis.synthetic.wishes import with_wishes
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.load import load_experiment
+from experiments.ratings import csv_header
+
+ATTEMPTS = 40
+"""Fresh draws of participants before the best is kept and what it misses is reported."""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """One wanted figure and what the synthetic data give."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def hit(self) -> bool:
+        """Whether the value lies in its window."""
+        return self.low <= self.value <= self.high
+
+
+@dataclass(frozen=True)
+class Synthetic:
+    """Synthetic participants: cell sums (n, cells) and how the wanted figures came out."""
+
+    experiment: Experiment
+    space: DesignSpace
+    seed: int
+    trials_per_cell: int
+    sums: NDArray[np.int64] = field(repr=False)
+    reached: tuple[Reached, ...]
+    missed: tuple[Missed, ...]
+    given_way: tuple[GivenWay, ...]
+    attempts: int
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Cell means (n, levels of the first factor, ...)."""
+        return (self.sums / self.trials_per_cell).reshape(len(self.sums), *self.space.shape)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be made: the figures, the design and the population behind them."""
+
+    experiment: Experiment
+    space: DesignSpace
+    published: Published
+    targets: Targets
+    given_way: tuple[GivenWay, ...]
+
+
+def make_plan(
+    name: str, n: int | None = None, means: Sequence[str] = (), effects: Sequence[str] = ()
+) -> Plan:
+    """Figures of exp1, exp2 or exp3 with the user's wishes, made jointly possible."""
+    published = load_published(name)
+    experiment = load_experiment(published.experiment)
+    space = DesignSpace.of(experiment)
+    people = experiment.participants if n is None else n
+    widest = max(c.shape[1] for c in space.effects.values())
+    if people < widest + 2:
+        raise InputError(f"expected at least {widest + 2} participants for {name}, got {people}")
+    published, given_way = make_feasible(with_wishes(published, space, means, effects), space)
+    return Plan(experiment, space, published, make_targets(published, space, people), given_way)
+
+
+def population_of(plan: Plan, rng: np.random.Generator) -> Population:
+    """Means and covariance that give the plan's figures."""
+    return make_population(plan.published, plan.space, plan.targets, rng)
+
+
+def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | None = None) -> Synthetic:
+    """Draw participants and mend them until every figure holds; the best of ATTEMPTS draws where none does.
+
+    `progress` gets (figures missed, rounds done).
+    """
+    rng = np.random.default_rng(seed)
+    trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
+    scale = (plan.experiment.trial.scale.minimum, plan.experiment.trial.scale.maximum)
+    best: Repaired | None = None
+    rounds = 0
+    for attempt in range(1, ATTEMPTS + 1):
+        start = draw(population_of(plan, rng), plan.targets.n, rng, exact=True)
+        found = repair(
+            start, trials, scale, plan.targets, rng, lambda m, s, r=rounds: progress and progress(m, r + s)
+        )
+        rounds += found.steps
+        if best is None or len(found.missed) < len(best.missed):
+            best = found
+        if not best.missed:
+            break
+    if best is None:
+        raise InputError("expected at least one attempt")
+    y = best.sums / trials
+    wanted = (
+        *plan.targets.means,
+        *plan.targets.spreads,
+        *plan.targets.tests,
+        *plan.targets.pairs,
+        *plan.targets.directions,
+    )
+    reached = tuple(Reached(t.name, value_of(y, t), t.low, t.high) for t in wanted)
+    return Synthetic(
+        plan.experiment, plan.space, seed, trials, best.sums, reached, best.missed, plan.given_way, attempt
+    )
+
+
+def write_ratings(synthetic: Synthetic, out: Path) -> int:
+    """Write the ratings as the server's CSV export, every row marked synthetic; the number of rows."""
+    header = csv_header(synthetic.experiment.factor_names)
+    rng = np.random.default_rng([synthetic.seed, 1])
+    temporary = out.with_name(f".{out.name}.part")
+    count = 0
+    try:
+        with temporary.open("w", newline="", encoding="utf-8") as handle:
+            writer = csv.DictWriter(handle, header, lineterminator="\n")
+            writer.writeheader()
+            for row in rating_rows(synthetic.experiment, synthetic.space, synthetic.sums, rng):
+                writer.writerow(row)
+                count += 1
+        temporary.replace(out)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return count
