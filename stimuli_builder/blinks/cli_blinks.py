@@ -45,7 +45,7 @@ def blinks(
     ] = None,
     preset: Annotated[
         str,
-        typer.Option(help="Values of the rule: 'relative' to the opening, or the 'paper' 's 0.1 px a frame."),
+        typer.Option(help="Values of the rule: 'relative' to the opening, or 'paper' (0.1 px a frame)."),
     ] = "relative",
     gradient: Annotated[
         float | None, typer.Option(help="Gradient at rest, as part of the opening per frame at 300 fps.")
@@ -57,7 +57,7 @@ def blinks(
         float | None, typer.Option(help="Opening in px that --gradient-px supposes for a series not in px.")
     ] = None,
     minimum_depth: Annotated[
-        float | None, typer.Option(help="Least depth of a blink as part of the opening [default: 0.23].")
+        float | None, typer.Option(help="Least depth of a blink as part of the opening; 0.23 without it.")
     ] = None,
     closed: Annotated[
         float | None, typer.Option(help="Distance at lid contact; from the deepest blinks without it.")

@@ -93,7 +93,7 @@ def export(
         str, typer.Option("--format", help="csv, json, blender (a script), maya (.anim) or arkit (CSV).")
     ] = "csv",
     fps: Annotated[
-        float | None, typer.Option(help="Frame rate of the curve [default: 30; csv, json: 300].")
+        float | None, typer.Option(help="Frame rate of the curve; 300 for csv and json, else 30, without it.")
     ] = None,
     count: Annotated[
         int, typer.Option(help="Blinks from the model, at natural intervals.", min=1, max=10_000)

@@ -95,7 +95,7 @@ def _series_row(
         label = f"({blink.number})" if out else f"{blink.number}"
         axes.annotate(
             label,
-            (blink.end_s, (1.04 - 0.17 * place) * top),
+            (blink.end_s, (0.7 - 0.2 * place) * top),
             xytext=(3, 0),
             textcoords="offset points",
             fontsize=7,

@@ -160,9 +160,12 @@ def _report(
 ) -> None:
     console = Console()
     headers = ("blinks", "a minute", "complete", "rejected", "down ms", "up ms", "total ms", "closure")
-    table = Table("column", box=SIMPLE_HEAD, caption="ms and closure are medians", caption_justify="left")
+    headers = ("blinks", "a minute", "complete", "rejected", "down ms", "up ms", "total ms", "closure")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    table.add_column("column", no_wrap=True)
     for header in headers:
         table.add_column(header, justify="right", no_wrap=True)
+    table.caption, table.caption_justify = "ms and closure: medians", "left"
     for row in summaries:
         medians = [
             f"{row[name].get('median', float('nan')):.0f}" for name in ("down_ms", "up_ms", "duration_ms")
