@@ -126,7 +126,7 @@ def _chroma(cover: NDArray[np.float32]) -> Picture:
 
 def write_video(actor: Actor, path: Path, advance: Callable[[], None]) -> None:
     """Draw and encode every frame; `advance` is called after each."""
-    with VideoWriter(path, actor.options.fps, PICTURE_SIZE, crf=20) as writer:
+    with VideoWriter(path, actor.options.fps, PICTURE_SIZE, crf=18) as writer:
         for number in range(actor.options.frame_count):
             luma, chroma = actor.frame(number)
             planes = np.concatenate([luma.reshape(-1), chroma.reshape(-1)]).reshape(-1, PICTURE_SIZE[0])

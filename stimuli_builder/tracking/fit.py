@@ -82,7 +82,7 @@ def work_out(model: CoupledModel) -> Algebra:
     parts = linear_parts(model, gx, gy, directions)
     count, size, pixels = parts.shape
     rows = parts.reshape(count * size, pixels)
-    products = (rows @ rows.T).reshape(count, size, count, size).transpose(0, 2, 1, 3)
+    products = ((rows * model.weights) @ rows.T).reshape(count, size, count, size).transpose(0, 2, 1, 3)
     forms = [
         products[i, j] + (products[j, i] if i < j else 0.0) for i in range(count) for j in range(i, count)
     ]
@@ -101,7 +101,7 @@ class Fitter:
         self._prior = RIDGE * diagonal + prior / np.maximum(model.sd, 1e-9) ** 2
         self._fixed = (
             mesh.vertices, model.shape_modes, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y,
-            mesh.eye_of, model.appearance, *mesh.neighbours(), algebra.hessian_forms,
+            mesh.eye_of, model.appearance, model.weights, *mesh.neighbours(), algebra.hessian_forms,
             algebra.directions, self._prior, LIMIT_SD * model.sd, algebra.scales, algebra.centre,
         )  # fmt: skip
         self._pixels = tuple(np.empty(pixels, np.float32) for _ in range(4))

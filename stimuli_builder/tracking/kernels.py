@@ -223,15 +223,14 @@ def step(c, pose, change, limits, scales, centre):
 
 
 @compiled
-def squares_by_eye(error, starts, eye_of, out):
-    """Mean square error of each eye, out (eyes,)."""
+def squares_by_eye(error, weights, starts, eye_of, out):
+    """Weighted mean square error of each eye, out (eyes,); `error` comes already times the weights."""
     counts = np.zeros(out.shape[0])
     out[:] = 0.0
     for t in range(eye_of.shape[0]):
-        part = error[starts[t] : starts[t + 1]]
-        total = dot(part, part)
-        out[eye_of[t]] += total
-        counts[eye_of[t]] += starts[t + 1] - starts[t]
+        for i in range(starts[t], starts[t + 1]):
+            out[eye_of[t]] += error[i] * error[i] / weights[i]
+            counts[eye_of[t]] += weights[i]
     for eye in range(out.shape[0]):
         out[eye] /= counts[eye]
 
@@ -252,6 +251,7 @@ def fit(
     py,
     eye_of,
     appearance,
+    weights,
     left,
     right,
     above,
@@ -290,7 +290,7 @@ def fit(
             first = last
         differentiate(error, left, right, above, below, gx, gy)
         for x in range(count):
-            error[x] -= sampled[x]
+            error[x] = weights[x] * (error[x] - sampled[x])
         accumulate(error, gx, gy, triangles, starts, forms, px, py, sums)
         right_side(c, appearance, directions, error, sums, change)
         hessian(hessian_forms, c, matrix)
@@ -309,5 +309,5 @@ def fit(
             return 0
         if furthest < tolerance:
             break
-    squares_by_eye(error, starts, eye_of, squares)
+    squares_by_eye(error, weights, starts, eye_of, squares)
     return iteration

@@ -11,7 +11,7 @@ from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, believing, train
 from stimuli_builder.video import VideoInfo, read_frames, scan_video
 
-WORTH_REFINING = 0.93
+WORTH_REFINING = 0.96
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ def learn(
 
     Parameters
     ----------
-    refine : make labels consistent with the pictures first; None does so where frames left out of training are
-        then fitted clearly better. Accuracy is always reported against the labels as they were given.
+    refine : make labels consistent with the pictures first; None does so where frames left out of training then
+        come clearly nearer to their labels. Accuracy is always reported against the labels as they were given.
     """
     labels = load_labels(labels_path, info.size_px, info.frame_count)
     _check_eyes(labels, one_eye)
@@ -76,5 +76,5 @@ def _check_eyes(labels: Labels, one_eye: bool) -> None:
 
 
 def _typical(results: list[HeldOut]) -> float:
-    residuals = [result.residuals.mean() for result in results if result.residuals is not None]
-    return float(np.median(residuals)) if residuals else float("inf")
+    distances = [result.rms_px for result in results if result.rms_px is not None]
+    return float(np.mean(distances)) if distances else float("inf")

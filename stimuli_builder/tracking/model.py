@@ -17,6 +17,7 @@ from stimuli_builder.tracking.shapes import LidMarkers, Points, mean_shape, simi
 from stimuli_builder.video import Picture
 
 FORMAT = 1
+WEIGHT_FLOOR = 0.3
 Values = NDArray[np.float64]
 
 
@@ -46,6 +47,7 @@ class CoupledModel:
     mesh : the base mesh, with the mean shape s0 as vertices.
     shape_modes : float64 (l, V, 2); movement of the vertices per coupled parameter.
     appearance : float32 (l + 1, N); A0, then the appearance modes of the coupled parameters, in grey levels.
+    weights : float32 (N,), mean 1; how much a pixel counts, low where left-out frames are badly explained.
     sd : float64 (l,); standard deviation of each coupled parameter over the labelled frames.
     examples, poses : (F, l) and (F, 4); parameters and similarity of each labelled frame.
     patches : uint8 (P, h, w); eye regions of a few labelled frames, for the search over a whole picture.
@@ -58,6 +60,7 @@ class CoupledModel:
     mesh: BaseMesh
     shape_modes: Values
     appearance: NDArray[np.float32]
+    weights: NDArray[np.float32]
     sd: Values
     examples: Values
     poses: Values
@@ -112,6 +115,7 @@ def train(pictures: list[Picture], points: Points, markers: LidMarkers, options:
         mesh=mesh,
         shape_modes=(joint[:, :split] / weight @ shape_basis).reshape(len(joint), -1, 2),
         appearance=np.concatenate([mean[None], joint[:, split:] @ look_basis]).astype(np.float32),
+        weights=pixel_weights(textures, len(look_basis)),
         sd=values / np.sqrt(len(shapes)),
         examples=both @ joint.T,
         poses=poses,
@@ -150,6 +154,27 @@ def principal(rows: Values, variance: float, fewest: int) -> tuple[Values, Value
     wanted = int(np.searchsorted(shares, variance - 1e-12) + 1)
     count = min(rank, max(wanted, fewest))
     return basis[:count], values[:count], float(shares[count - 1])
+
+
+def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
+    """Inverse variance of what each labelled frame shows that the others do not explain, mean 1.
+
+    A glint or a shift of gaze is not in the model; its pixels would drag the mesh (docs/decisions/0103).
+
+    Parameters
+    ----------
+    textures : (F, N) grey levels; frame by frame is left out and rebuilt from `modes` modes of the others.
+    """
+    squares = np.zeros(textures.shape[1])
+    for frame in range(len(textures)):
+        others = np.delete(textures, frame, axis=0)
+        mean = others.mean(0)
+        basis, _, _ = principal(others - mean, 1.0, 1)
+        rest = textures[frame] - mean
+        squares += (rest - (rest @ basis[:modes].T) @ basis[:modes]) ** 2
+    variance = squares / len(textures)
+    weights = 1 / (variance + WEIGHT_FLOOR * np.median(variance) + 1e-6)
+    return np.asarray(weights / weights.mean(), np.float32)
 
 
 def warped(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:
@@ -205,6 +230,7 @@ def save_model(model: CoupledModel, path: Path) -> None:
 ARRAYS = (
     "shape_modes",
     "appearance",
+    "weights",
     "sd",
     "examples",
     "poses",

@@ -1,0 +1,88 @@
+"""Labels proposed by a landmark detector: an optional extra, with weights that the user brings."""
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.tracking.labels import Labels, save_labels
+from stimuli_builder.tracking.shapes import Points, default_markers, moved, similarity_between
+from stimuli_builder.video import Picture, VideoInfo, read_frames
+
+# Numbers of the face mesh's 468 points: outer canthus, upper lid, inner canthus, lower lid, of both eyes.
+LEFT = (33, 161, 159, 158, 173, 133, 154, 145, 163)
+RIGHT = (263, 388, 386, 385, 398, 362, 381, 374, 390)
+LOOKED_AT = 400
+FARTHEST_LABEL = 5000
+
+
+def propose_labels(info: VideoInfo, out: Path, weights: Path | None, count: int) -> Labels:
+    """Detect landmarks on frames across the video and save those most unlike one another as labels.
+
+    Raises
+    ------
+    InputError
+        The extra is not installed, no weights are given, or too few frames show a face.
+    """
+    detect = _detector(weights)
+    step = max(1, min(info.frame_count, FARTHEST_LABEL) // LOOKED_AT)
+    found: dict[int, Points] = {}
+    for number in range(0, min(info.frame_count, FARTHEST_LABEL), step):
+        points = detect(read_frames(info, [number])[number])
+        if points is not None and _inside(points, info.size_px):
+            found[number] = points
+    if len(found) < count:
+        raise InputError(f"{info.path}: a face was found on {len(found)} frames, {count} are needed; label by hand")
+    chosen = most_varied(found, count)
+    labels = Labels(out, info.size_px, default_markers(2), {number: found[number] for number in chosen})
+    save_labels(labels, info.path.name, "landmark detector on single frames, not reviewed; half-closed lids sit low")
+    return labels
+
+
+def _inside(points: Points, size_px: tuple[int, int]) -> bool:
+    return bool((points >= 0).all() and (points <= np.array(size_px) - 1).all())
+
+
+def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
+    """Frames whose shapes, freed of position, size and turn, lie farthest from one another; ascending."""
+    frames = sorted(shapes)
+    first = shapes[frames[0]]
+    rows = np.array([moved(shapes[f], similarity_between(shapes[f], first)).ravel() for f in frames])
+    chosen = [int(((rows - np.median(rows, axis=0)) ** 2).sum(1).argmin())]
+    distance: NDArray[np.float64] = np.full(len(frames), np.inf)
+    while len(chosen) < min(count, len(frames)):
+        distance = np.minimum(distance, ((rows - rows[chosen[-1]]) ** 2).sum(1))
+        chosen.append(int(distance.argmax()))
+    return sorted(frames[place] for place in chosen)
+
+
+def _detector(weights: Path | None) -> Any:
+    """A function from a grey picture to 18 points, or None where it sees no face."""
+    if find_spec("mediapipe") is None:
+        raise InputError("label --bootstrap needs the optional extra: pip install 'palpebra[bootstrap]'")
+    if weights is None or not weights.is_file():
+        raise InputError(
+            f"expected --weights with a face_landmarker.task file, found {weights or 'none'}; no weights are shipped"
+        )
+    mediapipe = import_module("mediapipe")
+    tasks = import_module("mediapipe.tasks.python")
+    vision = import_module("mediapipe.tasks.python.vision")
+    options = vision.FaceLandmarkerOptions(base_options=tasks.BaseOptions(model_asset_path=str(weights)))
+    landmarker = vision.FaceLandmarker.create_from_options(options)
+
+    def detect(picture: Picture) -> Points | None:
+        colour = np.ascontiguousarray(np.repeat(picture[:, :, None], 3, axis=2))
+        image = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=colour)
+        faces = landmarker.detect(image).face_landmarks
+        return _points(faces[0], picture.shape) if faces else None
+
+    return detect
+
+
+def _points(face: Any, shape: tuple[int, ...]) -> Points:
+    height, width = shape[:2]
+    return np.array([(face[p].x * width - 0.5, face[p].y * height - 0.5) for p in (*LEFT, *RIGHT)])

@@ -1,0 +1,18 @@
+"""The trace of a track with its labelled blinks (the paper's Figure 3)."""
+
+from pathlib import Path
+
+from stimuli_builder.blinks.extract import blinks_of
+from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS
+from stimuli_builder.blinks.plots import save_figure, series_figure
+from stimuli_builder.blinks.series import read_series
+
+
+def plot_track(track: Path, fps: float, figure: Path) -> int:
+    """Label the blinks of a track by the paper's two criteria, save the figure, return how many there are.
+
+    With two eyes, the number of blinks is that of the eye that shows more.
+    """
+    eyes = [blinks_of(series, DEFAULT_OPTIONS) for series in read_series(track, (), fps)]
+    save_figure(series_figure(eyes, set()), figure)
+    return max(len(eye.blinks) for eye in eyes)
