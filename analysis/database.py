@@ -20,6 +20,18 @@ PORTION = 20_000
 KINDS = ("main", "attention")
 """Practice trials are never fetched: nobody analyses them."""
 
+RUN_TEXTS = (
+    "study",
+    "experiment",
+    "definition_sha256",
+    "phase",
+    "participant",
+    "run_status",
+    "exclusion_reason",
+)
+RUN_FLAGS = ("synthetic", "excluded")
+"""Columns that are the same for all rows of a run."""
+
 
 def default_url() -> str:
     """DATABASE_URL, or the SQLite file in the data folder.
@@ -62,31 +74,59 @@ class RatingsQuery:
         self._connection.close()
         self._engine.dispose()
 
-    def rows(
-        self, texts: Sequence[str], numbers: Sequence[str], flags: Sequence[str], factors: Sequence[str]
-    ) -> pd.DataFrame:
-        """Main and attention rows: text as categories, numbers float, flags bool, a column a factor."""
-        names = [*texts, *numbers, *flags, "levels"]
+    def rows(self, texts: Sequence[str], numbers: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
+        """Main and attention rows: text as categories, numbers float, a column a factor, and the run's columns.
+
+        The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once a run, not once a row.
+        """
+        names = [*texts, *numbers, "levels"]
         codes = {name: _Codes() for name in (*texts, "levels")}
-        values = {name: _Numbers() for name in (*numbers, *flags)}
+        values = {name: _Numbers() for name in numbers}
         kinds = ", ".join(f"'{kind}'" for kind in KINDS)
-        sql = f"SELECT {', '.join(names)} FROM ratings WHERE {self._where} AND kind IN ({kinds})"  # noqa: S608
-        for portion in self._portions(sql):
+        for portion in self._portions(
+            f"{', '.join(names)} FROM ratings WHERE {self._where} AND kind IN ({kinds})"
+        ):
             for name, column in zip(names, zip(*portion, strict=True), strict=True):
                 (codes if name in codes else values)[name].add(column)
         columns: dict[str, Any] = {name: codes[name].column() for name in texts}
         columns |= {name: values[name].column() for name in numbers}
-        columns |= {name: np.nan_to_num(values[name].column()) > 0 for name in flags}
-        return pd.DataFrame(columns | _factor_columns(codes["levels"].column(), factors))
+        columns |= _factor_columns(codes["levels"].column(), factors)
+        return pd.DataFrame(columns | self._of_runs(columns["run"]))
+
+    def _of_runs(self, run: "pd.Categorical[str]") -> dict[str, Any]:
+        """The columns of every row's run."""
+        names = ["run", *RUN_TEXTS, *RUN_FLAGS]
+        found = [
+            row
+            for rows in self._portions(f"DISTINCT {', '.join(names)} FROM ratings WHERE {self._where}")
+            for row in rows
+        ]
+        of_run = {str(row[0]): row[1:] for row in found}
+        wanted = [of_run[name] for name in run.categories]
+        taken = run.codes.astype(np.int64)
+        columns: dict[str, Any] = {}
+        for i, name in enumerate(RUN_TEXTS):
+            columns[name] = categorical(taken, ["" if row[i] is None else str(row[i]) for row in wanted])
+        for i, name in enumerate(RUN_FLAGS, len(RUN_TEXTS)):
+            columns[name] = np.array([bool(row[i]) for row in wanted], dtype=bool)[taken]
+        return columns
 
     def first_seen(self) -> dict[str, str]:
         """When the first row of each run was stored."""
-        sql = f"SELECT run, MIN(saved_at) FROM ratings WHERE {self._where} GROUP BY run"  # noqa: S608
-        return {str(run): str(moment) for run, moment in self._connection.execute(text(sql), self._values)}
+        found = self._portions(f"run, MIN(saved_at) FROM ratings WHERE {self._where} GROUP BY run")
+        return {str(run): str(moment) for rows in found for run, moment in rows}
 
-    def _portions(self, sql: str) -> Iterator[Sequence[Any]]:
-        streaming = self._connection.execution_options(stream_results=True)
-        yield from streaming.execute(text(sql), self._values).partitions(PORTION)
+    def _portions(self, selection: str) -> Iterator[Sequence[Any]]:
+        # the driver's own cursor: SQLAlchemy's row objects cost a second a million rows
+        query = text(f"SELECT {selection}").bindparams(**self._values)
+        sql = query.compile(self._engine, compile_kwargs={"literal_binds": True})
+        cursor = self._connection.connection.cursor()
+        try:
+            cursor.execute(str(sql))
+            while portion := cursor.fetchmany(PORTION):
+                yield portion
+        finally:
+            cursor.close()
 
 
 class _Codes:

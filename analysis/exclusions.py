@@ -56,10 +56,10 @@ def apply_exclusions(experiment: Experiment, ratings: StudyRatings, phase: str =
     practice = len(rows) - len(main) - len(attention)
     aside += [f"{practice} practice trials"] if practice else []
     unrated = np.isnan(main["response"].to_numpy())
-    aside += [f"{unrated.sum()} main trials without a rating"] if unrated.any() else []
-    main = main[~unrated]
+    aside += [f"{unrated.sum()} plays without a rating"] if unrated.any() else []
+    plays, main = main, main[~unrated]
     people = _people(main, rows)
-    reasons, not_applied = _participant_reasons(experiment, rows, main, attention)
+    reasons, not_applied = _participant_reasons(experiment, rows, plays, attention)
     _later_runs(people, reasons, ratings)
     excluded = tuple(
         ExcludedRun(str(people[run]), str(run), tuple(reasons[run]))
@@ -90,7 +90,7 @@ def _of_phase(rows: pd.DataFrame, phase: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def _participant_reasons(
-    experiment: Experiment, rows: pd.DataFrame, main: pd.DataFrame, attention: pd.DataFrame
+    experiment: Experiment, rows: pd.DataFrame, plays: pd.DataFrame, attention: pd.DataFrame
 ) -> tuple[dict[str, list[str]], list[str]]:
     reasons: dict[str, list[str]] = {}
     not_applied: list[str] = []
@@ -101,7 +101,7 @@ def _participant_reasons(
         if found is None:
             continue
         needed, finder = found
-        source = attention if isinstance(rule, rules.ExcludeAttention) else main
+        source = attention if isinstance(rule, rules.ExcludeAttention) else plays
         if needed not in rows.columns:
             not_applied.append(f"{rule.rule}: the data have no column '{needed}'")
             continue
@@ -143,7 +143,7 @@ def _attention(rule: rules.ExcludeAttention, rows: pd.DataFrame) -> Finding:
 
 def _playback(rule: rules.ExcludePlayback, rows: pd.DataFrame) -> Finding:
     poor = ~rows["verdict"].isin(["good", ""]).to_numpy()
-    shares = pd.Series(poor).groupby(rows["run"].astype(str).to_numpy()).mean()
+    shares = pd.Series(poor, index=rows.index).groupby(rows["run"], observed=True).mean()
     return [
         (str(run), f"{share:.0%} of plays were not good")
         for run, share in shares.items()
@@ -152,13 +152,13 @@ def _playback(rule: rules.ExcludePlayback, rows: pd.DataFrame) -> Finding:
 
 
 def _straight(rule: rules.ExcludeStraightLining, rows: pd.DataFrame) -> Finding:
-    counts = rows.groupby([rows["run"].astype(str), rows["response"]]).size()
-    share = counts.groupby(level=0).max() / counts.groupby(level=0).sum()
+    counts = rows.groupby(["run", "response"], observed=True).size().groupby(level=0, observed=True)
+    share = counts.max() / counts.sum()
     return [(str(run), f"{s:.0%} of answers are the same") for run, s in share.items() if s > rule.more_than]
 
 
 def _fast(rule: rules.ExcludeFast, rows: pd.DataFrame) -> Finding:
-    medians = rows["rt"].groupby(rows["run"].astype(str)).median()
+    medians = rows["rt"].groupby(rows["run"], observed=True).median()
     return [(str(run), f"median {rt:.0f} ms") for run, rt in medians.items() if rt < rule.below_ms]
 
 

@@ -9,27 +9,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.csvfile import numbers, read_text_table
-from analysis.database import RatingsQuery
+from analysis.database import RUN_FLAGS, RUN_TEXTS, RatingsQuery
 from analysis.errors import NoRatingsError
 from experiments.definition import Experiment
 from experiments.errors import InputError
 
-TEXT_COLUMNS = [
-    "study",
-    "experiment",
-    "definition_sha256",
-    "phase",
-    "run",
-    "participant",
-    "run_status",
-    "kind",
-    "verdict",
-    "stimulus",
-    "exclusion_reason",
-]
-NUMBER_COLUMNS = ["trial_index", "play", "exemplar", "response", "expected_response", "rt"]
-FLAG_COLUMNS = ["synthetic", "excluded"]
-"""What the analysis reads of the columns that experiments/ratings.py declares, besides the factors."""
+ROW_TEXTS = ("run", "kind", "verdict")
+ROW_NUMBERS = ("response", "expected_response", "rt")
+CSV_NUMBERS = ("trial_index", "play", "exemplar", *ROW_NUMBERS)
+"""What the analysis reads of the columns that experiments/ratings.py declares, besides the factors.
+
+`trial_index` and `play` only find repeated rows, which the database's unique index rules out.
+"""
 
 
 @dataclass(frozen=True)
@@ -61,15 +52,15 @@ def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> St
         As `read_text_table`; ratings that are text; another experiment's data.
     """
     factors = list(experiment.factor_names)
-    optional = [*TEXT_COLUMNS, *NUMBER_COLUMNS, *FLAG_COLUMNS, "saved_at"]
+    optional = [*ROW_TEXTS, "stimulus", *RUN_TEXTS, *CSV_NUMBERS, *RUN_FLAGS, "saved_at"]
     if _has_no_rows(path):
         raise NoRatingsError(f"{path.name} has a header but no ratings yet")
     table = read_text_table(path, ["participant", "response", *factors], optional)
     rows = table.columns
-    for name in NUMBER_COLUMNS:
+    for name in CSV_NUMBERS:
         if name in rows.columns:
             rows[name] = numbers(table, name)
-    for name in FLAG_COLUMNS:
+    for name in RUN_FLAGS:
         if name in rows.columns:
             rows[name] = _flags(rows[name])
     seen = _first_seen(rows)
@@ -78,8 +69,10 @@ def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> St
     return StudyRatings(rows, path.name, (*table.decisions, *chosen), seen)
 
 
-def load_database(url: str, experiment: Experiment, study: str | None = None) -> StudyRatings:
-    """Read the study's rows from the SQL view `ratings`.
+def load_database(
+    url: str, experiment: Experiment, study: str | None = None, clips: bool = False
+) -> StudyRatings:
+    """Read the study's rows from the SQL view `ratings`; `clips` adds the clip's file (`stimulus`).
 
     Raises
     ------
@@ -90,7 +83,8 @@ def load_database(url: str, experiment: Experiment, study: str | None = None) ->
     """
     query = RatingsQuery(url, experiment.name, study)
     try:
-        rows = query.rows(TEXT_COLUMNS, NUMBER_COLUMNS, FLAG_COLUMNS, list(experiment.factor_names))
+        texts = (*ROW_TEXTS, "stimulus") if clips else ROW_TEXTS
+        rows = query.rows(texts, ROW_NUMBERS, experiment.factor_names)
         if rows.empty:
             named = f"study '{study}'" if study else f"experiment '{experiment.name}'"
             raise NoRatingsError(f"{named} has no ratings yet in {query.name}")
