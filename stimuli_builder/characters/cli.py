@@ -1,0 +1,90 @@
+"""`stimuli bake`: render a character's atlas."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from stimuli_builder.characters.photorealistic.bake import BakeOrder, bake
+from stimuli_builder.characters.photorealistic.framing import parse_size
+from stimuli_builder.characters.photorealistic.parameters import PRESETS_FILE, load_preset
+from stimuli_builder.characters.photorealistic.plan import LEVEL_COUNTS, Quality, closures_of
+
+bake_app = typer.Typer(no_args_is_help=True, help="Render a character's atlas of baked pictures.")
+
+
+@bake_app.callback()
+def _bake() -> None:
+    """Render a character's atlas of baked pictures."""
+
+
+@bake_app.command("photorealistic")
+def bake_photorealistic(
+    preset: Annotated[str, typer.Option(help="Face to bake: a table of the presets file.")] = "northern",
+    levels: Annotated[
+        int, typer.Option(help=f"Closure levels of the atlas: one of {', '.join(map(str, LEVEL_COUNTS))}.")
+    ] = 129,
+    size: Annotated[str, typer.Option(help="Size of the full frame in px; it shows 128 mm.")] = "960x360",
+    out: Annotated[Path | None, typer.Option(help="Folder of the character [out/characters/PRESET].")] = None,
+    samples: Annotated[int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the crop.")] = 20,
+    frame_samples: Annotated[
+        int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the still frame.")
+    ] = 32,
+    presets: Annotated[Path, typer.Option(help="Presets file, to bake a face of your own.")] = PRESETS_FILE,
+    work: Annotated[Path, typer.Option(help="Where rendered shots wait: a stopped bake resumes.")] = Path(
+        "build/bake"
+    ),
+    blender: Annotated[
+        Path, typer.Option(help="Environment of Blender; made on first use (360 MB to download).")
+    ] = Path(".venv-bake"),
+    threads: Annotated[int, typer.Option(min=1, max=256, help="Render threads.")] = 2,
+) -> None:
+    """Render the photorealistic character with Cycles; coarse levels first, resumable at any moment.
+
+    Examples:
+
+      stimuli bake photorealistic --levels 9 --samples 16 --frame-samples 32      # a draft in minutes
+
+      stimuli bake photorealistic --preset southern --levels 129 --out my/face    # hours on two cores
+    """
+    closures_of(levels)
+    order = BakeOrder(
+        name=preset,
+        face=load_preset(preset, presets),
+        frame=parse_size(size),
+        levels=levels,
+        quality=Quality(samples, frame_samples),
+        out=out or Path("out/characters") / preset,
+        work=work,
+        blender=blender,
+        threads=threads,
+    )
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, disable=not sys.stderr.isatty()) as progress:
+        task = progress.add_task(f"baking {preset}")
+
+        def report(done: int, total: int, what: str) -> None:
+            progress.update(task, completed=done, total=total, description=f"baking {preset} ({what})")
+
+        bake(order, report)
+    typer.echo(f"{levels} levels of '{preset}' are in {order.out}")
+
+
+def register(app: typer.Typer) -> None:
+    """Add `bake` to the command line."""
+    app.add_typer(bake_app, name="bake")

@@ -1,0 +1,108 @@
+"""From rendered shots to the atlas: develop, lay over the still frame, write pictures and declaration."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
+from stimuli_builder.characters.photorealistic import anatomy, framing, plan
+from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
+from stimuli_builder.characters.photorealistic.framing import Box, Frame, bounding_box
+from stimuli_builder.characters.photorealistic.parameters import Face
+from stimuli_builder.characters.photorealistic.plan import Quality, closures_of
+from stimuli_builder.characters.photorealistic.renderer import Shot
+from stimuli_builder.characters.writing import write_declaration, write_picture
+
+Code = NDArray[np.float32]
+
+
+class Assembly:
+    """Pictures of one bake; `work` holds the shots."""
+
+    def __init__(self, work: Path, face: Face, frame: Frame, quality: Quality) -> None:
+        self.work, self.face, self.frame, self.quality = work, face, frame, quality
+        still = develop(plan.base_shot(work, frame, quality).read()["frame"], face.exposure_ev)
+        # The open level's own samples go into the still frame, so that nothing changes when a blink begins.
+        self.still = self._lay(still, plan.level_shot(work, frame, quality, 0.0))
+
+    @property
+    def crop(self) -> Box:
+        """Bounding box of what a blink may change."""
+        return bounding_box(list(self.frame.eye_boxes().values()))
+
+    @property
+    def lower_lid_crop(self) -> Box:
+        """Bounding box of what the lower lids may change."""
+        return bounding_box(list(self.frame.lower_lid_boxes().values()))
+
+    def level(self, closure: float) -> Code:
+        """(h, w, 3) code values in 0-1 of the crop at a rendered closure."""
+        shot = plan.level_shot(self.work, self.frame, self.quality, closure)
+        return _cut(self._lay(self.still, shot), self.crop)
+
+    def write(
+        self, folder: Path, name: str, levels: int, lower_lid: bool, provenance: dict[str, Any]
+    ) -> None:
+        """Write a character of the first `levels` generations; the declaration comes last."""
+        pictures = []
+        for closure in closures_of(levels):
+            file = f"level_{round(closure * 256):03d}.webp"
+            pictures.append((closure, write_picture(folder, file, to_8_bit(self.level(closure)))))
+        declaration = Declaration(
+            name=name,
+            label=f"Photorealistic: {self.face.label}",
+            size_px=(self.frame.width_px, self.frame.height_px),
+            px_per_mm=self.frame.px_per_mm,
+            inter_ocular_mm=framing.INTER_OCULAR_MM,
+            opening_mm=anatomy.OPENING_MM,
+            crop=self.crop,
+            base=write_picture(folder, "open.webp", to_8_bit(self.still)),
+            levels=tuple(Level(closure=w, file=p.file, sha256=p.sha256) for w, p in pictures),
+            lower_lid=self._write_lower_lid(folder) if lower_lid else None,
+            provenance=provenance,
+        )
+        write_declaration(folder, declaration)
+
+    def _write_lower_lid(self, folder: Path) -> LowerLid:
+        crop = self.lower_lid_crop
+        rest = _cut(self.still, crop)
+        poses = [self._write_pose(folder, 0.0, 0.0, rest)]
+        for pose in plan.lower_lid_poses():
+            shot = plan.pose_shot(self.work, self.frame, self.quality, pose)
+            moved = _cut(self._lay(self.still, shot), crop)
+            poses.append(self._write_pose(folder, pose.vertical_mm, pose.horizontal_mm, moved))
+        mattes = []
+        for closure in plan.MATTE_CLOSURES:
+            shot = plan.matte_shot(self.work, self.frame, closure)
+            matte = np.zeros((self.frame.height_px, self.frame.width_px, 3), np.float32)
+            for name, pixels in shot.read().items():
+                x, y, width, height = shot.boxes[name]
+                matte[y : y + height, x : x + width] = np.clip(pixels.astype(np.float32), 0, 1)
+            picture = write_picture(
+                folder, f"matte_{round(closure * 256):03d}.webp", to_8_bit(_cut(matte, crop))
+            )
+            mattes.append(Level(closure=closure, file=picture.file, sha256=picture.sha256))
+        return LowerLid(crop=crop, poses=tuple(poses), mattes=tuple(mattes))
+
+    def _write_pose(self, folder: Path, vertical: float, horizontal: float, code: Code) -> LowerLidPose:
+        file = f"lower_{round(vertical * 100):03d}_{round(horizontal * 100):03d}.webp"
+        picture = write_picture(folder, file, to_8_bit(code))
+        return LowerLidPose(
+            vertical_mm=vertical, horizontal_mm=horizontal, file=picture.file, sha256=picture.sha256
+        )
+
+    def _lay(self, still: Code, shot: Shot) -> Code:
+        """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims."""
+        laid = still.copy()
+        for name, pixels in shot.read().items():
+            x, y, width, height = box = shot.boxes[name]
+            where = laid[y : y + height, x : x + width]
+            where += self.frame.feather(box) * (develop(pixels, self.face.exposure_ev) - where)
+        return laid
+
+
+def _cut(image: Code, box: Box) -> Code:
+    x, y, width, height = box
+    return image[y : y + height, x : x + width]

@@ -1,0 +1,34 @@
+"""From the renderer's scene light to the picture's light: exposure, a soft shoulder, a slight S-curve."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.characters.colour import encode_srgb, srgb_to_linear
+
+SHOULDER_STARTS, CONTRAST = 0.55, 0.2
+
+
+def develop(scene_light: NDArray[np.floating], exposure_ev: float) -> NDArray[np.float32]:
+    """Gamma-encoded sRGB in 0-1 of scene-linear light, same shape."""
+    light = np.maximum(scene_light.astype(np.float32), 0) * np.float32(2.0**exposure_ev)
+    room = 1 - SHOULDER_STARTS
+    bent = SHOULDER_STARTS + room * (1 - np.exp(-(light - SHOULDER_STARTS) / room))
+    code = encode_srgb(np.where(light < SHOULDER_STARTS, light, bent))
+    return np.clip(code + CONTRAST * (code - 0.5) * code * (1 - code), 0, 1).astype(np.float32)
+
+
+def to_8_bit(code: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Rounded code values."""
+    return (code * 255 + 0.5).astype(np.uint8)
+
+
+def psnr_db(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
+    """Peak signal-to-noise ratio of two 8-bit pictures in dB; infinite where they are equal."""
+    error = np.mean((a.astype(np.float64) - b.astype(np.float64)) ** 2)
+    return float("inf") if error == 0 else float(10 * np.log10(255**2 / error))
+
+
+def mix_in_linear_light(a: NDArray[np.uint8], b: NDArray[np.uint8], share: float) -> NDArray[np.float32]:
+    """Linear light between two 8-bit pictures: what the clip builder shows between levels."""
+    weight = np.float32(share)
+    return (1 - weight) * srgb_to_linear(a) + weight * srgb_to_linear(b)
