@@ -7,6 +7,7 @@ from fastapi import Depends, Request
 
 from server.clips.store import ClipStore, FolderStore
 from server.db import Database, open_database
+from server.group_commit import GroupCommit
 from server.rate_limit import RateLimit
 from server.settings import Settings
 from server.versions import Versions
@@ -22,18 +23,21 @@ class Services:
     run_starts: RateLimit
     unsupported: RateLimit
     versions: Versions
+    group_commit: GroupCommit
     sign_ins: RateLimit
 
 
 def open_services(settings: Settings) -> Services:
     """Open database and clip store; nothing is migrated or started."""
+    database = open_database(settings)
     return Services(
         settings=settings,
-        database=open_database(settings),
+        database=database,
         clips=FolderStore(settings.clip_folder),
         run_starts=RateLimit(settings.run_starts_per_minute),
         unsupported=RateLimit(settings.unsupported_per_minute),
         versions=Versions(),
+        group_commit=GroupCommit(database),
         sign_ins=RateLimit(settings.logins_per_minute),
     )
 

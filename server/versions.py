@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Lock
 
-from sqlalchemy import select
+from sqlalchemy import Connection, select
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
@@ -43,10 +43,11 @@ class Versions:
         self._loaded: dict[int, LoadedVersion] = {}
         self._lock = Lock()
 
-    def get(self, session: Session, version_id: int) -> LoadedVersion:
+    def get(self, source: Session | Connection, version_id: int) -> LoadedVersion:
         """The version with this id, from memory or the database."""
         found = self._loaded.get(version_id)
         if found is None:
+            session = source if isinstance(source, Session) else Session(source)
             found = _load(session, version_id)
             with self._lock:
                 while len(self._loaded) >= _MOST_KEPT:

@@ -3,22 +3,27 @@
 from uuid import UUID
 
 from fastapi import APIRouter, Response
+from sqlalchemy import Connection
 
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.participants.endpoints import RunToken
 from server.trials import service
-from server.trials.schemas import RatingIn, RatingSaved
+from server.trials.schemas import RatingIn, RatingSaved, Receipt
 
 router = APIRouter(prefix="/api", tags=["ratings"], responses=ERROR_RESPONSES)
 
 
 @router.put("/run/ratings/{rating_id}", status_code=201, responses={200: {"model": RatingSaved}})
-def put_rating(
-    services: ServicesDep, token: RunToken, rating_id: UUID, rating: RatingIn, response: Response
+async def put_rating(
+    services: ServicesDep, token: RunToken, rating_id: UUID, rating: RatingIn
 ) -> RatingSaved:
     """Store one rating (201); the same again is answered with the same receipt (200)."""
-    with services.database.write() as session:
-        receipt, is_new = service.save_rating(services, session, token, str(rating_id), rating)
-    response.status_code = 201 if is_new else 200
-    return RatingSaved(receipt=receipt)
+
+    def save(connection: Connection) -> tuple[Receipt, bool]:
+        return service.save_rating(services.versions, connection, token, str(rating_id), rating)
+
+    receipt, is_new = await services.group_commit.run(token, save)
+    content = RatingSaved(receipt=receipt).model_dump_json()
+    # A finished response, so that FastAPI does not validate and encode the receipt once more.
+    return Response(content, 201 if is_new else 200, media_type="application/json")  # type: ignore[return-value]

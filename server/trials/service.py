@@ -3,18 +3,17 @@
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy.orm import Session
+from sqlalchemy import Connection
 
 from experiments.definition import Experiment
 from server.clock import now
-from server.context import Services
 from server.errors import Conflict, Invalid, NotFound
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
 from server.tokens import hash_token
 from server.trials import repository
 from server.trials.schemas import PlaybackLog, RatingIn, Receipt
 from server.trials.verdict import Playback, Ruling, frames_in_log, is_settled, judge
-from server.versions import LoadedVersion
+from server.versions import LoadedVersion, Versions
 
 
 class TrialNotInRun(NotFound):
@@ -48,19 +47,19 @@ class RatingDiffers(Conflict):
 
 
 def save_rating(
-    services: Services, session: Session, token: str, rating_id: str, rating: RatingIn
+    versions: Versions, connection: Connection, token: str, rating_id: str, rating: RatingIn
 ) -> tuple[Receipt, bool]:
     """Store a rating, or find it stored; return the receipt and whether it is new."""
-    run = repository.run_for_rating(session, hash_token(token))
+    run = repository.run_for_rating(connection, hash_token(token))
     if run is None:
         raise RunUnknown("This visit is not known; please open the link you were given again.")
-    trial = repository.trial(session, run.id, rating.trial_index)
+    trial = repository.trial(connection, run.id, rating.trial_index)
     if trial is None:
         raise TrialNotInRun(
             f"Trial {rating.trial_index} is not in this run, which has trials 0 to {run.trials_total - 1}."
         )
-    loaded = services.versions.get(session, run.version_id)
-    stored = repository.stored_ratings(session, run.id, rating.trial_index, rating_id)
+    loaded = versions.get(connection, run.version_id)
+    stored = repository.stored_ratings(connection, run.id, rating.trial_index, rating_id)
     known = _known(stored, rating_id, rating)
     most = loaded.experiment.playback.max_repeats
     if known is not None:
@@ -70,12 +69,12 @@ def save_rating(
     _check(run, loaded.experiment, trial.kind, rating)
     ruling = _judge(loaded, trial.version_clip_id, rating)
     saved_at = now()
-    repository.add_rating(session, _row(run, rating_id, rating, ruling, saved_at))
+    repository.add_rating(connection, _row(run, rating_id, rating, ruling, saved_at))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
     before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
     answered = int(settles and not before)
     elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)
-    repository.mark_seen(session, run.id, saved_at, elapsed, answered)
+    repository.mark_seen(connection, run.id, saved_at, elapsed, answered)
     left = run.trials_total - run.trials_answered - answered
     return _receipt(rating_id, saved_at, ruling, not settles and not before, left), True
 
