@@ -137,7 +137,9 @@ def _decode(path: Path) -> Iterator[tuple[int | None, Picture]]:
             for frame in container.decode(stream):
                 yield frame.pts, grey(frame)
         except av.error.FFmpegError as error:
-            raise InputError(f"{path}: truncated or damaged ({_reason(error)}); copy the file again") from error
+            raise InputError(
+                f"{path}: truncated or damaged ({_reason(error)}); copy the file again"
+            ) from error
 
 
 def read_frames(info: VideoInfo, wanted: Sequence[int]) -> dict[int, Picture]:
@@ -228,7 +230,9 @@ class VideoWriter:
     Pictures are uint8: (height, width) grey or (height, width, 3) RGB; sides are even.
     """
 
-    def __init__(self, path: Path, fps: float, size_px: tuple[int, int], *, crf: int = 18, preset: str = "veryfast"):
+    def __init__(
+        self, path: Path, fps: float, size_px: tuple[int, int], *, crf: int = 18, preset: str = "veryfast"
+    ):
         self.path = path
         self._temporary = temporary_beside(path, suffix=path.suffix or ".mp4")
         rate = Fraction(fps).limit_denominator(100_000)
@@ -237,7 +241,9 @@ class VideoWriter:
             self._stream: Any = self._container.add_stream("libx264", rate=rate)
         except (av.error.FFmpegError, ValueError, OSError) as error:
             remove_quietly(self._temporary)
-            raise InputError(f"{path}: cannot be written as video ({_reason(error)}); use a name in .mp4") from error
+            raise InputError(
+                f"{path}: cannot be written as video ({_reason(error)}); use a name in .mp4"
+            ) from error
         self._stream.width, self._stream.height = size_px
         self._stream.pix_fmt = "yuv420p"
         self._stream.options = {"crf": str(crf), "preset": preset, "x264-params": "log-level=error"}

@@ -1,9 +1,12 @@
 """`stimuli actor`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from stimuli_builder.actor.recording import Actor
 
 
 def register(app: typer.Typer) -> None:
@@ -14,19 +17,23 @@ def register(app: typer.Typer) -> None:
 def actor(
     out: Annotated[Path, typer.Option(help="Video to write (MP4, H.264, 512 x 384).")],
     truth: Annotated[Path | None, typer.Option(help="Exact truth of every frame (CSV).")] = None,
-    labels: Annotated[Path | None, typer.Option(help="Label file of frames chosen for variety (JSON).")] = None,
+    labels: Annotated[
+        Path | None, typer.Option(help="Label file of frames chosen for variety (JSON).")
+    ] = None,
     seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 20.0,
     fps: Annotated[float, typer.Option(help="Frames per second.")] = 300.0,
     seed: Annotated[int, typer.Option(help="Same seed, same face and same recording.", min=0)] = 1,
     noise: Annotated[float, typer.Option(help="Sensor noise, sd in grey levels.")] = 2.0,
     label_frames: Annotated[int, typer.Option(help="Frames in the label file.", min=3, max=500)] = 20,
-    label_noise: Annotated[float, typer.Option(help="Error of the labels, sd in pixels of x and of y.", min=0)] = 0.0,
+    label_noise: Annotated[
+        float, typer.Option(help="Error of the labels, sd in pixels of x and of y.", min=0)
+    ] = 0.0,
 ) -> None:
     """Generate a high-speed recording of a synthetic actor, with exact truth and label files.
 
-    Blinks, head drift, gaze, light and sensor noise follow published statistics. The truth has the columns of a track
-    up to the distances, then closure (0 open, 1 closed, mean of both eyes), blink (number from 1, empty between
-    blinks) and phase (open, down, up).
+    Blinks, head drift, gaze, light and sensor noise follow published statistics. The truth has the columns of
+    a track up to the distances, then closure (0 open, 1 closed, mean of both eyes), blink (number from 1, empty
+    between blinks) and phase (open, down, up).
 
     Examples:
 
@@ -36,17 +43,19 @@ def actor(
     """
     from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
     from stimuli_builder.files import temporary_beside
-    from stimuli_builder.tracking.cli import _progress as progress_bar
+    from stimuli_builder.progress import frame_progress
 
     options = ActorOptions(seconds, fps, seed, noise)
     for target in (out, truth, labels):
         if target is not None:
             temporary_beside(target)
     person = Actor(options)
-    with progress_bar() as progress:
+    with frame_progress() as progress:
         task = progress.add_task("drawing", total=options.frame_count)
         write_video(person, out, lambda: progress.advance(task))
-    print(f"{out}: {options.frame_count:,} frames at {fps:g} frames/s, {int(person.course.blink.max())} blinks")
+    print(
+        f"{out}: {options.frame_count:,} frames at {fps:g} frames/s, {int(person.course.blink.max())} blinks"
+    )
     if truth is not None:
         write_truth(person, truth)
         print(f"{truth}: truth of every frame")
@@ -54,7 +63,7 @@ def actor(
         _save_labels(person, labels, out.name, label_frames, label_noise)
 
 
-def _save_labels(person: "Actor", path: Path, video: str, count: int, noise: float) -> None:  # type: ignore[name-defined]  # noqa: F821
+def _save_labels(person: "Actor", path: Path, video: str, count: int, noise: float) -> None:
     from stimuli_builder.actor.face import PICTURE_SIZE
     from stimuli_builder.actor.recording import label_points
     from stimuli_builder.tracking.labels import Labels, save_labels
@@ -62,6 +71,8 @@ def _save_labels(person: "Actor", path: Path, video: str, count: int, noise: flo
 
     frames = label_points(person, count, noise)
     save_labels(
-        Labels(path, PICTURE_SIZE, default_markers(2), frames), video, f"synthetic actor, label noise sd {noise:g} px"
+        Labels(path, PICTURE_SIZE, default_markers(2), frames),
+        video,
+        f"synthetic actor, label noise sd {noise:g} px",
     )
     print(f"{path}: {len(frames)} labelled frames")

@@ -15,7 +15,7 @@ Values = NDArray[np.float64]
 PICTURE_SIZE = (512, 384)
 EYE_WIDTH_PX = 76.0
 EYE_CENTRES = ((160.0, 196.0), (352.0, 196.0))
-# One eye width stands for 30 mm: the lower lid rises 0.75 mm and moves 2.4 mm to the nose when the eye closes.
+# One eye width stands for 30 mm: on closing, the lower lid rises 0.75 mm and moves 2.4 mm to the nose.
 LOWER_LIFT = 0.025
 LOWER_NASAL = 0.08
 UPPER_NASAL = 0.02
@@ -76,7 +76,7 @@ def head_matrix(head: Values) -> Values:
     centre = np.array(PICTURE_SIZE) / 2
     a, b = scale * np.cos(turn), scale * np.sin(turn)
     linear = np.array([[a, -b], [b, a]])
-    return np.c_[linear, centre - linear @ centre + [shift_x, shift_y]]
+    return np.asarray(np.c_[linear, centre - linear @ centre + [shift_x, shift_y]])
 
 
 def landmarks(closure: Values, head: Values) -> Values:

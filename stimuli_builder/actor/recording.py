@@ -4,6 +4,7 @@ import csv
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,7 +12,14 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.actor import skin
-from stimuli_builder.actor.face import EYE_CENTRES, EYE_WIDTH_PX, PICTURE_SIZE, head_matrix, landmarks, lid_distances
+from stimuli_builder.actor.face import (
+    EYE_CENTRES,
+    EYE_WIDTH_PX,
+    PICTURE_SIZE,
+    head_matrix,
+    landmarks,
+    lid_distances,
+)
 from stimuli_builder.actor.physiology import Course, course, plan_blinks
 from stimuli_builder.actor.renderer import draw_eye
 from stimuli_builder.files import whole_text
@@ -78,15 +86,24 @@ class Actor:
             self._eye(picture, cover, eye, number, matrix, inverse)
         return self._exposed(picture), _chroma(cover)
 
-    def _eye(self, picture: NDArray[np.float32], cover: NDArray[np.float32], eye: int, number: int, matrix: Values, inverse: Values) -> None:
+    def _eye(
+        self,
+        picture: NDArray[np.float32],
+        cover: NDArray[np.float32],
+        eye: int,
+        number: int,
+        matrix: Values,
+        inverse: Values,
+    ) -> None:
         x0, x1, y0, y1 = _box(EYE_CENTRES[eye], matrix)
         part, seen = np.zeros((y1 - y0, x1 - x0), np.float32), cover[y0:y1, x0:x1]
         closures = self._exposures(number, eye)
         now = self.course
+        draw: Any = draw_eye
         for closure in closures:
-            draw_eye(
-                part, seen, x0, y0, inverse, np.array(EYE_CENTRES[eye]), 1.0 - 2.0 * eye, EYE_WIDTH_PX, closure,
-                now.gaze[number], now.light[number], self._face, float(skin.MARGIN_PX), self._lid, self._iris,
+            draw(
+                part, seen, x0, y0, inverse, np.array(EYE_CENTRES[eye]), 1.0 - 2.0 * eye, EYE_WIDTH_PX,
+                closure, now.gaze[number], now.light[number], self._face, float(skin.MARGIN_PX), self._lid, self._iris,
                 self._lashes, 1.0 / len(closures),
             )  # fmt: skip
         picture[y0:y1, x0:x1] = part
@@ -156,7 +173,9 @@ def write_truth(actor: Actor, path: Path) -> None:
             distances = [f"{value:.4f}" for value in (*points.reshape(-1), *lid_distances(points))]
             blink = int(now.blink[number]) or ""
             closure = f"{now.closure[number].mean():.5f}"
-            writer.writerow([number, f"{now.times_s[number]:.6f}", *distances, closure, blink, now.phase[number]])
+            writer.writerow(
+                [number, f"{now.times_s[number]:.6f}", *distances, closure, blink, now.phase[number]]
+            )
 
 
 def choose_frames(now: Course, count: int, within: int = 20_000) -> list[int]:
@@ -177,6 +196,7 @@ def label_points(actor: Actor, count: int, noise_px: float) -> dict[int, Values]
     rng = np.random.default_rng([actor.options.seed, 5])
     now = actor.course
     return {
-        number: landmarks(now.closure[number], now.head[number]) + rng.normal(0, noise_px, (18, 2)) * (noise_px > 0)
+        number: landmarks(now.closure[number], now.head[number])
+        + rng.normal(0, noise_px, (18, 2)) * (noise_px > 0)
         for number in choose_frames(now, count)
     }

@@ -111,7 +111,25 @@ def lash_shade(u, v, top, low, closure, lashes):
 
 
 @compiled
-def draw_eye(out, cover, x0, y0, inverse, centre, side, width, closure, gaze, light, face, margin, lid, iris, lashes, share):
+def draw_eye(
+    out,
+    cover,
+    x0,
+    y0,
+    inverse,
+    centre,
+    side,
+    width,
+    closure,
+    gaze,
+    light,
+    face,
+    margin,
+    lid,
+    iris,
+    lashes,
+    share,
+):
     """Add one exposure of one eye, weighted by `share`, into out and cover (h, w) float32.
 
     The patch starts at picture pixel (x0, y0); `inverse` (2, 3) leads from the picture to the face at rest.

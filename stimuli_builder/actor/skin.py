@@ -1,4 +1,4 @@
-"""Procedural textures of the synthetic face: skin with brows and nose, lid skin, iris. Grey levels 0 to 255."""
+"""Procedural textures of the synthetic face: skin with brows and nose, lid skin, iris; grey 0 to 255."""
 
 import cv2
 import numpy as np
@@ -57,7 +57,7 @@ def _moles(base: Texture, rng: np.random.Generator) -> Texture:
 
 
 def lid_texture(rng: np.random.Generator) -> Texture:
-    """Skin of the upper lid's plate: rows from the margin up to 0.5 eye widths, columns u from -0.6 to 0.6."""
+    """Skin of the upper lid's plate: rows from the margin up to 0.5 eye widths, columns u in -0.6 to 0.6."""
     fine = mottle(LID_SHAPE, (2.0,), rng)
     folds = cv2.GaussianBlur(rng.standard_normal(LID_SHAPE).astype(np.float32), (0, 0), sigmaX=24, sigmaY=2.2)
     veins = mottle(LID_SHAPE, (7.0, 16.0), rng)
@@ -70,12 +70,14 @@ def iris_texture(rng: np.random.Generator) -> Texture:
         np.tile(rng.standard_normal(IRIS_SHAPE).astype(np.float32), (1, 3)), (0, 0), sigmaX=1.6, sigmaY=9
     )[:, IRIS_SHAPE[1] : 2 * IRIS_SHAPE[1]]
     radius = np.linspace(0, 1, IRIS_SHAPE[0], dtype=np.float32)[:, None]
-    ring = np.where(radius > 0.86, 34 * (radius - 0.86) / 0.14, 0) - 14 * np.exp(-(((radius - 0.5) / 0.12) ** 2))
+    ring = np.where(radius > 0.86, 34 * (radius - 0.86) / 0.14, 0) - 14 * np.exp(
+        -(((radius - 0.5) / 0.12) ** 2)
+    )
     return np.asarray(84 + 11 * rays / rays.std() - ring, np.float32)
 
 
 def lash_texture(rng: np.random.Generator, columns: int = 512) -> Texture:
-    """Darkness of lashes along the margin, two rows: upper and lower lid, columns u from -0.6 to 0.6; 0 to 1."""
+    """Darkness of lashes along the margin, two rows: upper and lower lid, u from -0.6 to 0.6."""
     rows = []
     for count, thickness in ((34, 2.0), (26, 1.6)):
         places = np.sort(rng.uniform(0.1, 0.9, count)) * columns

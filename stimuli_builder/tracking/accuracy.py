@@ -71,7 +71,9 @@ def cross_validate(
     return sorted(results, key=lambda result: result.frame)
 
 
-def _held_out(model: CoupledModel, finder: Finder, frame: int, fold: int, picture: Picture, label: Points) -> HeldOut:
+def _held_out(
+    model: CoupledModel, finder: Finder, frame: int, fold: int, picture: Picture, label: Points
+) -> HeldOut:
     small = reduced(picture, model.reduction)
     middle = np.median(model.poses, axis=0)
     fits = [fit for fit in (finder.anywhere(small), finder.near(small, middle)) if fit is not None]
@@ -143,7 +145,9 @@ def compare_with_truth(track: Path, truth: Path) -> TruthReport:
     names, gaps = point_columns(2), distance_columns(2)
     for row, true in zip_longest(track_rows(track), track_rows(truth)):
         if row is None or true is None or row["frame"] != true["frame"]:
-            raise InputError(f"{track}: its frames are not those of {truth}; compare a track with its own truth")
+            raise InputError(
+                f"{track}: its frames are not those of {truth}; compare a track with its own truth"
+            )
         again += row.get("status") == "reinitialised"
         if row.get("status") == "lost":
             lost += 1

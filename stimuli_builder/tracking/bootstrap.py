@@ -36,10 +36,14 @@ def propose_labels(info: VideoInfo, out: Path, weights: Path | None, count: int)
         if points is not None and _inside(points, info.size_px):
             found[number] = points
     if len(found) < count:
-        raise InputError(f"{info.path}: a face was found on {len(found)} frames, {count} are needed; label by hand")
+        raise InputError(
+            f"{info.path}: a face was found on {len(found)} frames, {count} are needed; label by hand"
+        )
     chosen = most_varied(found, count)
     labels = Labels(out, info.size_px, default_markers(2), {number: found[number] for number in chosen})
-    save_labels(labels, info.path.name, "landmark detector on single frames, not reviewed; half-closed lids sit low")
+    save_labels(
+        labels, info.path.name, "landmark detector on single frames, not reviewed; half-closed lids sit low"
+    )
     return labels
 
 
@@ -66,7 +70,8 @@ def _detector(weights: Path | None) -> Any:
         raise InputError("label --bootstrap needs the optional extra: pip install 'palpebra[bootstrap]'")
     if weights is None or not weights.is_file():
         raise InputError(
-            f"expected --weights with a face_landmarker.task file, found {weights or 'none'}; no weights are shipped"
+            f"expected --weights with a face_landmarker.task file, found {weights or 'none'}; "
+            "no weights are shipped"
         )
     mediapipe = import_module("mediapipe")
     tasks = import_module("mediapipe.tasks.python")

@@ -1,4 +1,4 @@
-"""`stimuli track`, `stimuli train`, `stimuli accuracy` and `stimuli label`."""
+"""`stimuli track` and `stimuli train`; `stimuli label` and `stimuli accuracy` live in cli_labels.py."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -6,25 +6,35 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from stimuli_builder.tracking.learn import Lesson
     from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
     from stimuli_builder.video import VideoInfo
 
-Video = Annotated[Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")]
-LabelFile = Annotated[Path | None, typer.Option("--labels", help="Label file (JSON) of about 20 frames of VIDEO.")]
+Video = Annotated[
+    Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")
+]
+LabelFile = Annotated[
+    Path | None, typer.Option("--labels", help="Label file (JSON) of about 20 frames of VIDEO.")
+]
 OneEye = Annotated[bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points a frame.")]
-ShapeVariance = Annotated[float, typer.Option(help="Share of shape variance kept (n modes).", min=0.5, max=1.0)]
-LookVariance = Annotated[float, typer.Option(help="Share of appearance variance kept (m modes).", min=0.5, max=1.0)]
-CoupledVariance = Annotated[float, typer.Option(help="Share of coupled variance kept (l modes).", min=0.5, max=1.0)]
+ShapeVariance = Annotated[
+    float, typer.Option(help="Share of shape variance kept (n modes).", min=0.5, max=1.0)
+]
+LookVariance = Annotated[
+    float, typer.Option(help="Share of appearance variance kept (m modes).", min=0.5, max=1.0)
+]
+CoupledVariance = Annotated[
+    float, typer.Option(help="Share of coupled variance kept (l modes).", min=0.5, max=1.0)
+]
 FewestModes = Annotated[
     bool, typer.Option("--paper-modes/--variance-only", help="Keep at least the paper's 8, 10 and 10 modes.")
 ]
 BasePixels = Annotated[int, typer.Option(help="Pixels of the base mesh.", min=500, max=100_000)]
 Refine = Annotated[
     bool | None,
-    typer.Option("--refine/--no-refine", help="Make labels consistent with the pictures; unset: where it helps."),
+    typer.Option(
+        "--refine/--no-refine", help="Make labels consistent with the pictures; unset: where it helps."
+    ),
 ]
 Folds = Annotated[int, typer.Option(help="Folds of the accuracy report.", min=2, max=50)]
 VariableRate = Annotated[
@@ -34,20 +44,27 @@ VariableRate = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the commands of the tracker to `app`."""
+    from stimuli_builder.tracking.cli_labels import register as register_labels
+
     app.command()(track)
     app.command()(train)
-    app.command()(accuracy)
-    app.command()(label)
+    register_labels(app)
 
 
 def track(
     video: Video,
     out: Annotated[Path, typer.Option(help="Track to write (CSV).")],
     labels: LabelFile = None,
-    model: Annotated[Path | None, typer.Option(help="Reuse a model of 'stimuli train' instead of labels.")] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="Reuse a model of 'stimuli train' instead of labels.")
+    ] = None,
     one_eye: OneEye = False,
-    preview: Annotated[Path | None, typer.Option(help="Also draw mesh and distance trace on the video (MP4).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Also save the trace with labelled blinks (PNG, SVG, PDF).")] = None,
+    preview: Annotated[
+        Path | None, typer.Option(help="Also draw mesh and distance trace on the video (MP4).")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Also save the trace with labelled blinks (PNG, SVG, PDF).")
+    ] = None,
     shape_variance: ShapeVariance = 0.98,
     appearance_variance: LookVariance = 0.90,
     coupled_variance: CoupledVariance = 0.98,
@@ -59,9 +76,9 @@ def track(
 ) -> None:
     """Track the eyelids of a recording with the coupled active appearance model.
 
-    Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (one pair
-    distance_px with --one-eye), residual, iterations, status, reason. A frame that cannot be fitted has empty
-    points, the status 'lost' and its reason.
+    Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (with
+    --one-eye 9 points and distance_px), residual, iterations, status, reason. A frame that cannot be fitted
+    has empty points, the status 'lost' and its reason.
 
     Examples:
 
@@ -73,6 +90,7 @@ def track(
     """
     from experiments.errors import InputError
     from stimuli_builder.files import temporary_beside
+    from stimuli_builder.progress import frame_progress
     from stimuli_builder.tracking.learn import open_video
     from stimuli_builder.tracking.track import track_video
 
@@ -84,14 +102,14 @@ def track(
     info = open_video(video, accept_variable_rate)
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
     trained = _model(info, labels, model, options, one_eye, refine, folds)
-    with _progress() as progress:
+    with frame_progress() as progress:
         task = progress.add_task("tracking", total=info.frame_count)
         summary = track_video(
             trained, info, out, lambda now: progress.update(task, completed=now.frames, refresh=False)
         )
     print(
-        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked, {summary.reinitialised:,} re-initialised, "
-        f"{summary.lost:,} lost\n{summary.fit_fps:,.0f} frames/s fit only, "
+        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked, "
+        f"{summary.reinitialised:,} re-initialised, {summary.lost:,} lost\n{summary.fit_fps:,.0f} frames/s fit only, "
         f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
     )
     _pictures(trained, info, out, preview, plot)
@@ -113,8 +131,8 @@ def train(
 ) -> None:
     """Train the model on labelled frames, report its accuracy by fold, and save it.
 
-    Every labelled frame is left out of training once and then found without its label. The report gives the root
-    mean square distance of the landmarks from the labels and the error of the inter-eyelid distance.
+    Every labelled frame is left out of training once and then found without its label. The report gives the
+    root mean square distance of the landmarks from the labels and the error of the inter-eyelid distance.
 
     Examples:
 
@@ -138,58 +156,9 @@ def train(
         print(f"{out}: model saved")
 
 
-def accuracy(
-    track: Annotated[Path, typer.Argument(help="Track of the synthetic actor (CSV).")],
-    truth: Annotated[Path, typer.Argument(help="Truth that 'stimuli actor' wrote (CSV).")],
-) -> None:
-    """Compare a track of the synthetic actor with its exact truth.
-
-    Example:
-
-      stimuli accuracy track.csv truth.csv
-    """
-    from stimuli_builder.tracking.accuracy import compare_with_truth
-
-    report = compare_with_truth(track, truth)
-    blinks = "no blink" if report.blink_p95_px is None else f"{report.blink_p95_px:.3f} px in blinks"
-    print(
-        f"{report.frames:,} frames, {report.lost:,} lost, {report.reinitialised:,} re-initialised\n"
-        f"landmarks: RMS {report.rms_px:.3f} px, 95th percentile {report.p95_px:.3f} px, {blinks}\n"
-        f"inter-eyelid distance: error sd {report.distance_sd_px:.3f} px, bias {report.distance_bias_px:+.3f} px"
-    )
-
-
-def label(
-    video: Video,
-    out: Annotated[Path, typer.Option(help="Label file to write (JSON), to be corrected by hand.")],
-    bootstrap: Annotated[bool, typer.Option("--bootstrap", help="Propose labels with a landmark detector.")] = False,
-    weights: Annotated[
-        Path | None, typer.Option(help="Weights of the detector (face_landmarker.task); none are shipped.")
-    ] = None,
-    frames: Annotated[int, typer.Option(help="Frames to label, chosen for variety.", min=3, max=200)] = 20,
-    accept_variable_rate: VariableRate = False,
-) -> None:
-    """Propose labels for frames chosen for variety, with a face landmark detector (optional extra).
-
-    Needs the extra 'bootstrap' (MediaPipe) and a weights file of your own. A detector sets upper-lid points 1 to 2
-    pixels low on half-closed lids: review every frame on the labelling page before training.
-
-    Example:
-
-      stimuli label face.mp4 --bootstrap --weights face_landmarker.task --out face.labels.json
-    """
-    from experiments.errors import InputError
-    from stimuli_builder.tracking.bootstrap import propose_labels
-    from stimuli_builder.tracking.learn import open_video
-
-    if not bootstrap:
-        raise InputError("expected --bootstrap; to label by hand use the labelling page of the admin site")
-    info = open_video(video, accept_variable_rate)
-    labels = propose_labels(info, out, weights, frames)
-    print(f"{out}: {len(labels.frames)} frames proposed; review each one before training")
-
-
-def _options(shape: float, look: float, coupled: float, paper_modes: bool, base_pixels: int) -> "TrainingOptions":
+def _options(
+    shape: float, look: float, coupled: float, paper_modes: bool, base_pixels: int
+) -> "TrainingOptions":
     from stimuli_builder.tracking.model import TrainingOptions
 
     if paper_modes:
@@ -223,31 +192,14 @@ def _model(
     return trained
 
 
-def _progress() -> "Progress":
-    """A progress bar on stderr with frames/s and remaining time; silent where stderr is no terminal."""
-    import sys
-
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from stimuli_builder.tracking.speed import SpeedColumn
-
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        SpeedColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        disable=not sys.stderr.isatty(),
-    )
-
-
-def _pictures(model: "CoupledModel", info: "VideoInfo", out: Path, preview: Path | None, plot: Path | None) -> None:
+def _pictures(
+    model: "CoupledModel", info: "VideoInfo", out: Path, preview: Path | None, plot: Path | None
+) -> None:
     if preview is not None:
+        from stimuli_builder.progress import frame_progress
         from stimuli_builder.tracking.preview import write_preview
 
-        with _progress() as progress:
+        with frame_progress() as progress:
             task = progress.add_task("preview", total=info.frame_count)
             write_preview(model, info, out, preview, lambda: progress.advance(task))
         print(f"{preview}: preview written")
@@ -263,7 +215,8 @@ def _report_modes(lesson: "Lesson") -> None:
     kept = [f"{share:.1%}" for share in model.variance_kept]
     print(
         f"trained on {len(model.examples)} frames: {model.mode_counts[0]} shape modes ({kept[0]}), "
-        f"{model.mode_counts[1]} appearance modes ({kept[1]}), {model.mode_counts[2]} coupled modes ({kept[2]}), "
+        f"{model.mode_counts[1]} appearance modes ({kept[1]}), "
+        f"{model.mode_counts[2]} coupled modes ({kept[2]}), "
         f"{model.mesh.pixel_count:,} base pixels, labels {'refined' if lesson.refined else 'as given'}"
     )
 

@@ -1,6 +1,7 @@
 """Fitting the coupled AAM to one picture: the steepest-descent algebra, and buffers kept between frames."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +93,14 @@ def work_out(model: CoupledModel) -> Algebra:
 class Fitter:
     """Fits one model to pictures; keeps its buffers, so use one for each thread."""
 
-    def __init__(self, model: CoupledModel, *, stop_px: float = STOP_PX, most: int = MOST_ITERATIONS, prior: float = 0.0):
+    def __init__(
+        self,
+        model: CoupledModel,
+        *,
+        stop_px: float = STOP_PX,
+        most: int = MOST_ITERATIONS,
+        prior: float = 0.0,
+    ):
         self.model = model
         self.stop_px, self.most = stop_px, most
         algebra = work_out(model)
@@ -111,8 +119,17 @@ class Fitter:
     def fit(self, picture: Picture, c: Values, pose: Values, most: int | None = None) -> Fit:
         """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""
         c, pose = c.copy(), pose.copy()
-        iterations = kernels.fit(
-            picture, c, pose, most or self.most, self.stop_px, *self._fixed, *self._pixels, self._vertices, self._squares
+        run: Any = kernels.fit
+        iterations = run(
+            picture,
+            c,
+            pose,
+            most or self.most,
+            self.stop_px,
+            *self._fixed,
+            *self._pixels,
+            self._vertices,
+            self._squares,
         )
         return Fit(c, pose, self._vertices.copy(), np.sqrt(self._squares), int(iterations))
 

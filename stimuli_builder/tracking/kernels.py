@@ -27,7 +27,9 @@ def place(base, modes, c, pose, out):
 
 
 @compiled
-def sample(picture, vertices, triangles, starts, forms, px, py, out):
+def sample(
+    picture: Any, vertices: Any, triangles: Any, starts: Any, forms: Any, px: Any, py: Any, out: Any
+) -> None:
     """Piecewise affine warp: bilinear samples of `picture` (uint8) at every base pixel.
 
     Outside the picture its edge is repeated.
@@ -281,7 +283,9 @@ def fit(
     change = np.empty(size)
     matrix = np.empty((size, size))
     place(base, shape_modes, c, pose, vertices)
-    for iteration in range(1, most + 1):
+    iteration = 0
+    while iteration < most:
+        iteration += 1
         sample(picture, vertices, triangles, starts, forms, px, py, sampled)
         first = 0
         while first < count:

@@ -58,7 +58,8 @@ def load_labels(path: Path, size_px: tuple[int, int] | None = None, frame_count:
     width, height = _size(path, document)
     if size_px is not None and (width, height) != tuple(size_px):
         raise InputError(
-            f"{path}: labels were made on {width} x {height} pixels, the video has {size_px[0]} x {size_px[1]}; "
+            f"{path}: labels were made on {width} x {height} pixels, the video has "
+            f"{size_px[0]} x {size_px[1]}; "
             "use the video they were made on"
         )
     frames = _frames(path, document.get("frames"))
@@ -115,7 +116,9 @@ def _frames(path: Path, found: object) -> dict[int, Points]:
         frames[number] = _points(f"{path}: frame {number}", points)
     counts = sorted({len(points) for points in frames.values()})
     if len(counts) > 1:
-        raise InputError(f"{path}: some frames have {counts[0]} points and some {counts[-1]}; label all alike")
+        raise InputError(
+            f"{path}: some frames have {counts[0]} points and some {counts[-1]}; label all alike"
+        )
     return dict(sorted(frames.items()))
 
 
@@ -135,9 +138,12 @@ def _check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) -
     if len(outside):
         x, y = points[outside[0]]
         raise InputError(
-            f"{where}: point {outside[0] + 1} at ({x:g}, {y:g}) is outside the picture of {size[0]} x {size[1]}"
+            f"{where}: point {outside[0] + 1} at ({x:g}, {y:g}) is outside the picture "
+            f"of {size[0]} x {size[1]}"
         )
-    centres = [points[start : start + EYE_POINTS].mean(0)[0] for start in range(0, eyes * EYE_POINTS, EYE_POINTS)]
+    centres = [
+        points[start : start + EYE_POINTS].mean(0)[0] for start in range(0, eyes * EYE_POINTS, EYE_POINTS)
+    ]
     if centres != sorted(centres):
         raise InputError(f"{where}: the eyes are swapped; points 1 to 9 belong to the image-left eye")
     for eye in range(eyes):
@@ -147,7 +153,9 @@ def _check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) -
 def _check_eye(where: str, eye: Points, first: int) -> None:
     """Refuse an eye whose outline crosses itself by more than the wobble of a closed eye's labels."""
     if np.hypot(*(eye[5] - eye[0])) < 4:
-        raise InputError(f"{where}: canthi {first + 1} and {first + 6} are under 4 px apart; label a larger eye")
+        raise InputError(
+            f"{where}: canthi {first + 1} and {first + 6} are under 4 px apart; label a larger eye"
+        )
     along, down, width = eye_axis(eye)
     x, y = (eye - eye[0]) @ along / width, (eye - eye[0]) @ down / width
     sign = 1.0 if x[5] > 0 else -1.0
@@ -156,12 +164,16 @@ def _check_eye(where: str, eye: Points, first: int) -> None:
         wrong = np.flatnonzero(order < -ORDER_TOLERANCE)
         if len(wrong):
             a, b = list(names)[wrong[0]], list(names)[wrong[0] + 1]
-            raise InputError(f"{where}: points {first + a + 1} and {first + b + 1} cross; check the point order")
+            raise InputError(
+                f"{where}: points {first + a + 1} and {first + b + 1} cross; check the point order"
+            )
     steps = np.argsort(upper)
     upper_y = np.interp(sign * x[6:9], upper[steps], y[:6][steps])
     crossed = np.flatnonzero(upper_y - y[6:9] > CROSSING_TOLERANCE)
     if len(crossed):
-        raise InputError(f"{where}: lower-lid point {first + 7 + crossed[0]} lies above the upper lid; they cross")
+        raise InputError(
+            f"{where}: lower-lid point {first + 7 + crossed[0]} lies above the upper lid; they cross"
+        )
 
 
 def _markers(path: Path, document: dict[str, Any], eyes: int) -> LidMarkers:
@@ -173,8 +185,14 @@ def _markers(path: Path, document: dict[str, Any], eyes: int) -> LidMarkers:
             raise InputError(f"{path}: expected '{key}' with one list of points for each of {eyes} eyes")
         for number, eye in enumerate(given):
             allowed = range(EYE_POINTS * number, EYE_POINTS * (number + 1))
-            if not isinstance(eye, list) or not eye or any(type(p) is not int or p not in allowed for p in eye):
-                raise InputError(f"{path}: '{key}' names {eye!r}, expected points {allowed[0]} to {allowed[-1]}")
+            if (
+                not isinstance(eye, list)
+                or not eye
+                or any(type(p) is not int or p not in allowed for p in eye)
+            ):
+                raise InputError(
+                    f"{path}: '{key}' names {eye!r}, expected points {allowed[0]} to {allowed[-1]}"
+                )
         chosen.append(tuple(tuple(eye) for eye in given))
     return LidMarkers(chosen[0], chosen[1])
 

@@ -30,8 +30,8 @@ def open_video(path: Path, accept_variable_rate: bool = False) -> VideoInfo:
     if info.variable and not accept_variable_rate:
         steps = np.diff(info.times_s) * 1000
         raise InputError(
-            f"{path}: variable frame rate, steps of {steps.min():.1f} to {steps.max():.1f} ms; convert it to a "
-            "constant rate, or keep its own time stamps with --accept-variable-rate"
+            f"{path}: variable frame rate, steps of {steps.min():.1f} to {steps.max():.1f} ms; "
+            "convert it to a constant rate, or keep its own time stamps with --accept-variable-rate"
         )
     return info
 
@@ -49,8 +49,8 @@ def learn(
 
     Parameters
     ----------
-    refine : make labels consistent with the pictures first; None does so where frames left out of training then
-        come clearly nearer to their labels. Accuracy is always reported against the labels as they were given.
+    refine : make labels consistent with the pictures first; None does so where frames left out of training
+        then come clearly nearer to their labels. Accuracy is always reported against the labels as given.
     """
     labels = load_labels(labels_path, info.size_px, info.frame_count)
     _check_eyes(labels, one_eye)
@@ -64,7 +64,9 @@ def learn(
             held_out, refined = trial, True
     points = refined_labels(*given) if refined else labels.frames
     frames = sorted(points)
-    model = train([pictures[f] for f in frames], np.array([points[f] for f in frames]), labels.markers, options)
+    model = train(
+        [pictures[f] for f in frames], np.array([points[f] for f in frames]), labels.markers, options
+    )
     return Lesson(believing(model, residual_limits(held_out, labels.eyes)), labels, held_out, refined)
 
 

@@ -59,7 +59,9 @@ class BaseMesh:
     def weights(self) -> NDArray[np.float64]:
         """Barycentric coordinates of every pixel, (N, 3)."""
         forms = self.barycentric[self.triangle_of].astype(np.float64)
-        return np.asarray(forms[:, :, 0] * self.x[:, None] + forms[:, :, 1] * self.y[:, None] + forms[:, :, 2])
+        return np.asarray(
+            forms[:, :, 0] * self.x[:, None] + forms[:, :, 1] * self.y[:, None] + forms[:, :, 2]
+        )
 
     def neighbours(self) -> tuple[NDArray[np.uint32], ...]:
         """Pixel number of the left, right, upper and lower neighbour, each (N,).
@@ -108,7 +110,7 @@ def build_mesh(mean: Points, base_pixels: int) -> BaseMesh:
 
 def _eye_vertices(eye: int, eyes: int) -> NDArray[np.int64]:
     border = EYE_POINTS * eyes + BORDER_POINTS * eye
-    return np.r_[EYE_POINTS * eye : EYE_POINTS * (eye + 1), border : border + BORDER_POINTS]
+    return np.asarray(np.r_[EYE_POINTS * eye : EYE_POINTS * (eye + 1), border : border + BORDER_POINTS])
 
 
 def _area(points: Points, triangles: NDArray[np.int64]) -> float:
@@ -144,6 +146,8 @@ def _claim(owner: NDArray[np.int64], number: int, form: NDArray[np.float64], cor
     x0, y0 = np.floor(corners.min(0)).astype(int)
     x1, y1 = np.ceil(corners.max(0)).astype(int) + 1
     y, x = np.mgrid[y0:y1, x0:x1]
-    inside = ((form[:, 0, None, None] * x + form[:, 1, None, None] * y + form[:, 2, None, None]) > -1e-9).all(0)
+    inside = ((form[:, 0, None, None] * x + form[:, 1, None, None] * y + form[:, 2, None, None]) > -1e-9).all(
+        0
+    )
     part = owner[y0:y1, x0:x1]
     part[inside & (part < 0)] = number

@@ -13,7 +13,14 @@ from stimuli_builder.files import whole_file
 from stimuli_builder.tracking.kernels import sample
 from stimuli_builder.tracking.mesh import BaseMesh, build_mesh, mesh_from
 from stimuli_builder.tracking.picture import reduced, reduced_points
-from stimuli_builder.tracking.shapes import LidMarkers, Points, mean_shape, similarity_between, unmoved, with_border
+from stimuli_builder.tracking.shapes import (
+    LidMarkers,
+    Points,
+    mean_shape,
+    similarity_between,
+    unmoved,
+    with_border,
+)
 from stimuli_builder.video import Picture
 
 FORMAT = 1
@@ -80,7 +87,9 @@ class CoupledModel:
         return self.markers.eyes
 
 
-def train(pictures: list[Picture], points: Points, markers: LidMarkers, options: TrainingOptions) -> CoupledModel:
+def train(
+    pictures: list[Picture], points: Points, markers: LidMarkers, options: TrainingOptions
+) -> CoupledModel:
     """Learn the model from labelled frames.
 
     Parameters
@@ -180,14 +189,23 @@ def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
 def warped(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:
     """The picture pulled back from `shape` (V, 2) to the base frame: grey levels (N,)."""
     out = np.empty(mesh.pixel_count, np.float32)
-    sample(picture, shape.astype(np.float32), mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, out)
+    pull: Any = sample
+    pull(
+        picture, shape.astype(np.float32), mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, out
+    )
     return out.astype(np.float64)
 
 
-def _patches(pictures: list[Picture], shapes: Points, count: int = 5) -> tuple[Picture, NDArray[np.int64], Values]:
+def _patches(
+    pictures: list[Picture], shapes: Points, count: int = 5
+) -> tuple[Picture, NDArray[np.int64], Values]:
     """Eye regions of labelled frames spread over the range of shapes, cut at one common size."""
-    spread = np.ptp(shapes[:, :, 1], axis=1) * 0 + (shapes - shapes.mean(1, keepdims=True)).reshape(len(shapes), -1).var(1)
-    chosen = np.argsort(spread)[np.unique(np.linspace(0, len(shapes) - 1, min(count, len(shapes))).astype(int))]
+    spread = np.ptp(shapes[:, :, 1], axis=1) * 0 + (shapes - shapes.mean(1, keepdims=True)).reshape(
+        len(shapes), -1
+    ).var(1)
+    chosen = np.argsort(spread)[
+        np.unique(np.linspace(0, len(shapes) - 1, min(count, len(shapes))).astype(int))
+    ]
     sides = np.ceil(np.ptp(shapes, axis=1).max(0)).astype(int) + 2
     height, width = pictures[0].shape
     sides = np.minimum(sides, [width, height])
@@ -249,11 +267,15 @@ def load_model(path: Path) -> CoupledModel:
             arrays = {name: stored[name] for name in ARRAYS}
             mesh = mesh_from(stored["vertices"], stored["triangles"], stored["eye_of"])
     except FileNotFoundError as error:
-        raise InputError(f"{path}: expected a model file, found none; make one with 'stimuli train'") from error
+        raise InputError(
+            f"{path}: expected a model file, found none; make one with 'stimuli train'"
+        ) from error
     except Exception as error:
         raise InputError(f"{path}: not a model that 'stimuli train' wrote") from error
     if facts.get("format") != FORMAT:
-        raise InputError(f"{path}: model format {facts.get('format')}, this program reads {FORMAT}; train it again")
+        raise InputError(
+            f"{path}: model format {facts.get('format')}, this program reads {FORMAT}; train it again"
+        )
     return CoupledModel(mesh=mesh, **arrays, **_facts(facts))
 
 

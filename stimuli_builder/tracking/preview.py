@@ -20,7 +20,9 @@ TRACES = ((90, 170, 255), (255, 180, 70))
 SHIFT = 4
 
 
-def write_preview(model: CoupledModel, info: VideoInfo, track: Path, out: Path, advance: Callable[[], None]) -> None:
+def write_preview(
+    model: CoupledModel, info: VideoInfo, track: Path, out: Path, advance: Callable[[], None]
+) -> None:
     """Draw a finished track on its video.
 
     The model gives the triangles; the track is read row by row, so memory does not grow with its length.
@@ -75,8 +77,19 @@ def _draw_trace(panel: Picture, history: deque[NDArray[np.float64]], span: int, 
         good = np.isfinite(y)
         for part in np.split(np.arange(len(y)), np.flatnonzero(np.diff(good.astype(int))) + 1):
             if good[part[0]]:
-                cv2.polylines(panel, [_fixed(np.c_[x[part], y[part]])], False, TRACES[eye], 1, cv2.LINE_AA, SHIFT)
+                cv2.polylines(
+                    panel, [_fixed(np.c_[x[part], y[part]])], False, TRACES[eye], 1, cv2.LINE_AA, SHIFT
+                )
 
 
 def _write_text(canvas: Picture, text: str) -> None:
-    cv2.putText(canvas, text, (6, canvas.shape[0] - PANEL_PX + 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, TEXT, 1, cv2.LINE_AA)
+    cv2.putText(
+        canvas,
+        text,
+        (6, canvas.shape[0] - PANEL_PX + 14),
+        cv2.FONT_HERSHEY_SIMPLEX,
+        0.42,
+        TEXT,
+        1,
+        cv2.LINE_AA,
+    )

@@ -10,7 +10,9 @@ from stimuli_builder.tracking.accuracy import HeldOut
 def fold_lines(results: Sequence[HeldOut]) -> Iterator[str]:
     """One line a fold and one for all: RMS against labels, inter-eyelid distance, frames not found."""
     yield "accuracy on frames left out of training, in pixels of the video, against the labels as given"
-    yield f"{'fold':>6} {'frames':>7} {'RMS':>8} {'median':>8} {'worst':>8} {'distance bias':>14} {'sd':>7}  not found"
+    names = ("fold", "frames", "RMS", "median", "worst", "distance bias", "sd")
+    widths = (6, 7, 8, 8, 8, 14, 7)
+    yield " ".join(f"{name:>{width}}" for name, width in zip(names, widths, strict=True)) + "  not found"
     for fold in sorted({result.fold for result in results}):
         yield _line(str(fold + 1), [result for result in results if result.fold == fold])
     yield _line("all", results)

@@ -1,4 +1,4 @@
-"""Finding the eyes again: several closures at a known place, or the whole picture by patches of labelled frames."""
+"""Finding the eyes again: closures tried at a known place, or patches of labelled frames anywhere."""
 
 from collections.abc import Iterator
 
@@ -62,8 +62,9 @@ class Finder:
         for _, number, scale, place in found[:CANDIDATES]:
             frame = int(self._model.patch_frames[number])
             corner = (np.array(place) + 0.5) * self._factor - 0.5
-            yield self._model.examples[frame], _carried(
-                self._model.poses[frame], self._model.patch_corners[number], corner, scale
+            yield (
+                self._model.examples[frame],
+                _carried(self._model.poses[frame], self._model.patch_corners[number], corner, scale),
             )
 
 
@@ -81,7 +82,9 @@ def inside(fit: Fit, picture: Picture) -> bool:
     eyes = len(fit.residuals)
     points = fit.vertices[: EYE_POINTS * eyes]
     height, width = picture.shape
-    return bool((points > -0.5).all() and (points[:, 0] < width - 0.5).all() and (points[:, 1] < height - 0.5).all())
+    return bool(
+        (points > -0.5).all() and (points[:, 0] < width - 0.5).all() and (points[:, 1] < height - 0.5).all()
+    )
 
 
 def _spread_closures(fitter: Fitter) -> list[Values]:

@@ -78,7 +78,9 @@ def with_border(points: Points) -> Points:
 
     The border is fixed to the canthi alone, so that it stays with the face while the lids move.
     """
-    return np.concatenate([points, *[_border(points[s : s + EYE_POINTS]) for s in range(0, len(points), EYE_POINTS)]])
+    return np.concatenate(
+        [points, *[_border(points[s : s + EYE_POINTS]) for s in range(0, len(points), EYE_POINTS)]]
+    )
 
 
 def _border(eye: Points) -> Points:

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 COLUMN_MEANINGS = {
     "frame": "frame number from 0",
     "time_s": "presentation time of the frame in seconds, from 0",
-    "x01": "first landmark in pixels, x to the right, pixel centres at integers; likewise to x18 (x09 for one eye)",
+    "x01": "first landmark in pixels, x to the right, centres at integers; so on to x18 (one eye: x09)",
     "y01": "first landmark in pixels, y down; likewise to y18 (y09 for one eye)",
-    "left_distance_px": "inter-eyelid distance of the image-left eye at right angles to the canthus line",
+    "left_distance_px": "inter-eyelid distance of the image-left eye, square to the canthus line",
     "right_distance_px": "the same of the image-right eye",
     "distance_px": "the same in one-eye tracks, instead of the two columns before",
-    "residual": "root mean square difference of model and picture over the eye regions, grey levels of 0 to 255",
+    "residual": "root mean square difference of model and picture over the eyes, grey levels of 0 to 255",
     "iterations": "Gauss-Newton iterations used",
     "status": "tracked, reinitialised (found again by search) or lost (points and distances are empty)",
     "reason": "why a frame is lost, or after what it was found again; empty for tracked frames",
@@ -44,7 +44,16 @@ def distance_columns(eyes: int) -> list[str]:
 
 def track_columns(eyes: int) -> list[str]:
     """All columns of a track in order."""
-    return ["frame", "time_s", *point_columns(eyes), *distance_columns(eyes), "residual", "iterations", "status", "reason"]
+    return [
+        "frame",
+        "time_s",
+        *point_columns(eyes),
+        *distance_columns(eyes),
+        "residual",
+        "iterations",
+        "status",
+        "reason",
+    ]
 
 
 class TrackWriter:
@@ -68,7 +77,9 @@ class TrackWriter:
         else:
             cells = [f"{value:.3f}" for value in (*frame.points.ravel().tolist(), *frame.distances.tolist())]
         residual = "" if frame.residual is None else f"{frame.residual:.3f}"
-        self._writer.writerow([number, f"{time_s:.6f}", *cells, residual, frame.iterations, frame.status, frame.reason])
+        self._writer.writerow(
+            [number, f"{time_s:.6f}", *cells, residual, frame.iterations, frame.status, frame.reason]
+        )
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -96,4 +107,6 @@ def numbers(row: dict[str, str], names: list[str], where: str) -> NDArray[np.flo
     try:
         return np.array([float(row[name]) if row[name] else np.nan for name in names])
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{where}: row {row.get('frame')} has no number in one of {names[0]} to {names[-1]}") from error
+        raise InputError(
+            f"{where}: row {row.get('frame')} has no number in one of {names[0]} to {names[-1]}"
+        ) from error

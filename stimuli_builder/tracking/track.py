@@ -1,7 +1,7 @@
 """Tracking a video: every frame ends fitted, or with a status and a reason, never with a wrong number."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -107,7 +107,7 @@ class Tracker:
         residual = _overall(best) if best is not None and best.iterations else None
         return TrackedFrame("lost", self._loss, None, None, residual, best.iterations if best else 0)
 
-    def _attempts(self, picture: Picture):  # type: ignore[no-untyped-def]
+    def _attempts(self, picture: Picture) -> Iterator[Fit]:
         """Fits from likely starts: near the last place often, over the whole picture now and then."""
         count = self._lost_frames
         if self._last is not None and (count < NEAR_EVERY_FRAME or count % NEAR_LATER_EVERY == 0):
