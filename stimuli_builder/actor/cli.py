@@ -32,8 +32,8 @@ def actor(
     """Generate a high-speed recording of a synthetic actor, with exact truth and label files.
 
     Blinks, head drift, gaze, light and sensor noise follow published statistics. The truth has the columns of
-    a track up to the distances, then closure (0 open, 1 closed, mean of both eyes), blink (number from 1, empty
-    between blinks) and phase (open, down, up).
+    a track up to the distances, then closure (0 open, 1 closed, mean of both eyes), blink (number from 1,
+    empty between blinks) and phase (open, down, up).
 
     Examples:
 

@@ -102,9 +102,9 @@ class Actor:
         draw: Any = draw_eye
         for closure in closures:
             draw(
-                part, seen, x0, y0, inverse, np.array(EYE_CENTRES[eye]), 1.0 - 2.0 * eye, EYE_WIDTH_PX,
-                closure, now.gaze[number], now.light[number], self._face, float(skin.MARGIN_PX), self._lid, self._iris,
-                self._lashes, 1.0 / len(closures),
+                part, seen, x0, y0, inverse, np.array(EYE_CENTRES[eye]), 1.0 - 2.0 * eye,
+                EYE_WIDTH_PX, closure, now.gaze[number], now.light[number], self._face,
+                float(skin.MARGIN_PX), self._lid, self._iris, self._lashes, 1.0 / len(closures),
             )  # fmt: skip
         picture[y0:y1, x0:x1] = part
 

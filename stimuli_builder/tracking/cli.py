@@ -109,7 +109,8 @@ def track(
         )
     print(
         f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked, "
-        f"{summary.reinitialised:,} re-initialised, {summary.lost:,} lost\n{summary.fit_fps:,.0f} frames/s fit only, "
+        f"{summary.reinitialised:,} re-initialised, {summary.lost:,} lost\n"
+        f"{summary.fit_fps:,.0f} frames/s fit only, "
         f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
     )
     _pictures(trained, info, out, preview, plot)

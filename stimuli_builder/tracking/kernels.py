@@ -27,9 +27,7 @@ def place(base, modes, c, pose, out):
 
 
 @compiled
-def sample(
-    picture: Any, vertices: Any, triangles: Any, starts: Any, forms: Any, px: Any, py: Any, out: Any
-) -> None:
+def sample(picture, vertices, triangles, starts, forms, px, py, out):
     """Piecewise affine warp: bilinear samples of `picture` (uint8) at every base pixel.
 
     Outside the picture its edge is repeated.
