@@ -7,7 +7,7 @@ export const de: Messages = {
   try_again: "Noch einmal versuchen",
   start_study: "Beginnen",
   preview_note: "Vorschau: Diese Antworten werden später gelöscht.",
-  minutes: "Etwa {minutes} Minuten",
+  minutes: "Etwa {minutes} min",
   choose_language: "Sprache",
   step: "Schritt {step} von {steps}",
 
@@ -17,7 +17,7 @@ export const de: Messages = {
   saving_offline: "Gerade besteht keine Verbindung. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald sie wieder da ist.",
   not_saved: "Der Server hat das nicht angenommen: {message}",
 
-  form_required: "nötig",
+  form_required: "erforderlich",
   form_missing: "Bitte beantworten Sie diese Frage.",
   form_number: "Bitte geben Sie eine ganze Zahl von {minimum} bis {maximum} ein.",
   form_length: "Bitte höchstens {maximum} Zeichen.",

@@ -5,7 +5,7 @@ export const en = {
   try_again: "Try again",
   start_study: "Start",
   preview_note: "Preview: these answers are deleted later.",
-  minutes: "About {minutes} minutes",
+  minutes: "About {minutes} min",
   choose_language: "Language",
   step: "Step {step} of {steps}",
 
@@ -15,7 +15,7 @@ export const en = {
   saving_offline: "There is no connection at the moment. Your answers are safe on this device and will be sent as soon as it is back.",
   not_saved: "The server did not accept this: {message}",
 
-  form_required: "needed",
+  form_required: "required",
   form_missing: "Please answer this question.",
   form_number: "Please enter a whole number from {minimum} to {maximum}.",
   form_length: "Please use at most {maximum} characters.",

@@ -16,11 +16,10 @@ import { Outbox } from "./outbox/outbox";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
 import { claimTab } from "./screen/one-tab";
 import { completed, RatingsMissing, showCompletion } from "./screens/finish";
-import { showNotice } from "./screens/notice";
+import { emptied, showNotice } from "./screens/notice";
 import { openStopDialog } from "./screens/stop-dialog";
 import type { Session } from "./session";
 import { button } from "../ui/page";
-import { h } from "../ui/element";
 
 const RETURNS = 3;
 
@@ -45,12 +44,14 @@ export async function main(root: HTMLElement): Promise<void> {
 
 async function visit(root: HTMLElement, t: Translate, link_token: string, link: LinkDocument, language: string): Promise<void> {
   const identity = new Identity(link_token, link.kind, location.search);
-  if (link.status !== "open" && !(link.resumable && identity.isKnown) && link.status !== "used") return showRefusal(root, t, link.status);
+  // A visit that this browser or this personal link has begun may go on though no new one may begin.
+  const returns = identity.isKnown || link.resumable;
+  if (link.status !== "open" && !returns) return showRefusal(root, t, link.status);
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
   const found = await passGates(root, t, link_token, link, store.durable);
   if (!found) return;
   if (!(await oneTab(root, t, link_token))) return;
-  const chosen = identity.isKnown ? language : await startPage(root, link, language);
+  const chosen = returns ? language : await startPage(root, link, language);
   const start = { language: chosen, client_id: identity.client_id(), query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
   const started = await persistently(root, t, () => startRun(link_token, start));
   const outbox = new Outbox(store, { onUnauthorized: () => root.dispatchEvent(new CustomEvent("taken-over")) });
@@ -90,6 +91,7 @@ async function play(session: Session, started: StartedRun, durable: boolean): Pr
   void describeDevice(session, durable);
   root.replaceChildren();
   await runTimeline(root, timeline(session, started.run_token), simulation(run));
+  if (session.completion) showCompletion(session, emptied(root), session.completion);
 }
 
 /** Only previews and synthetic runs may answer themselves. */
@@ -100,12 +102,11 @@ function simulation(run: RunDocument): SimulationMode | null {
 
 async function ended(root: HTMLElement, t: Translate, run: RunDocument, started: StartedRun, identity: Identity): Promise<void> {
   if (run.status === "withdrawn") return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn") });
+  if (run.status === "screened_out") return void showNotice(root, { title: t("screened_out_title"), text: t("screened_out") });
   const done = await persistently(root, t, () => completed(started.run_token));
-  const display = h("div", { class: "notice" });
-  root.replaceChildren(display);
   // On a laboratory's computer the next person comes by the same link.
   const next = identity.isNamed ? [] : [button(t("new_visit"), () => (identity.forget(), location.reload()), "plain")];
-  showCompletion({ t, run }, display, done, next);
+  showCompletion({ t, run }, emptied(root), done, next);
 }
 
 function showProblem(root: HTMLElement, t: Translate, error: unknown): void {

@@ -1,5 +1,5 @@
 /** All that the screens of one visit share. */
-import type { AssignedTrial, Calibration, LinkDocument, Receipt, RunDocument, Stage } from "../api/participant";
+import type { AssignedTrial, Calibration, Completion, LinkDocument, Receipt, RunDocument, Stage } from "../api/participant";
 import type { Translate } from "../i18n";
 import type { EventLog } from "./outbox/events";
 import type { Outbox, Outcome } from "./outbox/outbox";
@@ -25,6 +25,8 @@ export interface Session {
   /** Aborted when this page must do nothing more: another tab took over, or the participant stopped. */
   over: AbortController;
   api: RunApi;
+  /** What the server gave at the end. */
+  completion: Completion | null;
   /** Answered main and attention trials so far. */
   answered: number;
 }

@@ -38,7 +38,7 @@ export function restNodes(session: Session, block: number): Node[] {
 
 export function blockNodes(session: Session, block: number, next: number | null): Node[] {
   const trials = trialsOf(session, block);
-  const open = trials.filter((one) => !one.answered);
+  const open = trials.filter((one) => !one.answered && one.plays_done === 0);
   return [{
     timeline: [preloadNode(session, trials), ...trialNodes(session, open), ...repetitions(session, block)],
     on_timeline_start: () => (enterStage(session, "trials"), fetchAhead(session, trials, next)),

@@ -21,13 +21,19 @@ export async function persistently<Body>(root: HTMLElement, t: Translate, ask: (
 }
 
 export const fetchLink = (token: string): Promise<LinkDocument> => call("GET", `/api/links/${encodeURIComponent(token)}`);
-export const fetchRun = (token: string): Promise<RunDocument> => call("GET", "/api/run", { token, timeout_ms: 30_000 });
+
+/** The run as the page sees it: practice is no block. */
+export async function fetchRun(token: string): Promise<RunDocument> {
+  const run = await call<RunDocument>("GET", "/api/run", { token, timeout_ms: 30_000 });
+  return { ...run, blocks: run.blocks.filter(({ block }) => block > 0) };
+}
+
 export const startRun = (link_token: string, body: object): Promise<StartedRun> =>
   call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body });
 
 const REFUSALS: Record<string, MessageKey> = {
   link_unknown: "link_unknown", study_closed: "link_closed", link_used: "link_used", run_too_old: "run_too_old",
-  link_full: "link_full", link_expired: "link_expired", study_paused: "link_paused", closed: "link_closed",
+  study_full: "link_full", link_expired: "link_expired", study_paused: "link_paused", closed: "link_closed",
   expired: "link_expired", full: "link_full", paused: "link_paused", used: "link_used",
 };
 

@@ -35,6 +35,7 @@ export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocum
     replays: new Replays(),
     over: new AbortController(),
     api: new RunApi(outbox),
+    completion: null,
     answered: counted(run).filter((trial) => trial.answered).length,
   };
   owed(run.trials).forEach(({ trial, play }) => session.replays.add(trial, play));

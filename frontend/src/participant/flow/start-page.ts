@@ -3,13 +3,13 @@ import type { LinkDocument } from "../../api/participant";
 import { languageName, translator } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
 import { button, showPage } from "../../ui/page";
+import { emptied } from "../screens/notice";
 import { setLanguage } from "./appearance";
 
 /** Resolves with the language chosen when the participant starts. */
 export function startPage(root: HTMLElement, link: LinkDocument, language: string): Promise<string> {
   return new Promise((resolve) => {
-    const display = h("div", { class: "notice" });
-    root.replaceChildren(display);
+    const display = emptied(root);
     const draw = (chosen: string): void => {
       setLanguage(chosen);
       const t = translator(chosen);

@@ -10,7 +10,8 @@ export interface Showing {
   frames: number;
   fps: number;
   stalls: number;
-  focus_lost: boolean;
+  /** How often the page was hidden or lost focus. */
+  focus_lost: number;
 }
 
 export interface Screen { refresh_rate_hz: number | null; device_pixel_ratio: number }
@@ -34,7 +35,7 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
     frames_missing: sum(showings.map((showing) => Math.max(0, showing.frames - distinct(showing.drawn)))),
     longest_gap_ms: gaps.length ? round(Math.max(...gaps)) : null,
     stalls: sum(showings.map((showing) => showing.stalls)),
-    focus_lost: showings.some((showing) => showing.focus_lost),
+    focus_lost: sum(showings.map((showing) => showing.focus_lost)),
     ...screen,
     drawn: showings.flatMap(({ drawn, key_at_ms }) =>
       drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),

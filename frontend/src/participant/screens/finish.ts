@@ -26,6 +26,7 @@ export function finish(session: Session): PluginClass<Parameters> {
     async simulate({ token }) {
       await session.outbox.drained();
       const done = await completed(token);
+      session.completion = done;
       return { completion_code: done.completion_code ?? "" };
     },
     act: () => {},
@@ -43,8 +44,8 @@ async function complete(session: Session, display: HTMLElement, token: string): 
   await session.outbox.drained();
   const done = await completed(token);
   clearInterval(tell);
-  showCompletion(session, display, done);
   await leaveFullScreen();
+  session.completion = done;
   return { completion_code: done.completion_code ?? "" };
 }
 
@@ -62,6 +63,7 @@ export async function completed(token: string): Promise<Completion> {
   }
 }
 
+/** The last page. It lies outside the timeline, which clears what its screens have shown. */
 export function showCompletion(session: Pick<Session, "t" | "run">, display: HTMLElement, done: Completion, extra: HTMLElement[] = []): void {
   const { t, run } = session;
   const code = done.completion_code && h("div", { class: "code" }, h("p", { class: "help" }, t("done_code")), codeRow(t("done_copy"), t("done_copied"), done.completion_code));

@@ -9,11 +9,15 @@ export interface Notice {
   actions?: { label: string; press: () => void }[];
 }
 
-export function showNotice(root: HTMLElement, notice: Notice): HTMLElement {
-  // jsPsych keeps its own element in the root; a new one takes its place and the old timeline ends unseen.
+/** A fresh place in the root. jsPsych's own element goes, and with it whatever its timeline still shows. */
+export function emptied(root: HTMLElement): HTMLElement {
   const display = h("div", { class: "notice" });
   root.replaceChildren(display);
-  root.classList.remove("jspsych-display-element");
+  return display;
+}
+
+export function showNotice(root: HTMLElement, notice: Notice): HTMLElement {
+  const display = emptied(root);
   const buttons = (notice.actions ?? []).map(({ label, press }, place) => button(label, press, place ? "quiet" : "primary"));
   showPage(display, { title: notice.title, body: [h("p", { role: "alert" }, notice.text), ...(notice.more ?? [])], actions: buttons });
   return display;

@@ -18,7 +18,7 @@ import { simulatedRating } from "./simulated";
 import { stage, type Stage } from "./stage";
 
 export interface ClipRatingParameters { trial: AssignedTrial; play: number; next: AssignedTrial | null; number: number; total: number }
-export interface ClipRatingData { response: number | null; rt: number | null; frames_missing: number; key_to_first_frame_ms: number | null; again: boolean }
+export interface ClipRatingData { response: number | null; rt: number | null; frames_missing: number | null; key_to_first_frame_ms: number | null; again: boolean }
 
 export function clipRating(session: Session): PluginClass<ClipRatingParameters> {
   return plugin<ClipRatingParameters, ClipRatingData>({
@@ -90,7 +90,7 @@ async function watch(session: Session, place: Stage, { number, total, play, tria
     const note = play > 1 ? t("ready_replay") : t(key, { number, total });
     const key_at_ms = await waitForStart(session, place, prompt, note);
     showings.push(await showOnce(session, place, sha256, key_at_ms));
-    if (showings.some((shown) => shown.focus_lost)) session.events.add("focus_lost", { trial_index: trial.trial_index });
+    if (showings.some((shown) => shown.focus_lost > 0)) session.events.add("focus_lost", { trial_index: trial.trial_index });
   }
   return showings;
 }

@@ -1,0 +1,86 @@
+"""A real `server run` in a process of its own, that can be killed and started again on the same data."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+
+from server.cli_common import migrated_services
+from server.settings import Settings
+from tests.helpers.studies import StudyInDatabase, add_study
+
+START_LIMIT_S = 60.0
+
+
+def free_port() -> int:
+    """A port nobody listens on at the moment."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+class ServerProcess:
+    """The server on a data folder. `kill` is kill -9; `start` after it takes the same port."""
+
+    def __init__(self, data_folder: Path) -> None:
+        self.settings = Settings(data_folder=data_folder, secret_key="browser tests")
+        self.port = free_port()
+        self.log = data_folder.with_suffix(".log")
+        self.process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def address(self) -> str:
+        return f"http://localhost:{self.port}"
+
+    def add_study(self, folder: Path, text: str) -> StudyInDatabase:
+        """Take in a declaration with tiny clips, live; its `link_token` leads to /run/."""
+        with migrated_services(self.settings) as services:
+            return add_study(services, folder, text)
+
+    def query(self, work: Callable[..., object], *arguments: object) -> object:
+        """Call `work(session, ...)` on the server's database."""
+        with migrated_services(self.settings) as services, services.database.read() as session:
+            return work(session, *arguments)
+
+    def start(self) -> "ServerProcess":
+        environment = os.environ | {
+            "PALPEBRA_DATA_FOLDER": str(self.settings.data_folder),
+            "PALPEBRA_SECRET_KEY": self.settings.secret_key,
+        }
+        command = [sys.executable, "-m", "server", "run", "--port", str(self.port)]
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+        self._wait()
+        return self
+
+    def kill(self) -> None:
+        """End it as a power cut would."""
+        self._end(signal.SIGKILL)
+
+    def stop(self) -> None:
+        self._end(signal.SIGTERM)
+
+    def _end(self, how: signal.Signals) -> None:
+        if self.process is not None:
+            self.process.send_signal(how)
+            self.process.wait(timeout=30)
+            self.process = None
+
+    def _wait(self) -> None:
+        limit = time.monotonic() + START_LIMIT_S
+        while time.monotonic() < limit:
+            if self.process is not None and self.process.poll() is not None:
+                raise RuntimeError(f"the server ended at once:\n{self.log.read_text()[-3000:]}")
+            try:
+                with urllib.request.urlopen(f"{self.address}/healthz", timeout=2):
+                    return
+            except (urllib.error.URLError, ConnectionError, TimeoutError):
+                time.sleep(0.1)
+        raise RuntimeError(f"the server did not answer within {START_LIMIT_S:.0f} s")
