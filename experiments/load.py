@@ -102,6 +102,8 @@ def _problem(detail: Any, text: str) -> Problem:
         allowed = [tag.strip(" '") for tag in str(context["expected_tags"]).split(",")]
         tag = str(context["tag"])
         message = f"no such {context['discriminator']} '{tag}'{did_you_mean(tag, allowed)}"
+    elif detail["type"] == "union_tag_not_found":
+        message = f"the key {detail['ctx']['discriminator']} is required and missing"
     elif detail["type"] == "missing":
         message = "this key is required and missing"
     elif "input" in detail and isinstance(detail["input"], str | int | float | bool):

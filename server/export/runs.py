@@ -42,7 +42,7 @@ def run_rows(session: Session, study: Study) -> Iterator[list[Any]]:
 
 def _values(session: Session, run: StudyRun) -> dict[str, Any]:
     query = select(FormAnswer.form, FormAnswer.answers).where(FormAnswer.study_run_id == run.id)
-    answers = session.execute(query).tuples()
+    answers = session.execute(query)
     return {
         "run": run.public_id,
         "participant": run.participant,

@@ -34,7 +34,7 @@ class HeatMap:
                 .where(StudyRun.study_id == study_id, Rating.id > self._last_id - _READ_AGAIN)
                 .order_by(Rating.id)
             )
-            return self._take(session.execute(query).tuples())
+            return self._take(session.execute(query))
 
     def _take(self, rows: Iterable[tuple[int, int, int, str]]) -> set[int]:
         changed = set()

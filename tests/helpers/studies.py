@@ -52,6 +52,9 @@ per_block = 1
 [session]
 lease_minutes = 60
 
+[trial]
+kind = "clip_rating"
+
 [trial.scale]
 question = { en = "How natural?", de = "Wie natürlich?" }
 low = { en = "not at all", de = "gar nicht" }

@@ -1,5 +1,6 @@
 """Every server test runs on SQLite and PostgreSQL; see tests/helpers."""
 
+from tests.helpers.admins import experimenter, owner, viewer  # noqa: F401 - fixtures
 from tests.helpers.databases import (  # noqa: F401 - fixtures
     database_url,
     empty_database_url,

@@ -1,0 +1,116 @@
+import pyotp
+import pytest
+from fastapi.testclient import TestClient
+
+from server.accounts import service
+from server.accounts.identity import COOKIE
+from server.app import create_app
+from server.context import Services
+from server.models import Account, AdminSession, ApiToken, Invitation
+from server.settings import Settings
+from tests.helpers.admins import PASSWORD, Admin
+
+
+def fresh(settings: Settings) -> TestClient:
+    return TestClient(create_app(settings), base_url=settings.public_url, raise_server_exceptions=False)
+
+
+def test_a_one_time_link_works_once(settings: Settings, services: Services) -> None:
+    _, token = service.invite(services.database, "owner", "first", None)
+    client = fresh(settings)
+    assert client.get("/api/admin/session").json() == {"account": None, "accounts_exist": False}
+    body = {"name": "ada", "password": PASSWORD}
+    assert client.post(f"/api/admin/invitations/{token}/account", json=body).status_code == 201
+    assert client.get("/api/admin/session").json()["account"]["role"] == "owner"
+    again = client.post(f"/api/admin/invitations/{token}/account", json=body | {"name": "eve"})
+    assert (again.status_code, again.json()["error"]["code"]) == (409, "conflict")
+
+
+@pytest.mark.parametrize("password", ["short", "a" * 20, "the owner!"[:9]])
+def test_a_weak_password_is_refused(settings: Settings, services: Services, password: str) -> None:
+    _, token = service.invite(services.database, "owner", "", None)
+    answer = fresh(settings).post(
+        f"/api/admin/invitations/{token}/account", json={"name": "ada", "password": password}
+    )
+    assert (answer.status_code, answer.json()["error"]["code"]) == (422, "weak_password")
+
+
+def test_secrets_are_stored_hashed(services: Services, owner: Admin) -> None:
+    token = owner.send("POST", "/tokens", {"name": "script", "scopes": ["read"]}).json()["token"]
+    cookie = owner.client.cookies[COOKIE]
+    with services.database.read() as session:
+        stored = [
+            *(row.password_hash for row in session.query(Account)),
+            *(row.token_hash for row in session.query(AdminSession)),
+            *(row.token_hash for row in session.query(ApiToken)),
+            *(row.token_hash for row in session.query(Invitation)),
+        ]
+    assert not [text for text in stored if PASSWORD in text or token in text or cookie in text]
+
+
+def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(
+    settings: Settings, services: Services
+) -> None:
+    _, token = service.invite(services.database, "owner", "", None)
+    made = fresh(settings).post(
+        f"/api/admin/invitations/{token}/account", json={"name": "ada", "password": PASSWORD}
+    )
+    cookie = made.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=strict" in cookie
+
+
+def test_ten_wrong_passwords_lock_the_account(settings: Settings, owner: Admin) -> None:
+    client = fresh(settings.model_copy(update={"logins_per_minute": 1000}))
+    for _ in range(10):
+        wrong = client.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
+        assert (wrong.status_code, wrong.json()["error"]["code"]) == (401, "wrong_credentials")
+    locked = client.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
+    assert (locked.status_code, locked.json()["error"]["code"]) == (429, "account_locked")
+    assert int(locked.headers["retry-after"]) > 0
+
+
+def test_an_unknown_name_and_a_wrong_password_are_told_alike(settings: Settings, owner: Admin) -> None:
+    client = fresh(settings)
+    one = client.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
+    two = client.post("/api/admin/session", json={"name": "nobody", "password": "wrong"})
+    assert one.json() == two.json()
+
+
+def test_second_factor_and_recovery_codes(settings: Settings, owner: Admin) -> None:
+    setup = owner.send("POST", "/second-factor").json()
+    assert setup["qr_svg"].startswith("<?xml")
+    code = pyotp.TOTP(setup["secret"]).now()
+    recovery = owner.send("PUT", "/second-factor", {"code": code}).json()["codes"]
+    credentials = {"name": owner.name, "password": PASSWORD}
+    client = fresh(settings)
+    missing = client.post("/api/admin/session", json=credentials)
+    assert missing.json()["error"]["code"] == "second_factor_required"
+    replayed = client.post("/api/admin/session", json=credentials | {"code": code})
+    assert replayed.status_code == 401
+    assert client.post("/api/admin/session", json=credentials | {"code": recovery[0]}).status_code == 200
+    assert client.post("/api/admin/session", json=credentials | {"code": recovery[0]}).status_code == 401
+
+
+def test_a_revoked_session_is_over(settings: Settings, owner: Admin) -> None:
+    other = fresh(settings)
+    other.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
+    [session] = [row for row in owner.get("/sessions").json() if not row["current"]]
+    assert owner.send("DELETE", f"/sessions/{session['id']}").status_code == 204
+    assert other.get("/api/admin/studies").status_code == 401
+
+
+def test_a_new_password_ends_other_sessions(settings: Settings, owner: Admin) -> None:
+    other = fresh(settings)
+    other.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
+    body = {"password": PASSWORD, "new_password": "another long one"}
+    assert owner.send("PUT", "/password", body).status_code == 204
+    assert other.get("/api/admin/studies").status_code == 401
+    assert owner.get("/studies").status_code == 200
+
+
+def test_another_sites_page_cannot_change_anything(owner: Admin) -> None:
+    answer = owner.send(
+        "POST", "/tokens", {"name": "x", "scopes": ["read"]}, headers={"origin": "https://evil.example"}
+    )
+    assert (answer.status_code, answer.json()["error"]["code"]) == (403, "not_allowed")

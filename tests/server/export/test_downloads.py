@@ -1,0 +1,66 @@
+import csv
+import io
+import json
+import zipfile
+
+from experiments.ratings import csv_header
+from server.export.codebook import RUN_COLUMNS
+from tests.helpers.admins import Admin
+from tests.helpers.studies import Participant, StudyInDatabase
+
+
+def table(text: str) -> list[list[str]]:
+    return list(csv.reader(io.StringIO(text)))
+
+
+def test_the_ratings_csv_has_the_columns_of_the_contract(viewer: Admin, participant: Participant) -> None:
+    participant.agree().rate_all()
+    rows = table(viewer.get("/studies/short/data/ratings.csv").text)
+    assert rows[0] == csv_header(["character", "speed"])
+    assert len(rows) == 1 + 12
+    assert {len(row) for row in rows} == {len(rows[0])}
+
+
+def test_the_runs_csv_has_one_row_a_visit_with_its_forms(viewer: Admin, participant: Participant) -> None:
+    participant.agree()
+    participant.request("PUT", "/forms/about", {"answers": {"age": 33}})
+    header, row = table(viewer.get("/studies/short/data/runs.csv").text)
+    assert header == [column.name for column in RUN_COLUMNS]
+    assert json.loads(dict(zip(header, row, strict=True))["forms"]) == {"about": {"age": 33}}
+
+
+def test_raw_data_are_json_lines(viewer: Admin, participant: Participant) -> None:
+    participant.agree().rate_all()
+    [line] = viewer.get("/studies/short/data/raw.ndjson").text.splitlines()
+    assert len(json.loads(line)["trials"]) == 12
+
+
+def test_the_codebook_explains_every_exported_column(viewer: Admin, study: StudyInDatabase) -> None:
+    text = viewer.get("/studies/short/data/codebook.md").text
+    for name in [*csv_header(["character", "speed"]), *(column.name for column in RUN_COLUMNS)]:
+        assert f"| {name} |" in text
+
+
+def test_the_psych_ds_folder_follows_the_specification(viewer: Admin, participant: Participant) -> None:
+    participant.agree().rate_all()
+    archive = zipfile.ZipFile(io.BytesIO(viewer.get("/studies/short/data/psych-ds.zip").content))
+    assert archive.testzip() is None
+    description = json.loads(archive.read("short/dataset_description.json"))
+    assert description["@type"] == "Dataset"
+    assert description["@context"] == "https://schema.org/"
+    measured = {variable["name"] for variable in description["variableMeasured"]}
+    tables = [name for name in archive.namelist() if name.startswith("short/data/")]
+    assert len(tables) == 2
+    for name in tables:
+        assert name.endswith("_data.csv")
+        rows = table(archive.read(name).decode("utf-8"))
+        assert set(rows[0]) <= measured
+        assert {len(row) for row in rows} == {len(rows[0])}
+
+
+def test_an_unknown_study_is_refused_before_the_download_begins(
+    viewer: Admin, study: StudyInDatabase
+) -> None:
+    answer = viewer.get("/studies/shrt/data/ratings.csv")
+    assert answer.status_code == 404
+    assert "did you mean 'short'?" in answer.json()["error"]["message"]

@@ -1,0 +1,53 @@
+import csv
+import io
+import json
+from typing import Any
+
+from experiments.ratings import RATING_COLUMNS, csv_header, factors_in_header
+from server.context import Services
+from server.export.ratings_csv import rating_rows, write_ratings_csv
+from server.models import Study
+from tests.helpers.studies import Participant
+
+
+def loaded(column_type: str, cell: str) -> Any:
+    """A CSV cell as the column's type says; empty is missing."""
+    if cell == "":
+        return None
+    return {"integer": int, "number": float, "boolean": lambda text: bool(int(text))}.get(column_type, str)(
+        cell
+    )
+
+
+def test_export_and_load_is_the_identity(participant: Participant, services: Services) -> None:
+    participant.agree()
+    comments = ["plain", 'with "quotes", commas', "two\nlines", "Lidschlag äöü 👁", ""]
+    for trial, comment in zip(participant.state()["trials"], comments, strict=False):
+        participant.rate(trial, comment=comment)
+    with services.database.read() as session:
+        study, stream = session.query(Study).one(), io.StringIO()
+        assert write_ratings_csv(session, study, stream) == 5
+        rows = list(rating_rows(session, study))
+    stream.seek(0)
+    read = list(csv.DictReader(stream))
+    factors = factors_in_header(read[0])
+    assert factors == ["character", "speed"]
+    for row, line in zip(rows, read, strict=True):
+        for column in RATING_COLUMNS:
+            if column.name == "levels":
+                levels = json.loads(row["levels"]) if row["levels"] else {}
+                assert {name: line[name] for name in factors if line[name]} == levels
+            else:
+                value = (
+                    bool(row[column.name])
+                    if column.type == "boolean" and row[column.name] is not None
+                    else row[column.name]
+                )
+                assert loaded(column.type, line[column.name]) == (None if value == "" else value), column.name
+
+
+def test_an_empty_study_exports_its_header(services: Services, study: Any) -> None:
+    with services.database.read() as session:
+        stream = io.StringIO()
+        assert write_ratings_csv(session, session.query(Study).one(), stream) == 0
+    assert stream.getvalue().strip() == ",".join(csv_header(["character", "speed"]))

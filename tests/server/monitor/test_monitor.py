@@ -1,0 +1,32 @@
+from server.monitor import endpoints
+from server.monitor.schemas import MonitorSnapshot
+from tests.helpers.admins import Admin
+from tests.helpers.studies import Participant, StudyInDatabase
+
+
+def test_the_monitor_counts_and_colours_trials(viewer: Admin, participant: Participant) -> None:
+    participant.agree()
+    trials = participant.state()["trials"]
+    participant.rate(trials[0])
+    participant.rate(trials[1], playback={"frames_drawn": 3, "frames_missing": 1})
+    shown = viewer.get("/studies/short/monitor").json()
+    [run] = shown["runs"]
+    assert run["heat"] == "gf" + "." * 10
+    assert (run["answered"], run["flagged"], run["presence"]) == (2, 1, "here")
+    assert [step["runs"] for step in shown["funnel"]][:2] == [1, 1]
+    assert (shown["active"], shown["complete"], shown["dropped"]) == (1, 0, 0)
+
+
+def test_only_changed_runs_are_sent_again(viewer: Admin, client, study: StudyInDatabase) -> None:  # type: ignore[no-untyped-def]
+    people = [Participant(client, study.link_token).agree() for _ in range(2)]
+    before = MonitorSnapshot.model_validate(viewer.get("/studies/short/monitor").json())
+    people[1].rate(people[1].state()["trials"][0])
+    after = MonitorSnapshot.model_validate(viewer.get("/studies/short/monitor").json())
+    sent = MonitorSnapshot.model_validate_json(endpoints.changes(before, after))
+    assert people[1].run_id in {run.run for run in sent.runs}
+    assert len(after.runs) == 2
+
+
+def test_previews_are_not_monitored(viewer: Admin, client, study: StudyInDatabase) -> None:  # type: ignore[no-untyped-def]
+    Participant(client, study.link("preview")).start()
+    assert viewer.get("/studies/short/monitor").json()["runs"] == []

@@ -1,0 +1,46 @@
+import time
+from typing import Any
+
+from fastapi.testclient import TestClient
+
+from tests.helpers.admins import Admin
+from tests.helpers.studies import Participant, StudyInDatabase
+
+
+def finished(admin: Admin) -> Any:
+    for _ in range(240):
+        [report] = admin.get("/studies/short/reports").json()
+        if report["status"] in ("done", "failed"):
+            return report
+        time.sleep(0.25)
+    raise AssertionError("the report was not finished in a minute")
+
+
+def test_a_report_is_built_by_a_process_of_its_own(
+    experimenter: Admin, client: TestClient, study: StudyInDatabase
+) -> None:
+    for number in range(4):
+        person = Participant(client, study.link_token).agree()
+        for trial in person.state()["trials"]:
+            expected = [int(c) for c in (trial["prompt"] or "") if c.isdigit()]
+            person.rate(trial, expected[0] if expected else 1 + (trial["trial_index"] * 7 + number * 3) % 7)
+        person.request("POST", "/complete")
+    body = {"phase": "live", "sensitivity": False}
+    assert experimenter.send("POST", "/studies/short/reports", body).status_code == 202
+    report = finished(experimenter)
+    assert report["status"] == "done", report["message"]
+    page = next(name for name in report["files"] if name.endswith(".html"))
+    shown = experimenter.get(f"/studies/short/reports/{report['id']}/{page}")
+    assert "<html" in shown.text
+    assert "sandbox" in shown.headers["content-security-policy"]
+
+
+def test_a_report_on_no_data_fails_with_a_reason(experimenter: Admin, study: StudyInDatabase) -> None:
+    experimenter.send("POST", "/studies/short/reports", {})
+    report = finished(experimenter)
+    assert report["status"] == "failed"
+    assert report["message"]
+
+
+def test_only_files_of_the_report_are_served(experimenter: Admin, study: StudyInDatabase) -> None:
+    assert experimenter.get("/studies/short/reports/x/..%2Fsecret_key").status_code == 404

@@ -1,0 +1,63 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from server.results.summary import histogram, margin
+from tests.helpers.admins import Admin
+from tests.helpers.studies import Participant, StudyInDatabase
+
+
+def test_margins_and_distributions_of_a_complete_run(viewer: Admin, participant: Participant) -> None:
+    participant.agree()
+    for trial in participant.state()["trials"]:
+        participant.rate(trial, 6)
+    shown = viewer.get("/studies/short/results").json()
+    assert (shown["participants"], shown["ratings"]) == (1, 8)
+    assert [entry["factors"] for entry in shown["margins"]] == [
+        ["character"],
+        ["speed"],
+        ["character", "speed"],
+    ]
+    assert {mean["mean"] for entry in shown["margins"] for mean in entry["means"]} == {6.0}
+    assert all(cell["counts"] == [0, 0, 0, 0, 0, 2, 0] for cell in shown["cells"])
+    assert sum(n for _, n in shown["response_times"]) == 8
+
+
+def test_excluded_runs_do_not_count(experimenter: Admin, participant: Participant) -> None:
+    participant.agree().rate_all()
+    experimenter.send("PUT", f"/studies/short/runs/{participant.run_id}/exclusion", {"reason": "test"})
+    assert experimenter.get("/studies/short/results").json()["participants"] == 0
+
+
+def test_an_empty_study_has_empty_results(viewer: Admin, study: StudyInDatabase) -> None:
+    shown = viewer.get("/studies/short/results").json()
+    assert shown["ratings"] == 0
+    assert len(shown["clips"]) == 8
+
+
+def test_error_bars_are_cousineau_morey() -> None:
+    # three participants, two conditions, by hand: differences 1, 2, 3; sd of a difference 1;
+    # the SE of a condition is sd(differences) / 2 / sqrt(3) * sqrt(2)
+    rows = {"a": {("x",): 1.0, ("y",): 2.0}, "b": {("x",): 3.0, ("y",): 5.0}, "c": {("x",): 2.0, ("y",): 5.0}}
+    first, second = margin(rows, ["f"], ["f"])
+    assert (first.mean, second.mean) == (2.0, 4.0)
+    assert first.se_within == pytest.approx(math.sqrt(2) / 2 / math.sqrt(3))
+
+
+@hypothesis_settings(deadline=None, max_examples=50)
+@given(st.lists(st.floats(-50, 50), min_size=2, max_size=8), st.data())
+def test_a_constant_per_participant_changes_no_error_bar(offsets: list[float], data: st.DataObject) -> None:
+    scores = [data.draw(st.tuples(st.floats(1, 7), st.floats(1, 7), st.floats(1, 7))) for _ in offsets]
+    levels = [("x",), ("y",), ("z",)]
+    plain = {str(n): dict(zip(levels, row, strict=True)) for n, row in enumerate(scores)}
+    moved = {n: {k: v + offsets[int(n)] for k, v in row.items()} for n, row in plain.items()}
+    one, two = margin(plain, ["f"], ["f"]), margin(moved, ["f"], ["f"])
+    for a, b in zip(one, two, strict=True):
+        assert a.se_within == pytest.approx(b.se_within, abs=1e-9)
+
+
+def test_a_histogram_keeps_every_value() -> None:
+    assert histogram([0, 5, 10, 99, 1000], [0, 10, 20]) == [2, 1, 2]

@@ -1,0 +1,243 @@
+import io
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.load import parse_experiment
+from server.context import Services
+from tests.helpers.admins import Admin
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase
+from tests.helpers.tiny_clips import encoded_video, make_clip_folder
+
+
+def zipped(files: dict[str, bytes]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return stream.getvalue()
+
+
+def upload(admin: Admin, name: str, content: bytes) -> Any:
+    return admin.client.post("/api/admin/uploads", files=[("files", (name, content))])
+
+
+def films(*names: str) -> dict[str, bytes]:
+    # a trailing box that players skip makes each film's bytes its own
+    video = encoded_video(4, 30)
+    return {name: video + (len(name) + 8).to_bytes(4, "big") + b"free" + name.encode() for name in names}
+
+
+OWN = ("fast_happy_1.mp4", "fast_happy_2.mp4", "fast_sad_1.mp4", "fast_sad_2.mp4",
+       "slow_happy_1.mp4", "slow_happy_2.mp4", "slow_sad_1.mp4", "slow_sad_2.mp4")  # fmt: skip
+
+
+def test_own_clips_become_a_study_by_a_file_name_pattern(experimenter: Admin) -> None:
+    found = upload(experimenter, "clips.zip", zipped(films(*OWN))).json()
+    assert len(found["files"]) == 8
+    assert found["suggested_pattern"] == "{factor1}_{factor2}_{exemplar}.mp4"
+    body = {
+        "name": "faces", "upload": found["id"], "levels": {"pattern": "{speed}_{mood}_{exemplar}.mp4"},
+        "own_clips": {"title": "Faces", "question": "How friendly?", "low": "not at all", "high": "very"},
+    }  # fmt: skip
+    made = experimenter.send("POST", "/studies", body)
+    assert made.status_code == 201, made.text
+    design = made.json()["design"]
+    assert (design["cells"], design["unique_clips"], design["trials_per_participant"]) == (4, 8, 8)
+    assert made.json()["summary"]["status"] == "draft"
+
+
+def test_own_clips_become_a_study_by_a_table(experimenter: Admin) -> None:
+    rows = ["file;speed;mood"] + [f"{name};{name.split('_')[0]};{name.split('_')[1]}" for name in OWN]
+    found = upload(experimenter, "clips.zip", zipped(films(*OWN))).json()
+    body = {
+        "name": "faces",
+        "upload": found["id"],
+        "levels": {"csv": "\n".join(rows)},
+        "own_clips": {"title": "Faces"},
+    }
+    made = experimenter.send("POST", "/studies", body)
+    assert made.status_code == 201, made.text
+    clips = experimenter.get("/studies/faces/clips").json()
+    assert {(clip["levels"]["speed"], clip["exemplar"]) for clip in clips} == {
+        ("fast", 1), ("fast", 2), ("slow", 1), ("slow", 2),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("csv", "message"),
+    [
+        ("speed,mood\nfast,happy", "a column 'file'"),
+        ("file,speed\nfast_hapy_1.mp4,fast", "did you mean 'fast_happy_1.mp4'?"),
+        ("file,speed\nfast_happy_1.mp4,fast\nfast_happy_1.mp4,fast", "stands there twice"),
+        ("file,speed\nfast_happy_1.mp4,", "has no level of 'speed'"),
+        ("file,speed\nfast_happy_1.mp4,fast", "7 clips have no row"),
+    ],
+)
+def test_a_wrong_table_is_refused_and_nothing_is_stored(experimenter: Admin, csv: str, message: str) -> None:
+    found = upload(experimenter, "clips.zip", zipped(films(*OWN))).json()
+    body = {"name": "faces", "upload": found["id"], "levels": {"csv": csv}, "own_clips": {"title": "Faces"}}
+    answer = experimenter.send("POST", "/studies", body)
+    assert answer.status_code == 422
+    assert message in answer.json()["error"]["message"]
+    assert experimenter.get("/studies").json() == []
+
+
+def test_cells_must_have_equally_many_clips(experimenter: Admin) -> None:
+    found = upload(experimenter, "clips.zip", zipped(films(*OWN[:-1]))).json()
+    body = {
+        "name": "f",
+        "upload": found["id"],
+        "levels": {"pattern": "{speed}_{mood}_{exemplar}.mp4"},
+        "own_clips": {"title": "F"},
+    }
+    assert (
+        "every cell needs the same number"
+        in experimenter.send("POST", "/studies", body).json()["error"]["message"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "status", "message"),
+    [
+        ("clips.zip", zipped({"../../evil.mp4": b"x"}), 422, "not allowed"),
+        ("clips.zip", zipped({"/etc/evil.mp4": b"x"}), 422, "not allowed"),
+        ("clips.zip", zipped({"run.sh": b"x"}), 422, "neither a film"),
+        ("clips.zip", zipped({"a/one.mp4": b"x", "b/one.mp4": b"y"}), 422, "more than once"),
+        ("clips.zip", zipped({"bomb.mp4": bytes(40_000_000)}), 422, "unpacks to far more"),
+        ("clips.zip", b"PK not a zip", 422, "damaged"),
+        ("../clip.mp4", b"x", 422, "not allowed"),
+    ],
+)  # fmt: skip
+def test_unsafe_uploads_are_refused_whole(
+    services: Services, experimenter: Admin, name: str, content: bytes, status: int, message: str
+) -> None:
+    answer = upload(experimenter, name, content)
+    assert (answer.status_code, message in answer.json()["error"]["message"]) == (status, True), answer.text
+    assert list(services.settings.upload_folder.iterdir()) == []
+
+
+def test_a_file_that_is_no_film_is_named(experimenter: Admin) -> None:
+    found = upload(
+        experimenter, "clips.zip", zipped({"a_1.mp4": b"these are words", "b_1.mp4": encoded_video(4, 30)})
+    ).json()
+    assert "cannot be read as a film" in found["files"][0]["problem"]
+    body = {
+        "name": "f",
+        "upload": found["id"],
+        "levels": {"pattern": "{x}_{exemplar}.mp4"},
+        "own_clips": {"title": "F"},
+    }
+    assert (
+        "'a_1.mp4' cannot be used" in experimenter.send("POST", "/studies", body).json()["error"]["message"]
+    )
+
+
+def test_a_built_set_is_uploaded_with_its_definition(experimenter: Admin, tmp_path: Path) -> None:
+    make_clip_folder(parse_experiment(SHORT), tmp_path / "built")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "built").iterdir()}
+    found = upload(experimenter, "built.zip", zipped(files)).json()
+    assert found["has_manifest"]
+    made = experimenter.send("POST", "/studies", {"name": "built", "upload": found["id"], "toml": SHORT})
+    assert made.status_code == 201, made.text
+
+
+def test_a_damaged_clip_of_a_built_set_is_named(experimenter: Admin, tmp_path: Path) -> None:
+    make_clip_folder(parse_experiment(SHORT), tmp_path / "built")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "built").iterdir()}
+    name = next(name for name in sorted(files) if name.endswith(".mp4"))
+    found = upload(experimenter, "built.zip", zipped(files | {name: files[name] + b"!"})).json()
+    answer = experimenter.send("POST", "/studies", {"name": "built", "upload": found["id"], "toml": SHORT})
+    assert f"clip {name}: expected sha256" in answer.json()["error"]["message"]
+    assert experimenter.get("/studies").json() == []
+
+
+def test_a_definition_is_checked_with_lines(experimenter: Admin) -> None:
+    checked = experimenter.send(
+        "POST", "/definitions/check", {"toml": SHORT.replace("per_cell", "per_cel")}
+    ).json()
+    assert checked["design"] is None
+    assert "did you mean 'per_cell'?" in checked["problems"][0]["message"]
+    assert checked["problems"][0]["line"] == 17
+    assert (
+        experimenter.send("POST", "/definitions/check", {"toml": SHORT}).json()["design"]["unique_clips"] == 8
+    )
+
+
+def test_edited_texts_become_a_version_and_runs_keep_theirs(
+    experimenter: Admin, study: StudyInDatabase, participant: Participant
+) -> None:
+    participant.agree()
+    revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+    body = {"revision": revision, "language": "en", "texts": {"consent": "Do you really agree?"}}
+    changed = experimenter.send("PUT", "/studies/short/texts", body)
+    assert changed.status_code == 200, changed.text
+    assert [version["number"] for version in changed.json()["versions"]] == [2, 1]
+    assert changed.json()["definition"]["texts"]["en"]["consent"] == "Do you really agree?"
+    assert participant.state()["texts"]["consent"] == "Do you agree?"
+    assert experimenter.get("/studies/short/versions/1").text.strip() == SHORT.strip()
+
+
+def test_two_people_editing_at_once_are_told(experimenter: Admin, study: StudyInDatabase) -> None:
+    revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+    settings = {"paused": True, "quota": 20, "recruiter": None}
+    assert (
+        experimenter.send("PUT", "/studies/short/settings", {"revision": revision} | settings).status_code
+        == 200
+    )
+    late = experimenter.send("PUT", "/studies/short/settings", {"revision": revision} | settings)
+    assert (late.status_code, late.json()["error"]["code"]) == (409, "edited_meanwhile")
+
+
+def test_a_changed_design_that_its_clips_do_not_fit_is_refused(
+    experimenter: Admin, study: StudyInDatabase
+) -> None:
+    revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+    toml = SHORT.replace("per_cell = 2", "per_cell = 3")
+    answer = experimenter.send("POST", "/studies/short/versions", {"revision": revision, "toml": toml})
+    assert answer.status_code == 422
+    assert "4 are missing from the manifest" in answer.json()["error"]["message"]
+
+
+def test_a_closed_study_takes_nobody(
+    experimenter: Admin, study: StudyInDatabase, participant: Participant
+) -> None:
+    revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+    body = {"revision": revision, "status": "closed"}
+    assert experimenter.send("PUT", "/studies/short/status", body).json()["summary"]["status"] == "closed"
+    refused = participant.start()
+    assert (refused.status_code, refused.json()["error"]["code"]) == (409, "study_closed")
+    back = experimenter.send("PUT", "/studies/short/status", {"revision": revision + 1, "status": "draft"})
+    assert back.status_code == 409
+
+
+def test_personal_links_are_made_at_once_and_listed(experimenter: Admin, study: StudyInDatabase) -> None:
+    made = experimenter.send(
+        "POST", "/studies/short/links", {"kind": "personal", "count": 3, "label": "S"}
+    ).json()
+    assert [link["label"] for link in made] == ["S001", "S002", "S003"]
+    table = experimenter.get("/studies/short/links/personal.csv").text.splitlines()
+    assert table[0] == "label,url,runs,complete"
+    assert len(table) == 4
+    assert experimenter.send("DELETE", f"/studies/short/links/{made[0]['id']}").status_code == 204
+    token = made[0]["url"].rpartition("/")[2]
+    assert Participant(experimenter.client, token).start().status_code == 404
+
+
+def test_a_preview_stores_nothing_that_counts(experimenter: Admin, study: StudyInDatabase) -> None:
+    [link] = experimenter.send("POST", "/studies/short/links", {"kind": "preview"}).json()
+    person = Participant(experimenter.client, link["url"].rpartition("/")[2])
+    assert person.start().status_code == 201
+    assert experimenter.get("/studies/short/runs").json() == []
+    assert experimenter.get("/studies/short").json()["summary"]["active"] == 0
+
+
+def test_only_an_untouched_draft_can_be_deleted(
+    experimenter: Admin, study: StudyInDatabase, participant: Participant
+) -> None:
+    assert experimenter.send("DELETE", "/studies/short").status_code == 409
+    study.change(status="draft")
+    assert experimenter.send("DELETE", "/studies/short").status_code == 204
+    assert experimenter.get("/studies").json() == []
