@@ -1,8 +1,8 @@
 """Laplace approximation of the cumulative-logit model with crossed intercepts, with its exact gradient.
 
-P(y <= k) = F(alpha_k - eta), eta = X beta + s_p u_participant + s_c v_item, u, v standard normal, F logistic. As in
-R's ordinal::clmm (Christensen 2019). F(a) - F(b) = F(a) F(-b) (1 - exp(b - a)), so that the log-likelihood of a rating
-has simple derivatives by eta: F(a) + F(b) - 1, then -(f(a) + f(b)).
+P(y <= k) = F(alpha_k - eta), eta = X beta + s_p u_participant + s_c v_item, u, v standard normal, F logistic,
+as in R's ordinal::clmm (Christensen 2019). F(a) - F(b) = F(a) F(-b) (1 - exp(b - a)), so that the
+log-likelihood of a rating has simple derivatives by eta: F(a) + F(b) - 1, then -(f(a) + f(b)).
 """
 
 from dataclasses import dataclass, field
@@ -164,4 +164,4 @@ class LaplaceLikelihood:
         edges = np.bincount(d.category + 1, weights=upper, minlength=d.n_categories + 1)
         edges += np.bincount(d.category, weights=lower, minlength=d.n_categories + 1)
         log_sd = np.array([u @ u - (1 - inverse_p).sum() - v_p @ u, v @ v - (1 - inverse_i).sum() - v_i @ v])
-        return float(value), Parameters(edges[1:-1], beta, log_sd)
+        return float(value), Parameters(edges[1:-1].astype(np.float64), beta, log_sd)

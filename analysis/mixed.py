@@ -1,4 +1,4 @@
-"""Linear mixed models of ratings: participants crossed with clips, by-participant slopes, Satterthwaite tests."""
+"""Linear mixed models: participants crossed with clips, by-participant slopes, Satterthwaite tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,8 +20,8 @@ Slopes = Literal["none", "main", "all", "correlated"]
 ZERO_THETA = 1e-4
 """A relative SD below this is tried at zero, its bound."""
 
-STARTS = (0.4, 1.0)
-"""Relative standard deviations to start from; lme4 starts from 1."""
+START = 0.4
+"""Relative standard deviation to start from."""
 
 LIFTS = (0.003, 0.01, 0.03, 0.1, 0.3)
 
@@ -97,10 +97,10 @@ def fit_mixed(
     item : the column (or columns, together) that names what was rated.
     slopes : by-participant slopes. `all`: one variance for every effect, so that each test has its own error
         term; `main`: main effects only; `correlated`: intercept and main-effect slopes with all correlations
-        (lme4's `(1 + A + B | participant)`); `none`: intercepts only, anti-conservative where people differ.
+        (lme4's `(1 + A + B | participant)`); `none`: intercepts only, anti-conservative if people differ.
 
-    Independent slopes share one variance over an effect's orthonormal contrasts, hence do not depend on coding;
-    with two levels they are lme4's `||` with +1/-1 columns, with more `(1 | participant:A)`.
+    Independent slopes share one variance over an effect's orthonormal contrasts, hence do not depend on
+    coding; with two levels they are lme4's `||` with +1/-1 columns, with more `(1 | participant:A)`.
 
     Raises
     ------
@@ -154,9 +154,8 @@ def _bounded(patterns: Floats) -> list[bool]:
 
 
 def _fit_theta(c: CrossProducts, bounded: list[bool]) -> Floats:
-    """Minimise from two starts; a theta that ended at zero, always a stationary point, is tried above it again."""
-    ends = [_descend(c, np.where(bounded, start, 0.0), bounded) for start in STARTS]
-    theta = min(ends, key=lambda end: criterion(c, end).value)
+    """Minimise; a theta that ended at zero, always stationary, is lifted where zero is no minimum."""
+    theta = _descend(c, np.where(bounded, START, 0.0), bounded)
     for _ in range(len(bounded)):
         lifted = _lifted(c, theta, bounded)
         if lifted is None:
@@ -183,13 +182,13 @@ def _descend(c: CrossProducts, start: Floats, bounded: list[bool]) -> Floats:
 
 def _lifted(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats | None:
     """Theta with one entry lifted from zero where that lowers the criterion, else None."""
-    value = criterion(c, theta).value
-    for k in np.flatnonzero((np.abs(theta) < ZERO_THETA) & np.array(bounded)):
+    at = criterion(c, theta)
+    for k in np.flatnonzero((np.abs(theta) < ZERO_THETA) & np.array(bounded) & (at.curve_at_zero < 0)):
         trials = np.repeat(theta[None], len(LIFTS), axis=0)
         trials[:, k] = LIFTS
         values = [criterion(c, trial).value for trial in trials]
-        if min(values) < value - 1e-9:
-            return trials[int(np.argmin(values))]
+        if min(values) < at.value - 1e-9:
+            return np.asarray(trials[int(np.argmin(values))], dtype=np.float64)
     return None
 
 
@@ -210,7 +209,7 @@ def _polished(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats:
         free = np.flatnonzero(np.abs(theta) > 0)
         if len(free) == 0 or np.abs(at.gradient[free]).max() < 1e-9:
             break
-        hessian = np.stack([_gradient_slope(c, theta, k)[free] for k in free])
+        hessian = np.stack([_gradient_slope(c, theta, int(k))[free] for k in free])
         values, vectors = np.linalg.eigh((hessian + hessian.T) / 2)
         if values.min() <= 1e-8 * values.max():
             break
@@ -245,10 +244,8 @@ def _result(
     rating: str,
 ) -> MixedResult:
     at, spread = criterion(c, theta), uncertainty(c, theta)
-    identity = np.eye(c.f)
     effects = tuple(
-        MixedEffect(effect, *f_test(at.beta, spread, identity[data.columns(effect)]))
-        for effect in data.effects
+        MixedEffect(effect, *f_test(at.beta, spread, data.differences(effect))) for effect in data.effects
     )
     item_name = item if isinstance(item, str) else "/".join(item)
     factor = np.tensordot(theta[:-1], c.patterns, 1)

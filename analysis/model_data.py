@@ -47,15 +47,30 @@ class ModelData:
         """Positions of an effect's columns."""
         return np.flatnonzero(np.array(self.effect_of) == effect)
 
+    def differences(self, effect: str) -> Floats:
+        """Contrasts (q, fixed columns) of an effect as differences from the first level of each factor.
+
+        The df of a test of several contrasts depend a little on how these are written; lmerTest's are these.
+        """
+        members = effect.split(":")
+        rows: Floats = np.ones((1, 1))
+        for factor, names in zip(self.factors, self.levels, strict=True):
+            size = len(names)
+            from_first = np.hstack([-np.ones((size - 1, 1)), np.eye(size - 1)])
+            rows = np.asarray(
+                np.kron(rows, from_first if factor in members else np.full((1, size), 1 / size))
+            )
+        return np.asarray(rows @ self.fixed, dtype=np.float64)
+
 
 def model_data(
     rows: pd.DataFrame, participant: str, item: str | Sequence[str], rating: str, within: Sequence[str]
 ) -> ModelData:
     """Code long rows, one a trial.
 
-    `item` is the column that names what was rated (a clip, a blink); several columns together name it where one
-    is not unique (exemplars numbered afresh within a profile). Raises InputError for unknown columns, missing
-    values, fewer than two participants, items or levels, and for cells that nobody rated.
+    `item` is the column that names what was rated (a clip, a blink); several columns together name it
+    where one is not unique (exemplars numbered afresh within a profile). Raises InputError for unknown
+    columns, missing values, fewer than two participants, items or levels, and for cells that nobody rated.
     """
     item_columns = [item] if isinstance(item, str) else list(item)
     for name in (participant, rating, *within, *item_columns):
@@ -91,7 +106,7 @@ def _coded(column: "pd.Series[str]", what: str) -> tuple[Integers, tuple[str, ..
     if len(names) < 2:
         raise InputError(f"expected at least two {what}, got {len(names)}")
     position = {name: i for i, name in enumerate(names)}
-    return texts.map(position).to_numpy(dtype=np.int64), tuple(names)
+    return np.asarray(texts.map(position), dtype=np.int64), tuple(names)
 
 
 def _refuse_empty_cells(cell: Integers, within: Sequence[str], levels: Sequence[Sequence[str]]) -> None:
@@ -116,13 +131,13 @@ def _design(
     fixed, spread = [np.ones((int(np.prod(sizes)), 1))], [np.ones((int(np.prod(sizes)), 1))]
     effect_of, names = ["intercept"], ["intercept"]
     for members in effect_members(len(factors)):
-        codings, bases = np.ones((1, 1)), np.ones((1, 1))
+        codings: Floats = np.ones((1, 1))
+        bases: Floats = np.ones((1, 1))
         for axis, size in enumerate(sizes):
             inside = axis in members
-            codings = np.kron(codings, _sum_coding(size)[:, 1:] if inside else np.ones((size, 1)))
+            codings = np.asarray(np.kron(codings, _sum_coding(size)[:, 1:] if inside else np.ones((size, 1))))
             basis = orthonormal_basis(size) * np.sqrt(size)
-            # the sign makes a two-level column +1, -1 as in sum coding
-            bases = np.kron(bases, basis[:, 1:] if inside else np.ones((size, 1)))
+            bases = np.asarray(np.kron(bases, basis[:, 1:] if inside else np.ones((size, 1))))
         fixed.append(codings)
         spread.append(bases)
         effect = effect_name([factors[m] for m in members])

@@ -70,9 +70,9 @@ def fit_ordinal(
 ) -> OrdinalResult:
     """Fit ordered ratings ~ full factorial of `within` with crossed random intercepts (Laplace).
 
-    Parameters are those of `analysis.mixed.fit_mixed`. Categories are the distinct ratings met, in order; a rating
-    of the scale that nobody gave has no threshold of its own. Raises InputError as there, and for more than 20
-    distinct ratings.
+    Parameters are those of `analysis.mixed.fit_mixed`. Categories are the distinct ratings met, in order; a
+    rating of the scale that nobody gave has no threshold of its own. Raises InputError as there, and for
+    more than 20 distinct ratings.
     """
     data = model_data(rows, participant, item, rating, within)
     categories, codes = np.unique(data.rating, return_inverse=True)

@@ -1,8 +1,8 @@
 """The REML criterion of crossed participants and items from cross-products, with its gradient.
 
-Model: y = X b + U_p a + U_c c + e with a_i = Lp u_i (p random coefficients of participant i), c = lambda v, u, v standard
-normal times sigma. theta are the free entries of Lp, then lambda (relative to sigma), as in lme4 (Bates et al. 2015,
-doi:10.18637/jss.v067.i01). Everything after the cross-products is independent of the number of trials.
+Model: y = X b + U_p a + U_c c + e with a_i = Lp u_i (p random coefficients of participant i), c = lambda v;
+u, v standard normal times sigma. theta are the free entries of Lp, then lambda (relative to sigma), as in
+lme4 (Bates et al. 2015, doi:10.18637/jss.v067.i01). After the cross-products trials cost nothing.
 """
 
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ Integers = NDArray[np.int64]
 class CrossProducts:
     """Sums over trials: N participants with p coefficients, J items, f fixed effects.
 
-    `pp` (N, p, p), `pc` (N, p, J), `cc` (J,), `pb` (N, p, f + 1), `cb` (J, f + 1), `bb` (f + 1, f + 1); the last
-    column of b is y. `patterns` (m, p, p): Lp = sum of theta_k patterns_k.
+    `pp` (N, p, p), `pc` (N, p, J), `cc` (J,), `pb` (N, p, f + 1), `cb` (J, f + 1), `bb` (f + 1, f + 1); the
+    last column of b is y. `patterns` (m, p, p): Lp = sum of theta_k patterns_k.
     """
 
     n: int
@@ -35,7 +35,7 @@ class CrossProducts:
     @property
     def f(self) -> int:
         """Number of fixed effects."""
-        return self.bb.shape[0] - 1
+        return int(self.bb.shape[0]) - 1
 
 
 def cross_products(
@@ -49,11 +49,22 @@ def cross_products(
     by_item = sparse.csr_matrix((ones, (item, trial)), shape=(items, n))
     by_pair = sparse.csr_matrix((ones, (participant * items + item, trial)), shape=(people * items, n))
     p, width = z.shape[1], b.shape[1]
-    pp = (by_person @ (z[:, :, None] * z[:, None, :]).reshape(n, -1)).reshape(people, p, p)
-    pc = (by_pair @ z).reshape(people, items, p).transpose(0, 2, 1).copy()
-    pb = np.stack([by_person @ (z[:, [k]] * b) for k in range(p)], axis=1).reshape(people, p, width)
+
+    def summed(indicator: sparse.csr_matrix, values: Floats) -> Floats:
+        return np.asarray(indicator @ values, dtype=np.float64)
+
+    pp = summed(by_person, (z[:, :, None] * z[:, None, :]).reshape(n, -1)).reshape(people, p, p)
+    pc = summed(by_pair, z).reshape(people, items, p).transpose(0, 2, 1).copy()
+    pb = np.stack([summed(by_person, z[:, [k]] * b) for k in range(p)], axis=1).reshape(people, p, width)
     return CrossProducts(
-        n, pp, pc, np.bincount(item, minlength=items).astype(np.float64), pb, by_item @ b, b.T @ b, patterns
+        n,
+        pp,
+        pc,
+        np.bincount(item, minlength=items).astype(np.float64),
+        pb,
+        summed(by_item, b),
+        b.T @ b,
+        patterns,
     )
 
 
@@ -62,6 +73,7 @@ class Criterion:
     """The model at one theta: deviance parts, estimates, and their derivatives.
 
     `h` = log|M| + log|X'V^-1 X|, `r2` the penalised residual sum of squares; `grad_h`, `grad_r2` (m + 1,).
+    `curve_at_zero` (m + 1,) is what the second derivative of `value` by theta_k would be at theta_k = 0.
     `unscaled` (f, f) is the covariance of beta over sigma^2, `unscaled_grad` (m + 1, f, f) its derivative.
     """
 
@@ -70,6 +82,7 @@ class Criterion:
     r2: float
     grad_h: Floats = field(repr=False)
     grad_r2: Floats = field(repr=False)
+    curve_at_zero: Floats = field(repr=False)
     beta: Floats = field(repr=False)
     unscaled: Floats = field(repr=False)
     unscaled_grad: Floats = field(repr=False)
@@ -126,9 +139,10 @@ def criterion(c: CrossProducts, theta: Floats) -> Criterion:
     up, uc = tp[:, :, f] - tp[:, :, :f] @ beta, tc[:, f] - tc[:, :f] @ beta
     grad_h = np.r_[2 * np.tensordot(c.patterns, k @ lp, 2), 2 * lam * k_item]
     grad_r2 = np.r_[-2 * np.tensordot(c.patterns, up.T @ up @ lp, 2), -2 * lam * float(uc @ uc)]
-    return Criterion(
-        c.n, h, r2, grad_h, grad_r2, beta, unscaled, _unscaled_grad(c, lp, lam, tp, tc, unscaled)
-    )
+    curve = 2 * np.r_[np.tensordot(c.patterns, k, 2), k_item]
+    curve -= 2 * (c.n - f) / r2 * np.r_[np.tensordot(c.patterns, up.T @ up, 2), float(uc @ uc)]
+    gradient = _unscaled_grad(c, lp, lam, tp, tc, unscaled)
+    return Criterion(c.n, h, r2, grad_h, grad_r2, curve, beta, unscaled, gradient)
 
 
 def _unscaled_grad(

@@ -26,7 +26,7 @@ class Uncertainty:
 def uncertainty(c: CrossProducts, theta: Floats) -> Uncertainty:
     """From the Hessian of the deviance in (theta, sigma) at the REML estimate.
 
-    A theta at its bound of zero is left out: there neither the deviance nor the covariance changes to first order.
+    A theta at its bound of zero is left out: neither deviance nor covariance changes there to first order.
     """
     at = criterion(c, theta)
     sigma, nu = at.sigma, c.n - c.f
@@ -34,7 +34,7 @@ def uncertainty(c: CrossProducts, theta: Floats) -> Uncertainty:
     m = len(free)
     hessian = np.empty((m + 1, m + 1))
     for row, k in enumerate(free):
-        hessian[row, :m] = _derivative(c, theta, k, sigma)[free]
+        hessian[row, :m] = _derivative(c, theta, int(k), sigma)[free]
     hessian[:m, :m] = (hessian[:m, :m] + hessian[:m, :m].T) / 2
     hessian[m, :m] = hessian[:m, m] = -2 * at.grad_r2[free] / sigma**3
     hessian[m, m] = 4 * nu / sigma**2
@@ -62,7 +62,7 @@ def _derivative(c: CrossProducts, theta: Floats, k: int, sigma: float) -> Floats
 def f_test(beta: Floats, found: Uncertainty, contrasts: Floats) -> tuple[float, int, float, float]:
     """F, its two df and p of `contrasts` (q, f) @ beta = 0.
 
-    One df per eigenvector of the contrasts' covariance, pooled by the mean of an F's denominator (Fai & Cornelius).
+    One df per eigenvector of the contrasts' covariance, pooled by the mean of F (Fai & Cornelius 1996).
     """
     covariance = contrasts @ found.covariance @ contrasts.T
     values, vectors = np.linalg.eigh(covariance)

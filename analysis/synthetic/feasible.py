@@ -66,7 +66,7 @@ def _possible(means: tuple[PrintedMean, ...], space: DesignSpace) -> bool:
         b_ub=np.r_[high, -low],
         bounds=bounds,
     )
-    return bool(found.status == 0 and found.x[-1] > 1e-6)
+    return bool(found.x is not None and found.status == 0 and found.x[-1] > 1e-6)
 
 
 def _contradiction(means: tuple[PrintedMean, ...], space: DesignSpace) -> str:

@@ -16,7 +16,7 @@ def test_value(y: Floats, contrasts: Floats) -> float:
     z = y @ contrasts
     mean = z.mean(axis=0)
     pillai = n * float(mean @ np.linalg.solve(z.T @ z, mean))
-    return pillai / (1 - pillai) * (n - q) / q
+    return float(pillai / (1 - pillai) * (n - q) / q)
 
 
 def test_after_moves(y: Floats, contrasts: Floats, step: Floats) -> Floats:

@@ -83,7 +83,7 @@ def _error_variance(z: Floats, target: TestTarget | None, n: int, sd: float, sha
 def _covariance(
     published: Published, space: DesignSpace, targets: Targets, variances: dict[str, Floats]
 ) -> Floats:
-    """Put grand mean and effects together; the wanted SDs of margins fix how effects go with the grand mean."""
+    """Put grand mean and effects together; wanted SDs of margins fix how effects go with the grand mean."""
     k = space.n_cells
     flat = np.full((k, 1), 1 / np.sqrt(k))
     effects = sum((c @ variances[e] @ c.T for e, c in space.effects.items()), np.zeros((k, k)))

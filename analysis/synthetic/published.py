@@ -12,7 +12,7 @@ FOLDER = Path(__file__).parent
 SHIPPED = ("exp1", "exp2", "exp3")
 
 Place = dict[str, str]
-"""Levels that name a margin or a cell, e.g. `{blur: MB, amplitude: FC}`; the other factors are averaged over."""
+"""Levels that name a margin or a cell, e.g. `{blur: MB, amplitude: FC}`; other factors are averaged over."""
 
 Printed = Annotated[str, Field(pattern=r"^[<>]?\d+(\.\d+)?$")]
 

@@ -44,7 +44,7 @@ class Repaired:
 def missed_targets(y: Floats, targets: Targets) -> tuple[Missed, ...]:
     """Targets whose statistic on cell means (n, cells) lies outside the window."""
     found = []
-    for target in (*targets.means, *targets.spreads, *targets.tests, *targets.pairs, *targets.directions):
+    for target in targets.everything:
         value = value_of(y, target)
         if not target.low <= value <= target.high:
             found.append(Missed(target.name, value, target.low, target.high))
@@ -116,8 +116,9 @@ def repair(
 ) -> Repaired:
     """Find whole sums of `trials` ratings near `cell_means` (n, cells) that hit every target.
 
-    Steepest descent over all changes of one point; where none helps, over random pairs of changes; from a dead end a few random ones lead on. Ends when every
-    target is hit or after `maximum_steps`. `progress` gets (targets missed, step).
+    Steepest descent over all changes of one point; where none helps, over random pairs of changes; from a
+    dead end a few random ones lead on. Ends when every target is hit or after `maximum_steps`. `progress`
+    gets (targets missed, step).
     """
     sums = np.clip(np.rint(cell_means * trials), trials * scale[0], trials * scale[1]).astype(np.int64)
     search = _Search(sums, trials, scale, targets, rng)

@@ -49,17 +49,17 @@ class DesignSpace:
         block = np.ones((1, 1))
         for axis, size in enumerate(self.shape):
             basis = orthonormal_basis(size)
-            block = np.kron(block, basis[:, 1:] if axis in members else basis[:, :1])
+            block = np.asarray(np.kron(block, basis[:, 1:] if axis in members else basis[:, :1]))
         return block
 
     def weights(self, place: Mapping[str, str]) -> Floats:
         """Averaging weights (cells,) of a margin or cell; InputError for an unknown factor or level."""
-        weight = np.ones(1)
+        weight: Floats = np.ones(1)
         for factor, level in place.items():
             self._check(factor, level)
         for factor, names in zip(self.factors, self.levels, strict=True):
             chosen = [place[factor]] if factor in place else list(names)
-            weight = np.kron(weight, np.array([name in chosen for name in names]) / len(chosen))
+            weight = np.asarray(np.kron(weight, np.array([name in chosen for name in names]) / len(chosen)))
         return weight
 
     def _check(self, factor: str, level: str) -> None:

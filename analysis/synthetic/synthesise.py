@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.files import whole_file
 from analysis.synthetic.feasible import GivenWay, make_feasible
 from analysis.synthetic.moves import value_of
 from analysis.synthetic.population import Population, draw, make_population
@@ -100,48 +101,43 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     rng = np.random.default_rng(seed)
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
     scale = (plan.experiment.trial.scale.minimum, plan.experiment.trial.scale.maximum)
-    best: Repaired | None = None
+    found: list[Repaired] = []
     rounds = 0
-    for attempt in range(1, ATTEMPTS + 1):
+    while len(found) < ATTEMPTS and not any(not f.missed for f in found):
         start = draw(population_of(plan, rng), plan.targets.n, rng, exact=True)
-        found = repair(
-            start, trials, scale, plan.targets, rng, lambda m, s, r=rounds: progress and progress(m, r + s)
-        )
-        rounds += found.steps
-        if best is None or len(found.missed) < len(best.missed):
-            best = found
-        if not best.missed:
-            break
-    if best is None:
-        raise InputError("expected at least one attempt")
+        found.append(repair(start, trials, scale, plan.targets, rng, _onward(progress, rounds)))
+        rounds += found[-1].steps
+    best = min(found, key=lambda f: len(f.missed))
     y = best.sums / trials
-    wanted = (
-        *plan.targets.means,
-        *plan.targets.spreads,
-        *plan.targets.tests,
-        *plan.targets.pairs,
-        *plan.targets.directions,
-    )
-    reached = tuple(Reached(t.name, value_of(y, t), t.low, t.high) for t in wanted)
+    reached = tuple(Reached(t.name, value_of(y, t), t.low, t.high) for t in plan.targets.everything)
     return Synthetic(
-        plan.experiment, plan.space, seed, trials, best.sums, reached, best.missed, plan.given_way, attempt
+        plan.experiment,
+        plan.space,
+        seed,
+        trials,
+        best.sums,
+        reached,
+        best.missed,
+        plan.given_way,
+        len(found),
     )
+
+
+def _onward(progress: Callable[[int, int], None] | None, rounds: int) -> Callable[[int, int], None] | None:
+    if progress is None:
+        return None
+    return lambda missed, step: progress(missed, rounds + step)
 
 
 def write_ratings(synthetic: Synthetic, out: Path) -> int:
     """Write the ratings as the server's CSV export, every row marked synthetic; the number of rows."""
     header = csv_header(synthetic.experiment.factor_names)
     rng = np.random.default_rng([synthetic.seed, 1])
-    temporary = out.with_name(f".{out.name}.part")
     count = 0
-    try:
-        with temporary.open("w", newline="", encoding="utf-8") as handle:
-            writer = csv.DictWriter(handle, header, lineterminator="\n")
-            writer.writeheader()
-            for row in rating_rows(synthetic.experiment, synthetic.space, synthetic.sums, rng):
-                writer.writerow(row)
-                count += 1
-        temporary.replace(out)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:
+        writer = csv.DictWriter(handle, header, lineterminator="\n")
+        writer.writeheader()
+        for row in rating_rows(synthetic.experiment, synthetic.space, synthetic.sums, rng):
+            writer.writerow(row)
+            count += 1
     return count

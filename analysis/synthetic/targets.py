@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,11 @@ class Targets:
     tests: tuple[TestTarget, ...]
     pairs: tuple[TestTarget, ...]
     directions: tuple[MeanTarget, ...]
+
+    @property
+    def everything(self) -> tuple[MeanTarget | SpreadTarget | TestTarget, ...]:
+        """Every target, in the order above."""
+        return (*self.means, *self.spreads, *self.tests, *self.pairs, *self.directions)
 
 
 def place_name(place: dict[str, str]) -> str:
@@ -143,7 +148,7 @@ def _ordered_places(
             else [{}]
         )
         for place in outer:
-            for a, b in zip(order, order[1:], strict=False):
+            for a, b in pairwise(order):
                 yield {**place, factor: a}, {**place, factor: b}
     if direction.highest is not None:
         varied = [direction.vary] if direction.vary else list(direction.highest)

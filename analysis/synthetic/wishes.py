@@ -17,8 +17,8 @@ def with_wishes(
     means : `factor.level=4.80` (several levels joined by commas: `blur.MB,amplitude.FC=4.9`).
     effects : `blur:amplitude=20.35`, the multivariate F wanted; `=0` for no effect.
 
-    Figures that would contradict a wish (the order and the pairs of its factors, a mean at the same place, the
-    printed p of the same effect) are dropped; all others stay.
+    Figures that would contradict a wish (the order and the pairs of its factors, a mean at the same place,
+    the printed p of the same effect) are dropped; all others stay.
     """
     wished_means = [_mean(text, space) for text in means]
     wished_tests = [_test(text, space) for text in effects]
