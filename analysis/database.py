@@ -75,7 +75,7 @@ class RatingsQuery:
         self._engine.dispose()
 
     def rows(self, texts: Sequence[str], numbers: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
-        """Main and attention rows: text as categories, numbers float, a column a factor, and the run's columns.
+        """Main and attention rows: text as categories, numbers float, a column a factor, a run's columns.
 
         The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once a run, not once a row.
         """

@@ -78,9 +78,3 @@ def partial_eta_squared_ci(
     size = noncentrality(f[known, None], d1[known, None], d2[known, None], tails)
     interval[known] = size / (size + (d1 + d2 + 1.0)[known, None])
     return interval
-
-
-def cohens_dz(difference: Floats) -> float:
-    """Mean over SD of paired differences (N,); NaN where they do not vary."""
-    spread = float(difference.std(ddof=1))
-    return float(difference.mean()) / spread if spread > 0 else float("nan")
