@@ -119,11 +119,16 @@ def link_token(services: Services, link: Link) -> str:
 
 
 def add_study(
-    services: Services, folder: Path, text: str = SHORT, name: str = "", status: str = "live"
+    services: Services,
+    folder: Path,
+    text: str = SHORT,
+    name: str = "",
+    status: str = "live",
+    frames: int = 4,
 ) -> StudyInDatabase:
     """Make tiny clips for a declaration, and take both in."""
     experiment = parse_experiment(text)
-    manifest = make_clip_folder(experiment, folder)
+    manifest = make_clip_folder(experiment, folder, frames=frames)
     store_clips(services.clips, manifest, folder)
     with services.database.write() as session:
         study = create_study(session, name or experiment.name, experiment, None)
