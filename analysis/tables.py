@@ -39,7 +39,8 @@ def paper_table(analysis: Analysis) -> Table:
     for factor in analysis.anova.factors:
         rows += _factor_rows(analysis, factor, multivariate, spread)
     rows += _interaction_rows(analysis, multivariate)
-    kind = "multivariate, df (q, N - q)" if multivariate else "univariate, df (q, q (N - 1))"
+    univariate = "univariate, df (q, q (N - 1)), p by Greenhouse-Geisser"
+    kind = "multivariate, df (q, N - q)" if multivariate else univariate
     notes = [
         f"N = {analysis.n_participants}. F: {kind}. SE: standard error over participants.",
         *_pair_notes(analysis),
@@ -60,10 +61,11 @@ def _title(analysis: Analysis, what: str) -> str:
 
 
 def _test_cells(effect: Effect, multivariate: bool) -> tuple[str, str, str]:
-    test = effect.multivariate if multivariate else effect.univariate
-    if test is None:
-        return DASH, DASH, DASH
-    return fixed(test.f_value), f"{test.df_effect}, {test.df_error}", paper_p(test.p_value)
+    if multivariate and effect.multivariate is not None:
+        m = effect.multivariate
+        return fixed(m.f_value), f"{m.df_effect}, {m.df_error}", paper_p(m.p_value)
+    u = effect.univariate
+    return fixed(u.f_value), f"{u.df_effect}, {u.df_error}", paper_p(u.p_gg)
 
 
 def _factor_rows(analysis: Analysis, factor: str, multivariate: bool, spread: bool) -> list[tuple[str, ...]]:
