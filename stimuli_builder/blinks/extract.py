@@ -7,10 +7,17 @@ import numpy as np
 
 from experiments.errors import InputError
 from stimuli_builder.blinks.labelling import LabelOptions, RefusedMinimum, find_blinks
-from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300, measure_blinks, smoothed
+from stimuli_builder.blinks.measure import (
+    MeasuredBlink,
+    closure_at_300,
+    lid_motion_at_300,
+    measure_blinks,
+    smoothed,
+)
 from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
-from stimuli_builder.blinks.series import BlinkSeries
+from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
 
+LID_FILTER_FRAMES = 10
 PLAUSIBLE_MS = (120, 600)
 """Median durations that are believed: 330 ms is usual."""
 PLAUSIBLE_SPEED = (9, 50)
@@ -76,8 +83,10 @@ def eye_of(column: str) -> Eye | None:
     return None
 
 
-def eye_profile(eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye: Eye | None) -> BlinkProfile:
-    """Return the profile of one blink of one eye, closure at 300 fps."""
+def eye_profile(
+    eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye: Eye | None, label: str = ""
+) -> BlinkProfile:
+    """Return the profile of one blink of one eye at 300 fps; its name holds eye, label or column."""
     closure, minimum = closure_at_300(
         eye_blinks.smooth,
         eye_blinks.series.fps,
@@ -87,7 +96,7 @@ def eye_profile(eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye
         blink.closed_distance,
     )
     return BlinkProfile(
-        profile_id=f"{recording}-{eye or eye_blinks.series.column}-{blink.number:02d}",
+        profile_id=f"{recording}-{eye or label or eye_blinks.series.column}-{blink.number:02d}",
         closure=np.round(closure, 6),
         minimum_index=minimum,
         down_frames=minimum,
@@ -96,14 +105,24 @@ def eye_profile(eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye
         source=f"recorded: {recording}, {eye_blinks.series.column}, blink {blink.number}",
         eye=eye,
         recording=recording,
+        lower_up_mm=_lid(eye_blinks, eye_blinks.series.lower_up_mm, blink),
+        lower_nasal_mm=_lid(eye_blinks, eye_blinks.series.lower_nasal_mm, blink),
         rest_before=round(blink.rest_before, 6),
         rest_after=round(blink.rest_after, 6),
     )
 
 
-def eye_profiles(eye_blinks: EyeBlinks, recording: str, eye: Eye | None) -> list[BlinkProfile]:
+def _lid(eye_blinks: EyeBlinks, place_mm: Array | None, blink: MeasuredBlink) -> Array | None:
+    fps = eye_blinks.series.fps
+    width = scaled_frames(LID_FILTER_FRAMES, fps)
+    return lid_motion_at_300(place_mm, fps, blink.onset_frame, blink.minimum_frame, blink.end_frame, width)
+
+
+def eye_profiles(
+    eye_blinks: EyeBlinks, recording: str, eye: Eye | None, label: str = ""
+) -> list[BlinkProfile]:
     """Return the profile of every blink of one eye."""
-    return [eye_profile(eye_blinks, blink, recording, eye) for blink in eye_blinks.blinks]
+    return [eye_profile(eye_blinks, blink, recording, eye, label) for blink in eye_blinks.blinks]
 
 
 def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
@@ -159,7 +178,7 @@ def all_profiles(
     profiles = [
         profile
         for eye_blinks, name in zip(eyes, names, strict=True)
-        for profile in eye_profiles(eye_blinks, recording, name)
+        for profile in eye_profiles(eye_blinks, recording, name, "one" if len(eyes) == 1 else "")
     ]
     if set(names) == {"left", "right"} and len(eyes) == 2:
         by_name = dict(zip(names, eyes, strict=True))

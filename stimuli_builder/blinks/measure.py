@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
@@ -142,14 +143,14 @@ def _measure(
     )
 
 
-def open_line(smooth: Array, onset: int, end: int) -> Callable[[Array | int], Array]:
+def open_line(smooth: Array, onset: int, end: int) -> Callable[[ArrayLike], Array]:
     """Open level during a blink: the line from its onset to its end.
 
     Eyes seldom reopen exactly as far as they were; against this line a profile begins and ends at 0,
     and nothing jumps where an animation joins it to an open eye.
     """
     levels = [float(smooth[onset]), float(smooth[end])]
-    return lambda frame: np.asarray(np.interp(np.asarray(frame), [onset, end], levels))
+    return lambda frame: np.asarray(np.interp(np.asarray(frame, dtype=np.float64), [onset, end], levels))
 
 
 def _rests(smooth: Array, blink: LabelledBlink, fps: float, closed: float) -> tuple[float, float]:
@@ -166,19 +167,43 @@ def _rests(smooth: Array, blink: LabelledBlink, fps: float, closed: float) -> tu
     return (widest - levels[0]) / (widest - closed), (widest - levels[1]) / (widest - closed)
 
 
-def closure_at_300(
-    smooth: Array, fps: float, onset: int, minimum: int, end: int, closed: float
-) -> tuple[Array, int]:
-    """Closure of one blink at 300 fps, and the sample of its minimum.
+def at_300(values: Array, fps: float, onset: int, minimum: int, end: int) -> tuple[Array, int]:
+    """Resample one blink, onset to end, to 300 fps by a monotone spline; return the sample of its minimum.
 
-    A spline passes through the filtered frames; its time is laid so that the minimum falls on a sample and
-    the ends on the last whole ones. Closure is cut to [0, 1]: a lid that met the other moves no further.
+    Its time is laid so that the minimum falls on a sample and the ends on the last whole ones.
     """
     before = max(1, round((minimum - onset) * PROFILE_FPS / fps))
     after = max(1, round((end - minimum) * PROFILE_FPS / fps))
     frames = np.concatenate(
         [np.linspace(onset, minimum, before + 1), np.linspace(minimum, end, after + 1)[1:]]
     )
-    spline = PchipInterpolator(np.arange(onset, end + 1), smooth[onset : end + 1])
-    level = open_line(smooth, onset, end)(frames)
-    return np.clip((level - spline(frames)) / (level - closed), 0.0, 1.0), before
+    spline = PchipInterpolator(np.arange(onset, end + 1), values[onset : end + 1])
+    return np.asarray(spline(frames)), before
+
+
+def closure_at_300(
+    smooth: Array, fps: float, onset: int, minimum: int, end: int, closed: float
+) -> tuple[Array, int]:
+    """Closure of one blink at 300 fps, and the sample of its minimum.
+
+    Closure is cut to [0, 1]: a lid that met the other moves no further.
+    """
+    level = open_line(smooth, onset, end)(np.arange(smooth.size))
+    closure, before = at_300((level - smooth) / (level - closed), fps, onset, minimum, end)
+    return np.clip(closure, 0.0, 1.0), before
+
+
+def lid_motion_at_300(
+    place_mm: Array | None, fps: float, onset: int, minimum: int, end: int, width_frames: float
+) -> Array | None:
+    """Lower lid's motion in one blink at 300 fps, against the line from onset to end; None if unknown."""
+    if place_mm is None or not np.isfinite(place_mm[onset : end + 1]).all():
+        return None
+    reach = int(np.ceil(width_frames))
+    first = max(0, onset - reach)
+    part = place_mm[first : end + 1 + reach]
+    known = np.where(np.isfinite(part), part, place_mm[minimum])
+    smooth = box_filter(known, width_frames)
+    frames = np.arange(smooth.size)
+    moved = smooth - open_line(smooth, onset - first, end - first)(frames)
+    return np.round(at_300(moved, fps, onset - first, minimum - first, end - first)[0], 6)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError, did_you_mean
 from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 
 PAPER_FPS = 300
 DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
@@ -33,6 +34,8 @@ class BlinkSeries:
         Whether the distance is in pixels.
     bridged_frames, missing_frames : int
         Frames filled by a straight line, and frames left out of the labelling.
+    lower_up_mm, lower_nasal_mm : (n,) float64 array or None
+        Place of the lower lid where a track holds it.
     """
 
     distance: Array
@@ -41,6 +44,8 @@ class BlinkSeries:
     is_px: bool
     bridged_frames: int = 0
     missing_frames: int = 0
+    lower_up_mm: Array | None = None
+    lower_nasal_mm: Array | None = None
 
 
 def scaled_frames(paper_frames: float, fps: float) -> float:
@@ -152,7 +157,8 @@ def make_series(
     gaps_allowed = (
         column in DISTANCE_COLUMNS and "status" in table.columns if allow_gaps is None else allow_gaps
     )
-    filled, bridged = bridge_gaps(values, round(MOST_BRIDGED_MS * fps / 1000))
+    reach = round(MOST_BRIDGED_MS * fps / 1000)
+    filled, bridged = bridge_gaps(values, reach)
     missing = np.isnan(filled)
     if missing.any() and not gaps_allowed:
         first = int(np.argmax(missing))
@@ -164,6 +170,8 @@ def make_series(
         )
     if np.nanmin(values) < 0:
         raise InputError(f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g})")
+    lid = tracked_lower_lid(table, column) if column in DISTANCE_COLUMNS else None
+    up, nasal = (None, None) if lid is None else (bridge_gaps(place, reach)[0] for place in lid)
     return BlinkSeries(
         distance=filled,
         fps=fps,
@@ -171,6 +179,8 @@ def make_series(
         is_px=column.endswith("_px"),
         bridged_frames=bridged,
         missing_frames=int(missing.sum()),
+        lower_up_mm=up,
+        lower_nasal_mm=nasal,
     )
 
 

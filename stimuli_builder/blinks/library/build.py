@@ -1,6 +1,7 @@
 """Measure the shipped library anew from its recordings."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -47,7 +48,10 @@ def recorded_profiles(
         blinks_of(series, options)
         for series in read_series(path, list(recording.columns.values()), recording.fps)
     ]
-    return all_profiles(eyes, recording.name, list(recording.columns))
+    profiles = all_profiles(eyes, recording.name, list(recording.columns))
+    if recording.keep_lower_lid:
+        return profiles
+    return [replace(profile, lower_up_mm=None, lower_nasal_mm=None) for profile in profiles]
 
 
 def write_profiles(

@@ -9,20 +9,24 @@ from stimuli_builder.blinks.profile import Eye
 
 LIBRARY_FOLDER = Path(__file__).parent
 RECORDINGS_FILE = LIBRARY_FOLDER / "recordings.toml"
-_EYES: dict[str, Eye] = {"left": "left", "right": "right"}
+_EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "one": None}
 
 
 @dataclass(frozen=True)
 class Recording:
-    """One recording: file, column of each eye, rate (None: from time_s), who is seen, and rights."""
+    """One recording: file, column of each eye, rate (None: from time_s), who is seen, and rights.
+
+    `keep_lower_lid`: whether the lower lid's motion in a track is good enough to be kept.
+    """
 
     name: str
     file: str
     fps: float | None
-    columns: dict[Eye, str]
+    columns: dict[Eye | None, str]
     person: str
     source: str
     licence: str
+    keep_lower_lid: bool
 
 
 def read_recordings(path: Path = RECORDINGS_FILE) -> list[Recording]:
@@ -53,4 +57,5 @@ def _recording(entry: dict[str, object]) -> Recording:
         person=str(entry["person"]),
         source=str(entry["source"]),
         licence=str(entry["licence"]),
+        keep_lower_lid=bool(entry.get("keep_lower_lid", True)),
     )

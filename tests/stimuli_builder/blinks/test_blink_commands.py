@@ -13,10 +13,9 @@ GUIDE = (Path(__file__).parents[3] / "docs" / "blinks.md").read_text(encoding="u
 
 
 def test_blinks_of_both_eyes_are_written_with_their_profiles(stimuli, series_file, tmp_path):
-    ended = stimuli(
-        "blinks", series_file, "--column", "gap_l", "--column", "gap_r", "--fps", 300,
-        "--out", tmp_path / "b.csv", "--summary", tmp_path / "s.json", "--plot", tmp_path / "s.png", "--plot-aligned", tmp_path / "a.svg",
-    )  # fmt: skip
+    both = ("--column", "gap_l", "--column", "gap_r", "--fps", 300, "--out", tmp_path / "b.csv")
+    figures = ("--plot", tmp_path / "s.png", "--plot-aligned", tmp_path / "a.svg")
+    ended = stimuli("blinks", series_file, *both, *figures, "--summary", tmp_path / "s.json")
     assert ended.code == 0, ended.err
     table = pd.read_csv(tmp_path / "b.csv")
     assert list(table.columns) == list(BLINK_COLUMNS)

@@ -9,11 +9,10 @@ from stimuli_builder.blinks.library.build import recorded_profiles, write_model,
 from stimuli_builder.blinks.library.recordings import read_recordings
 
 
-def test_the_library_ships_eighteen_profiles_of_nine_blinks_and_more_when_tracked():
+def test_the_library_ships_eighteen_profiles_of_nine_blinks_and_three_tracked_ones():
     shipped = load_library()
-    first = [profile for profile in shipped if profile.recording == "espbm"]
-    assert [profile.eye for profile in first] == ["left"] * 9 + ["right"] * 9
-    assert shipped[: len(first)] == tuple(first)
+    assert [profile.eye for profile in shipped] == ["left"] * 9 + ["right"] * 9 + [None] * 3
+    assert [profile.recording for profile in shipped] == ["espbm"] * 18 + ["eyeloop"] * 3
     assert len({profile.profile_id for profile in shipped}) == len(shipped)
 
 
