@@ -107,7 +107,7 @@ class FramePainter:
         window = self.character.window
         from_middle = np.arange(window.x, window.x + window.width) + 0.5 - self.character.size_px[0] / 2
         share = from_middle / (SEAM_MM * self.character.px_per_mm) + 0.5
-        return np.clip(share, 0.0, 1.0).astype(np.float32)
+        return np.asarray(np.clip(share, 0.0, 1.0), np.float32)
 
 
 def _same_picture(curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> bytes:

@@ -37,7 +37,7 @@ def write_preview(manifest: Manifest, folder: Path) -> tuple[Path, Path]:
 def contact_sheet(manifest: Manifest, folder: Path) -> Rgb:
     """One row a cell: the blink of its first exemplar, frame by frame."""
     firsts = [next(clips) for _, clips in groupby(manifest.clips, key=lambda clip: clip.cell)]
-    rows = [blink_frames(folder / clip.file, clip) for clip in firsts]
+    rows = [[_small(frame) for frame in blink_frames(folder / clip.file, clip)] for clip in firsts]
     columns = max(len(frames) for frames in rows)
     width, height = THUMBNAIL_PX
     sheet = Image.new("RGB", (LABEL_PX + columns * (width + 2), len(rows) * (height + 2)), PAPER)
@@ -47,9 +47,12 @@ def contact_sheet(manifest: Manifest, folder: Path) -> Rgb:
         top = number * (height + 2)
         draw.multiline_text((8, top + 10), _label(clip), fill=INK, font=font, spacing=4)
         for place, frame in enumerate(frames):
-            small = Image.fromarray(frame).resize(THUMBNAIL_PX, Image.Resampling.LANCZOS)
-            sheet.paste(small, (LABEL_PX + place * (width + 2), top))
+            sheet.paste(Image.fromarray(frame), (LABEL_PX + place * (width + 2), top))
     return np.asarray(sheet)
+
+
+def _small(frame: Rgb) -> Rgb:
+    return np.asarray(Image.fromarray(frame).resize(THUMBNAIL_PX, Image.Resampling.LANCZOS))
 
 
 def blink_frames(path: Path, clip: Clip) -> list[Rgb]:

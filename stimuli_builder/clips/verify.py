@@ -78,8 +78,7 @@ def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], floa
         pictures, problems = _decoded(path, clip)
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
-    meter = meters.of(clip)
-    if problems or meter is None or not clip.closure or clip.closure_other:
+    if problems or not _measurable(clip) or (meter := meters.of(clip)) is None:
         return problems, None
     off = np.abs(meter.measured_mm(pictures) - meter.promised_mm(clip))
     worst = float(off.max())
@@ -88,6 +87,11 @@ def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], floa
             f"frame {int(off.argmax())}: the eye is open {worst:.2f} mm more or less than the curve says"
         )
     return problems, worst
+
+
+def _measurable(clip: Clip) -> bool:
+    """Whether the upper lid's curve alone decides how far both eyes are open."""
+    return bool(clip.closure) and not clip.closure_other and clip.inputs.get("lower_lid") == "none"
 
 
 def _decoded(path: Path, clip: Clip) -> tuple[NDArray[np.uint8], list[str]]:
