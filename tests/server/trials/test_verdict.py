@@ -1,0 +1,70 @@
+from dataclasses import replace
+
+import pytest
+
+from experiments.rules import PlaybackRules
+from server.trials.verdict import Playback, frames_in_log, is_settled, judge
+
+CLIP = "a" * 64
+GOOD = Playback(
+    method="webcodecs",
+    clip_sha256=CLIP,
+    frames_drawn=45,
+    frames_late=0,
+    frames_missing=0,
+    longest_gap_ms=34.0,
+    focus_lost=False,
+    frames_seen=45,
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({}, ("good", "")),
+        ({"frames_missing": 1, "frames_seen": 44}, ("flagged", "flagged_missing_frames")),
+        ({"frames_missing": 3, "frames_seen": 42}, ("flagged", "flagged_missing_frames")),
+        ({"frames_missing": 4, "frames_seen": 41}, ("failed", "failed_missing_frames")),
+        ({"frames_late": 2}, ("good", "")),
+        ({"frames_late": 3}, ("flagged", "flagged_late_frames")),
+        ({"longest_gap_ms": 70.5}, ("flagged", "flagged_longest_gap_ms")),
+        ({"longest_gap_ms": 250.5}, ("failed", "failed_longest_gap_ms")),
+        ({"focus_lost": True}, ("failed", "focus_lost")),
+        ({"method": "video", "frames_seen": None}, ("flagged", "video_fallback")),
+        ({"method": "none"}, ("failed", "clip_not_played")),
+        ({"clip_sha256": "b" * 64}, ("failed", "wrong_clip")),
+        ({"frames_seen": None}, ("flagged", "no_frame_log")),
+        ({"frames_seen": 40}, ("flagged", "frame_log_disagrees")),
+    ],
+)
+def test_the_declared_rules(change, expected) -> None:
+    assert judge(PlaybackRules(), replace(GOOD, **change), CLIP, 45, rated=True) == expected
+
+
+def test_a_play_without_a_rating_has_failed() -> None:
+    assert judge(PlaybackRules(), GOOD, CLIP, 45, rated=False) == ("failed", "not_rated")
+
+
+def test_lost_focus_may_be_declared_harmless_enough_to_flag() -> None:
+    rules = PlaybackRules(fail_on_focus_lost=False, flag_video_fallback=False)
+    assert judge(rules, replace(GOOD, focus_lost=True), CLIP, 45, rated=True) == ("flagged", "focus_lost")
+    assert judge(rules, replace(GOOD, method="video"), CLIP, 45, rated=True) == ("good", "")
+
+
+def test_views_are_counted_one_by_one() -> None:
+    assert frames_in_log([0, 1, 2, 2, 0, 1, 2]) == 6
+    assert frames_in_log([]) == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "play", "verdict", "settled"),
+    [
+        ("main", 1, "good", True),
+        ("main", 1, "flagged", True),
+        ("main", 1, "failed", False),
+        ("main", 2, "failed", True),
+        ("practice", 1, "failed", True),
+    ],
+)
+def test_only_failed_main_plays_are_repeated(kind: str, play: int, verdict: str, settled: bool) -> None:
+    assert is_settled(kind, play, verdict, 1) is settled
