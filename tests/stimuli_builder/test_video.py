@@ -1,0 +1,117 @@
+"""Video in and out: sizes, rates, pixel formats, rotation, seeking, and files that break off."""
+
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.video import VideoWriter, frames, read_frames, scan_video
+
+
+def ramp(number, width=64, height=48):
+    """A picture that tells its frame number and which way is up."""
+    picture = np.full((height, width), 20 + 4 * number, np.uint8)
+    picture[: height // 4, : width // 4] = 230
+    return picture
+
+
+def write(path, codec="libx264", pix_fmt="yuv420p", count=20, fps=30, size=(64, 48)):
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
+        stream.width, stream.height = size
+        stream.pix_fmt = pix_fmt
+        for number in range(count):
+            frame = av.VideoFrame.from_ndarray(ramp(number, *size), format="gray").reformat(format=pix_fmt)
+            for packet in stream.encode(frame):
+                container.mux(packet)
+        for packet in stream.encode(None):
+            container.mux(packet)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "pix_fmt", "fps"),
+    [
+        ("a.mp4", "libx264", "yuv420p", 30),
+        ("b.mp4", "libx264", "yuv444p", 300),
+        ("c.mkv", "libx264", "gray", 24),
+        ("d.mkv", "ffv1", "yuv420p10le", 120),
+        ("e.mkv", "ffv1", "gray", 60),
+        ("f.avi", "mpeg4", "yuv420p", 25),
+        ("g.webm", "libvpx-vp9", "yuv420p", 50),
+        ("h.mkv", "ffv1", "bgr0", 1000 / 1001 * 30),
+    ],
+)
+def test_any_format_is_read_in_order_as_grey(tmp_path, name, codec, pix_fmt, fps):
+    path = write(tmp_path / name, codec, pix_fmt, fps=fps)
+    info = scan_video(path)
+    assert (info.size_px, info.frame_count, info.variable) == ((64, 48), 20, False)
+    assert info.fps == pytest.approx(fps, rel=0.02)
+    levels = [int(picture[40, 50]) for picture in frames(path)]
+    assert len(levels) == 20
+    assert (np.diff(levels) > 0).all()
+
+
+def test_frames_are_found_by_number(tmp_path):
+    path = write(tmp_path / "a.mp4", count=40)
+    everything = list(frames(path))
+    wanted = read_frames(scan_video(path), [39, 0, 17])
+    assert list(wanted) == [0, 17, 39]
+    assert all(np.array_equal(wanted[n], everything[n]) for n in wanted)
+    with pytest.raises(InputError, match="the video has frames 0 to 39"):
+        read_frames(scan_video(path), [40])
+
+
+MATRICES = {
+    90: (0, 1, -1, 0),
+    180: (-1, 0, 0, -1),
+    270: (0, -1, 1, 0),
+}
+
+
+@pytest.mark.parametrize("degrees", MATRICES)
+def test_a_rotated_phone_video_is_read_upright(tmp_path, degrees):
+    """The rotation is written where phones write it: into the matrix of the MP4 track header."""
+    path = write(tmp_path / "phone.mp4")
+    data = bytearray(path.read_bytes())
+    at = data.index(b"tkhd") + 4 + 40
+    a, b, c, d = (int(value * 65536) for value in MATRICES[degrees])
+    values = (a, b, 0, c, d, 0, 0, 0, 1 << 30)
+    data[at : at + 36] = b"".join(value.to_bytes(4, "big", signed=True) for value in values)
+    path.write_bytes(bytes(data))
+    info = scan_video(path)
+    assert info.size_px == ((64, 48) if degrees == 180 else (48, 64))
+    picture = next(iter(frames(path)))
+    corner = {90: (5, -5), 180: (-5, -5), 270: (-5, 5)}[degrees]
+    assert picture[corner] > 180
+    assert picture.shape == info.size_px[::-1]
+    assert picture[picture.shape[0] // 2, picture.shape[1] // 2] < 60
+
+
+def test_an_unfinished_video_is_never_left(tmp_path):
+    path = tmp_path / "out.mp4"
+    with pytest.raises(TypeError), VideoWriter(path, 30, (64, 48)) as writer:
+        writer.write(None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_written_frames_come_back(tmp_path):
+    path = tmp_path / "out.mp4"
+    with VideoWriter(path, 240, (64, 48)) as writer:
+        for number in range(10):
+            writer.write(np.repeat(ramp(number)[:, :, None], 3, axis=2))
+    info = scan_video(path)
+    assert info.frame_count == 10
+    assert info.fps == pytest.approx(240)
+
+
+def test_a_reader_that_stops_early_ends_its_thread(tmp_path):
+    import threading
+
+    path = write(tmp_path / "a.mp4", count=200)
+    reader = frames(path)
+    next(reader)
+    reader.close()
+    assert not [thread for thread in threading.enumerate() if thread.name == "decoder"]

@@ -1,0 +1,168 @@
+"""What `stimuli track` refuses: one line, exit code 2, nothing under the final name."""
+
+import json
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from stimuli_builder.tracking.labels import load_labels
+from stimuli_builder.video import VideoWriter
+
+
+def write_frames(path, pictures, stamps=None, fps=100, options=None):
+    """Write grey pictures with time stamps in milliseconds."""
+    with av.open(str(path), "w", options=options or {}) as container:
+        stream = container.add_stream("libx264", rate=fps)
+        stream.height, stream.width = pictures[0].shape
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": "20", "preset": "ultrafast", "bf": "0", "x264-params": "log-level=error"}
+        if stamps is not None:
+            stream.codec_context.time_base = Fraction(1, 1000)
+        for number, picture in enumerate(pictures):
+            frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format="yuv420p")
+            if stamps is not None:
+                frame.pts, frame.time_base = int(stamps[number]), Fraction(1, 1000)
+            for packet in stream.encode(frame):
+                container.mux(packet)
+        for packet in stream.encode(None):
+            container.mux(packet)
+
+
+@pytest.fixture
+def refused(stimuli, tmp_path, recording):
+    """Run track and expect one error line, exit code 2 and no output, not even a temporary one."""
+
+    def run(video=None, labels=None, *more):
+        out = tmp_path / "out" / "track.csv"
+        out.parent.mkdir(exist_ok=True)
+        chosen = ("--labels", labels or recording.labels) if "--model" not in more else ()
+        code, _, error = stimuli("track", video or recording.video, *chosen, "--out", out, *more)
+        assert code == 2
+        assert error.startswith("error: ")
+        assert error.count("\n") == 1
+        assert list(out.parent.iterdir()) == []
+        return error
+
+    return run
+
+
+def test_labels_for_another_video_size(refused, document, tmp_path):
+    document["image_size_px"] = [640, 480]
+    path = tmp_path / "labels.json"
+    path.write_text(json.dumps(document))
+    assert "made on 640 x 480 pixels, the video has 512 x 384" in refused(labels=path)
+
+
+def test_two_eye_labels_with_one_eye_and_the_reverse(refused, document, tmp_path):
+    assert "leave --one-eye out" in refused(None, None, "--one-eye")
+    document["frames"] = {key: points[:9] for key, points in document["frames"].items()}
+    del document["mid_upper"], document["mid_lower"]
+    path = tmp_path / "labels.json"
+    path.write_text(json.dumps(document))
+    assert "add --one-eye" in refused(labels=path)
+
+
+def test_missing_unreadable_and_soundless_videos(refused, tmp_path):
+    assert "found none" in refused(tmp_path / "none.mp4")
+    text = tmp_path / "text.mp4"
+    text.write_text("this is no video")
+    assert "not a video that can be read" in refused(text)
+    empty = tmp_path / "empty.mp4"
+    empty.write_bytes(b"")
+    assert "not a video that can be read" in refused(empty)
+
+
+def test_a_file_cut_off_before_its_index(refused, recording, tmp_path):
+    cut = tmp_path / "cut.mp4"
+    cut.write_bytes(recording.video.read_bytes()[:20_000])
+    assert "not a video that can be read" in refused(cut)
+
+
+def test_a_file_cut_off_after_its_index(refused, recording, tmp_path):
+    whole = tmp_path / "whole.mp4"
+    write_frames(whole, recording.pictures[:80], options={"movflags": "faststart"})
+    cut = tmp_path / "cut.mp4"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size * 6 // 10])
+    assert "truncated" in refused(cut)
+
+
+def test_a_video_without_a_face(refused, recording, tmp_path, stimuli):
+    model = tmp_path / "model.npz"
+    assert (
+        stimuli("train", recording.video, "--labels", recording.labels, "--out", model, "--no-refine")[0] == 0
+    )
+    rng = np.random.default_rng(5)
+    wall = [np.clip(rng.normal(130, 12, (384, 512)), 0, 255).astype(np.uint8) for _ in range(12)]
+    path = tmp_path / "wall.mp4"
+    write_frames(path, wall)
+    error = refused(path, None, "--model", model)
+    assert "no eyes like the labelled ones in any of its 12 frames" in error
+
+
+def test_variable_frame_rate_is_refused_or_accepted_by_name(refused, recording, tmp_path, stimuli):
+    stamps = np.cumsum([0] + [5, 5, 20] * 66)[:200]
+    path = tmp_path / "variable.mp4"
+    write_frames(path, recording.pictures[:200], stamps)
+    assert "variable frame rate, steps of 5.0 to 20.0 ms" in refused(path)
+    out = tmp_path / "track.csv"
+    labels = load_labels(recording.labels)
+    assert max(labels.frames) < 200
+    code, _, error = stimuli(
+        "track", path, "--labels", recording.labels, "--out", out, "--accept-variable-rate", "--no-refine"
+    )
+    assert (code, error) == (0, "")
+    assert [line.split(",")[1] for line in out.read_text().splitlines()[1:5]] == [
+        "0.000000",
+        "0.005000",
+        "0.010000",
+        "0.030000",
+    ]
+
+
+def test_a_model_for_another_size_or_no_model(refused, recording, tmp_path, lesson):
+    from stimuli_builder.tracking.model import save_model
+
+    model, small = tmp_path / "model.npz", tmp_path / "small.mp4"
+    save_model(lesson.model, model)
+    with VideoWriter(small, 100, (256, 192)) as writer:
+        for picture in recording.pictures[:5]:
+            writer.write(np.ascontiguousarray(picture[::2, ::2]))
+    assert "256 x 192 pixels, the model was trained on 512 x 384" in refused(small, None, "--model", model)
+    assert "not a model that 'stimuli train' wrote" in refused(None, None, "--model", recording.truth)
+    assert "found none" in refused(None, None, "--model", tmp_path / "none.npz")
+
+
+def test_labels_or_model_not_both_nor_neither(stimuli, recording, tmp_path):
+    out = tmp_path / "track.csv"
+    assert stimuli("track", recording.video, "--out", out)[0] == 2
+    assert "give one of them" in stimuli("track", recording.video, "--out", out)[2]
+
+
+def test_outputs_that_cannot_be_written_are_refused_first(stimuli, recording, tmp_path):
+    code, _, error = stimuli(
+        "track", recording.video, "--labels", recording.labels, "--out", tmp_path / "no" / "track.csv"
+    )
+    assert code == 2
+    assert "does not exist; make it first" in error
+
+
+def test_label_bootstrap_without_its_extra_or_weights(stimuli, recording, tmp_path):
+    from importlib.util import find_spec
+
+    out = tmp_path / "labels.json"
+    code, _, error = stimuli("label", recording.video, "--bootstrap", "--out", out)
+    assert code == 2
+    assert ("palpebra[bootstrap]" if find_spec("mediapipe") is None else "--weights") in error
+    assert "expected --bootstrap" in stimuli("label", recording.video, "--out", out)[2]
+    assert not out.exists()
+
+
+def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_path):
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join(recording.truth.read_text().splitlines()[:50]) + "\n")
+    code, _, error = stimuli("accuracy", other, recording.truth)
+    assert code == 2
+    assert "compare a track with its own truth" in error
+    assert "not a track" in stimuli("accuracy", recording.labels, recording.truth)[2]
