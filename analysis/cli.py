@@ -15,10 +15,12 @@ app = typer.Typer(
 
 def _gather() -> None:
     from analysis.cli_check_paper import register as register_check_paper
+    from analysis.cli_models import register as register_models
     from analysis.cli_run import register as register_run
 
     register_run(app)
     register_check_paper(app)
+    register_models(app)
 
 
 _gather()

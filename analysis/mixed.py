@@ -27,6 +27,9 @@ LIFTS = (0.003, 0.01, 0.03, 0.1, 0.3)
 
 NEWTON_STEPS = 8
 
+NEWTON_DECREMENT = 1e-8
+"""A step that promised less than this of the criterion was the last."""
+
 
 @dataclass(frozen=True)
 class MixedEffect:
@@ -213,14 +216,17 @@ def _polished(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats:
         values, vectors = np.linalg.eigh((hessian + hessian.T) / 2)
         if values.min() <= 1e-8 * values.max():
             break
+        rotated = vectors.T @ at.gradient[free]
         trial = theta.copy()
-        trial[free] -= vectors @ ((vectors.T @ at.gradient[free]) / values)
+        trial[free] -= vectors @ (rotated / values)
         if (trial[np.array(bounded)] < 0).any():
             break
         after = criterion(c, trial)
         if not after.value < at.value + 1e-10 * abs(at.value):
             break
         theta, at = trial, after
+        if float(rotated @ (rotated / values)) < NEWTON_DECREMENT:
+            break
     return theta
 
 

@@ -1,4 +1,4 @@
-"""Write the data behind the R golden files: seeded, rounded to a few decimals so that every reader parses it alike.
+"""Write the data behind the R golden files: seeded, rounded so that every reader parses it alike.
 
 Run from this folder: `python make_data.py`. The CSV files are committed; rerun only to add a case.
 """

@@ -1,0 +1,129 @@
+"""Power by simulation: synthetic participants drawn again and again from one population."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from analysis.synthetic.population import Population
+from analysis.synthetic.synthesise import Plan, population_of
+from experiments.errors import InputError
+
+Floats = NDArray[np.float64]
+Statistic = Literal["multivariate", "greenhouse-geisser"]
+
+CHUNK_VALUES = 4_000_000
+"""Simulated cell means held in memory at once."""
+
+
+@dataclass(frozen=True)
+class PowerResult:
+    """Share of significant tests, (effects, sample sizes), with standard errors; NaN where no test exists."""
+
+    experiment: str
+    statistic: Statistic
+    alpha: float
+    simulations: int
+    seed: int
+    n: tuple[int, ...]
+    effects: tuple[str, ...]
+    power: Floats = field(repr=False)
+    se: Floats = field(repr=False)
+
+    def smallest_n(self, wanted: float) -> dict[str, int | None]:
+        """Of every effect the smallest simulated n from which on the power stays at `wanted` or above."""
+        found: dict[str, int | None] = {}
+        for effect, row in zip(self.effects, self.power, strict=True):
+            enough = np.nan_to_num(row) >= wanted
+            start = len(row) - int(np.argmin(enough[::-1])) if not enough.all() else 0
+            found[effect] = self.n[start] if start < len(row) else None
+        return found
+
+
+def sample_sizes(text: str) -> tuple[int, ...]:
+    """Read `10:60:5` (first, last, step), `10:60`, or `20,30,43`; InputError for anything else."""
+    try:
+        parts = [int(part) for part in text.replace(",", ":").split(":")]
+    except ValueError:
+        raise InputError(f"expected sample sizes as 10:60:5 or 20,30,43, got '{text}'") from None
+    if ":" in text and "," not in text and len(parts) in (2, 3):
+        step = parts[2] if len(parts) == 3 else 1
+        if step < 1 or parts[1] < parts[0]:
+            raise InputError(f"expected first:last:step with first <= last and step >= 1, got '{text}'")
+        parts = list(range(parts[0], parts[1] + 1, step))
+    elif ":" in text:
+        raise InputError(f"expected sample sizes as 10:60:5 or 20,30,43, got '{text}'")
+    if min(parts) < 3 or max(parts) > 5000:
+        raise InputError(f"expected sample sizes from 3 to 5000, got {min(parts)} to {max(parts)}")
+    return tuple(sorted(set(parts)))
+
+
+def simulate_power(
+    plan: Plan,
+    sizes: Sequence[int],
+    simulations: int = 1000,
+    alpha: float = 0.05,
+    seed: int = 1,
+    statistic: Statistic = "multivariate",
+    progress: Callable[[int], None] | None = None,
+) -> PowerResult:
+    """Simulate the tests of every effect whose size is known (printed or wished).
+
+    The population has the means and covariance that give the plan's figures at the plan's own n; cell means
+    are clipped to the scale and rounded to what the trials of a cell can give. `progress` gets the number of
+    data sets just finished.
+    """
+    if not 0 < alpha < 1:
+        raise InputError(f"expected alpha between 0 and 1, got {alpha}")
+    if simulations < 10:
+        raise InputError(f"expected at least 10 simulations, got {simulations}")
+    rng = np.random.default_rng(seed)
+    population = population_of(plan, rng)
+    known = [t.name.removeprefix("F ") for t in plan.targets.tests if t.wanted is not None]
+    effects = tuple(e for e in plan.space.effects if e in known)
+    contrasts = [plan.space.effects[e] for e in effects]
+    power = np.empty((len(effects), len(sizes)))
+    for column, n in enumerate(sizes):
+        hits, done = np.zeros(len(effects)), 0
+        while done < simulations:
+            count = min(simulations - done, max(1, CHUNK_VALUES // (n * plan.space.n_cells)))
+            y = _draw(plan, population, count, n, rng)
+            hits += [_significant(y @ c, alpha, statistic) for c in contrasts]
+            done += count
+            if progress is not None:
+                progress(count)
+        power[:, column] = hits / simulations
+    se = np.sqrt(power * (1 - power) / simulations)
+    return PowerResult(
+        plan.experiment.name, statistic, alpha, simulations, seed, tuple(sizes), effects, power, se
+    )
+
+
+def _draw(plan: Plan, population: Population, count: int, n: int, rng: np.random.Generator) -> Floats:
+    """Cell means (count, n, cells) as ratings of the experiment's trials can give them."""
+    values, vectors = np.linalg.eigh(population.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    y = population.means + rng.normal(size=(count, n, len(values))) @ root.T
+    trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
+    scale = plan.experiment.trial.scale
+    return np.asarray(np.rint(np.clip(y, scale.minimum, scale.maximum) * trials) / trials)
+
+
+def _significant(z: Floats, alpha: float, statistic: Statistic) -> float:
+    """How many data sets of contrast scores z (count, n, q) have p below alpha; NaN where no test exists."""
+    _, n, q = z.shape
+    mean = z.mean(axis=1)
+    residual = z - mean[:, None, :]
+    error = residual.transpose(0, 2, 1) @ residual
+    if statistic == "multivariate":
+        if n <= q:
+            return float("nan")
+        size = n * np.einsum("sq,sq->s", mean, np.linalg.solve(error, mean[:, :, None])[:, :, 0])
+        return float((special.fdtrc(q, n - q, size * (n - q) / q) < alpha).sum())
+    trace = np.einsum("sqq->s", error)
+    epsilon = trace**2 / (q * np.einsum("sij,sij->s", error, error))
+    f = n * (mean**2).sum(axis=1) / trace * (n - 1)
+    return float((special.fdtrc(q * epsilon, q * epsilon * (n - 1), f) < alpha).sum())
