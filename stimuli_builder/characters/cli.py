@@ -14,6 +14,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from experiments.errors import InputError
 from stimuli_builder.characters.photorealistic.bake import BakeOrder, bake
 from stimuli_builder.characters.photorealistic.framing import parse_size
 from stimuli_builder.characters.photorealistic.parameters import PRESETS_FILE, load_preset
@@ -33,6 +34,9 @@ def bake_photorealistic(
     levels: Annotated[
         int, typer.Option(help=f"Closure levels of the atlas: one of {', '.join(map(str, LEVEL_COUNTS))}.")
     ] = 129,
+    rendered: Annotated[
+        int | None, typer.Option(help="How many of them to render; the others are moved in between [all].")
+    ] = None,
     size: Annotated[str, typer.Option(help="Size of the full frame in px; it shows 128 mm.")] = "960x360",
     out: Annotated[Path | None, typer.Option(help="Folder of the character [out/characters/PRESET].")] = None,
     samples: Annotated[int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the crop.")] = 20,
@@ -57,11 +61,15 @@ def bake_photorealistic(
       stimuli bake photorealistic --preset southern --levels 129 --out my/face    # hours on two cores
     """
     closures_of(levels)
+    closures_of(rendered or levels)
+    if (rendered or levels) > levels:
+        raise InputError(f"cannot render {rendered} levels of an atlas that has {levels}")
     order = BakeOrder(
         name=preset,
         face=load_preset(preset, presets),
         frame=parse_size(size),
         levels=levels,
+        rendered=rendered or levels,
         quality=Quality(samples, frame_samples),
         out=out or Path("out/characters") / preset,
         work=work,

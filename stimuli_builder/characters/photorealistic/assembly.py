@@ -1,17 +1,21 @@
 """From rendered shots to the atlas: develop, lay over the still frame, write pictures and declaration."""
 
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
 from stimuli_builder.characters.photorealistic import anatomy, framing, plan
 from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
 from stimuli_builder.characters.photorealistic.framing import Box, Frame, bounding_box
+from stimuli_builder.characters.photorealistic.inbetween import Inbetweener
 from stimuli_builder.characters.photorealistic.parameters import Face
-from stimuli_builder.characters.photorealistic.plan import Quality, closures_of
+from stimuli_builder.characters.photorealistic.plan import Quality, Stage, closures_of
 from stimuli_builder.characters.photorealistic.renderer import Shot
 from stimuli_builder.characters.writing import write_declaration, write_picture
 
@@ -42,14 +46,28 @@ class Assembly:
         shot = plan.level_shot(self.work, self.frame, self.quality, closure)
         return _cut(self._lay(self.still, shot), self.crop)
 
-    def write(
-        self, folder: Path, name: str, levels: int, lower_lid: bool, provenance: dict[str, Any]
-    ) -> None:
-        """Write a character of the first `levels` generations; the declaration comes last."""
+    def levels(self, rendered: int, between: int) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+        """Closures and 8-bit pictures of the rendered levels, with `between` moved ones after each."""
+        inbetweener = Inbetweener(self.face, self.frame)
+        closures = closures_of(rendered)
+        picture = to_8_bit(self.level(closures[0]))
+        for low, high in pairwise(closures):
+            yield low, picture
+            upper = to_8_bit(self.level(high))
+            lights = srgb_to_linear(picture), srgb_to_linear(upper)
+            for step in range(1, between + 1):
+                closure = low + (high - low) * step / (between + 1)
+                yield closure, linear_to_srgb(inbetweener.between(closure, low, high, *lights, self.crop))
+            picture = upper
+        yield closures[-1], picture
+
+    def write(self, folder: Path, name: str, stage: Stage, between: int, provenance: dict[str, Any]) -> None:
+        """Write a stage's character, with `between` moved levels after each; the declaration comes last."""
         pictures = []
-        for closure in closures_of(levels):
-            file = f"level_{round(closure * 256):03d}.webp"
-            pictures.append((closure, write_picture(folder, file, to_8_bit(self.level(closure)))))
+        for closure, picture in self.levels(stage.levels, between):
+            pictures.append(
+                (closure, write_picture(folder, f"level_{round(closure * 256):03d}.webp", picture))
+            )
         declaration = Declaration(
             name=name,
             label=f"Photorealistic: {self.face.label}",
@@ -60,7 +78,7 @@ class Assembly:
             crop=self.crop,
             base=write_picture(folder, "open.webp", to_8_bit(self.still)),
             levels=tuple(Level(closure=w, file=p.file, sha256=p.sha256) for w, p in pictures),
-            lower_lid=self._write_lower_lid(folder) if lower_lid else None,
+            lower_lid=self._write_lower_lid(folder) if stage.lower_lid else None,
             provenance=provenance,
         )
         write_declaration(folder, declaration)

@@ -24,12 +24,16 @@ RECIPE = 1
 
 @dataclass(frozen=True)
 class BakeOrder:
-    """What to bake and where; `work` keeps rendered shots so that a stopped bake goes on."""
+    """What to bake and where; `work` keeps rendered shots so that a stopped bake goes on.
+
+    Of the atlas's `levels`, `rendered` are rendered and the others moved between them (inbetween.py).
+    """
 
     name: str
     face: Face
     frame: Frame
     levels: int
+    rendered: int
     quality: Quality
     out: Path
     work: Path
@@ -49,7 +53,7 @@ def bake(order: BakeOrder, report: Callable[[int, int, str], None]) -> None:
     """
     work = order.work_folder()
     work.mkdir(parents=True, exist_ok=True)
-    todo = stages(work, order.frame, order.quality, order.levels)
+    todo = stages(work, order.frame, order.quality, order.rendered)
     total = sum(len(stage.shots) for stage in todo)
     done = sum(shot.file.exists() for stage in todo for shot in stage.shots)
     report(done, total, "begin")
@@ -73,7 +77,8 @@ def bake(order: BakeOrder, report: Callable[[int, int, str], None]) -> None:
 
 def _write(order: BakeOrder, work: Path, stage: Stage) -> None:
     assembly = Assembly(work, order.face, order.frame, order.quality)
-    assembly.write(order.out, order.name, stage.levels, stage.lower_lid, _provenance(order, stage))
+    between = (order.levels - 1) // (order.rendered - 1) - 1
+    assembly.write(order.out, order.name, stage, between, _provenance(order, stage, between))
 
 
 def _ensure_textures(folder: Path, face: Face) -> None:
@@ -83,12 +88,15 @@ def _ensure_textures(folder: Path, face: Face) -> None:
         finished.touch()
 
 
-def _provenance(order: BakeOrder, stage: Stage) -> dict[str, Any]:
+def _provenance(order: BakeOrder, stage: Stage, between: int) -> dict[str, Any]:
+    levels = (stage.levels - 1) * (between + 1) + 1
     size = f"{order.frame.width_px}x{order.frame.height_px}"
     return {
-        "command": f"stimuli bake photorealistic --preset {order.name} --levels {stage.levels} --size {size} "
-        f"--samples {order.quality.crop_samples} --frame-samples {order.quality.frame_samples}",
+        "command": f"stimuli bake photorealistic --preset {order.name} --levels {levels} "
+        f"--rendered {stage.levels} --size {size} --samples {order.quality.crop_samples} "
+        f"--frame-samples {order.quality.frame_samples}",
         "recipe": RECIPE,
+        "rendered_levels": stage.levels,
         "samples": order.quality.crop_samples,
         "frame_samples": order.quality.frame_samples,
         "versions": {

@@ -93,14 +93,21 @@ def _lash(root: Array, side: int, upper: bool, length: float, fan: float, rows: 
 def brow(side: int, hair: Hair, seed: int) -> list[Strand]:
     """One eyebrow: strong hairs and, between them, a third as many short fine ones that soften its edge."""
     rng = np.random.default_rng(seed)
-    strands = []
+    flat, lift, radius = [], [], []
     for index in range(hair.brow_hairs):
         along = rng.uniform() ** 0.95
         fine = index % 3 == 0
         if along < 0.14 and rng.random() < (0.14 - along) / 0.14 * 0.6:
             continue
-        strands.append(_brow_hair(side, along, fine, hair.brow_height, rng))
-    return strands
+        grown = _brow_hair(side, along, fine, hair.brow_height, rng)
+        flat.append(grown[0])
+        lift.append(grown[1])
+        radius.append(grown[2])
+    if not flat:
+        return []
+    places = np.stack(flat)
+    z = anatomy.closed_skin(places[..., 0], places[..., 1]) - 0.15 + np.stack(lift)
+    return list(zip(np.dstack([places, z]), radius, strict=True))
 
 
 def brow_line(along: Array | float) -> Array:
@@ -114,7 +121,10 @@ def brow_half_height(along: Array | float) -> Array:
     return np.asarray(np.interp(along, [0, 0.08, 0.3, 0.6, 0.85, 1], [2.0, 3.2, 3.4, 2.7, 1.6, 0.5]))
 
 
-def _brow_hair(side: int, along: float, fine: bool, height: float, rng: np.random.Generator) -> Strand:
+def _brow_hair(
+    side: int, along: float, fine: bool, height: float, rng: np.random.Generator
+) -> tuple[Array, Array, float]:
+    """(k, 2) frontal positions, (k,) lift off the skin, and radius of one hair."""
     across = float(np.clip(rng.normal(0, 0.62 if fine else 0.5), -1.3, 1.2))
     y = (
         float(brow_line(along))
@@ -131,6 +141,5 @@ def _brow_hair(side: int, along: float, fine: bool, height: float, rng: np.rando
     steps = np.stack([side * np.cos(angle), np.sin(angle)], -1)[:-1] * length / (BROW_POINTS - 1)
     flat = np.array([side * (13.5 + along * 42), y]) + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
     lift = rng.uniform(0.12, 0.5) * np.sin(np.pi * np.minimum(share * 0.75, 1)) * 0.9
-    z = anatomy.closed_skin(flat[:, 0], flat[:, 1]) - 0.15 + lift
     radius = (0.018 if fine else 0.030) * np.interp(along, [0, 0.2, 1], [0.8, 1.0, 0.9])
-    return np.column_stack([flat, z]), float(radius * np.clip(rng.normal(1, 0.2), 0.5, 1.6))
+    return flat, lift, float(radius * np.clip(rng.normal(1, 0.2), 0.5, 1.6))

@@ -68,11 +68,15 @@ def load_presets(file: Path = PRESETS_FILE) -> dict[str, Face]:
         raise InputError(f"cannot read presets from {file}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{file} is not TOML: {error}") from error
+    return {name: _face(file, name, face) for name, face in content.items()}
+
+
+def _face(file: Path, name: str, content: object) -> Face:
     try:
-        return {name: Face.model_validate(face) for name, face in content.items()}
+        return Face.model_validate(content)
     except ValidationError as error:
         fault = error.errors()[0]
-        where = ".".join(str(part) for part in fault["loc"])
+        where = ".".join(str(part) for part in (name, *fault["loc"]))
         raise InputError(f"{file}: {where}: {fault['msg']}") from error
 
 

@@ -1,0 +1,80 @@
+"""The cartoon: its opening measured on pixels, its light, its levels."""
+
+import numpy as np
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.characters.cartoon import LEVELS, OPENING_MM, crop_px, draw_frame, fingerprint
+
+SIZE = (1920, 720)
+PX_PER_MM = 15.0
+
+
+def eye_window(side: int) -> tuple[int, int, int, int]:
+    """One eye from canthus to canthus: x, y, width, height in px at SIZE."""
+    middle = 960 + round(side * 30 * PX_PER_MM)
+    return middle - 150, 260, 300, 260
+
+
+def visible_opening_mm(picture: np.ndarray) -> float:
+    """Height of the highest column of eyeball in a picture (h, w, 3).
+
+    All colours of the eyeball have nearly as much green as red, or more; skin, lashes and rims have less.
+    """
+    eyeball = picture[..., 1] > 0.84 * picture[..., 0]
+    return float(np.max(eyeball.sum(0)) / PX_PER_MM)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("closure", [0.0, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0])
+def test_the_visible_opening_is_calibrated(side: int, closure: float) -> None:
+    opening = visible_opening_mm(draw_frame(closure, SIZE, eye_window(side)))
+    assert opening == pytest.approx(OPENING_MM * (1 - closure), abs=0.1)
+
+
+def test_both_eyes_are_lit_from_the_same_side() -> None:
+    for side in (-1, 1):
+        picture = draw_frame(0.0, SIZE, eye_window(side)).min(axis=2)
+        light = np.argwhere(picture > 0.97)
+        assert light[:, 1].mean() < 150
+    skin = draw_frame(0.0, (960, 360)).mean(axis=(0, 2))
+    assert skin[:100].mean() > skin[-100:].mean() + 0.05
+
+
+def test_the_eyes_are_not_mirror_images() -> None:
+    picture = draw_frame(0.0, (960, 360))
+    assert np.abs(picture[100:260, :480] - picture[100:260, :479:-1]).mean() > 0.01
+
+
+def test_only_the_crop_changes() -> None:
+    x, y, width, height = crop_px((960, 360))
+    changed = np.any(draw_frame(0.0, (960, 360)) != draw_frame(1.0, (960, 360)), axis=2)
+    assert changed.any()
+    changed[y : y + height, x : x + width] = False
+    assert not changed.any()
+
+
+def test_a_window_is_the_same_part_of_the_whole() -> None:
+    whole = draw_frame(0.3, (960, 360))
+    np.testing.assert_array_equal(draw_frame(0.3, (960, 360), (100, 60, 400, 200)), whole[60:260, 100:500])
+
+
+@pytest.mark.parametrize("closure", [0.05, 0.5, 0.95])
+def test_levels_are_close_enough_to_interpolate(closure: float) -> None:
+    window = crop_px((960, 360))
+    step = 1 / (LEVELS - 1)
+    low = np.floor(closure / step) * step
+    pictures = [draw_frame(w, (960, 360), window).astype(float) for w in (low, low + step / 2, low + step)]
+    between = ((pictures[0] ** 2.2 + pictures[2] ** 2.2) / 2) ** (1 / 2.2)
+    mse = np.mean((between - pictures[1]) ** 2)
+    assert -10 * np.log10(mse) > 44
+
+
+@pytest.mark.parametrize("closure", [-0.01, 1.01, float("nan")])
+def test_closure_outside_its_range_is_refused(closure: float) -> None:
+    with pytest.raises(InputError, match="closure must lie between"):
+        draw_frame(closure, (320, 120))
+
+
+def test_the_fingerprint_is_a_hash() -> None:
+    assert len(fingerprint()) == 64
