@@ -57,10 +57,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     services = open_services(settings or Settings())
 
     @asynccontextmanager
-    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(served: FastAPI) -> AsyncIterator[None]:
         yield
-        services.group_commit.close()
-        services.database.close()
+        served.state.services.group_commit.close()
+        served.state.services.database.close()
 
     app = FastAPI(
         title="Palpebra",

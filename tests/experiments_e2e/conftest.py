@@ -4,7 +4,7 @@ from tests.helpers.databases import (  # noqa: F401 - fixtures
     database_url,
     empty_database_url,
     postgres_server,
-    postgres_template,
+    postgres_database,
     services,
     settings,
     sqlite_template,

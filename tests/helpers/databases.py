@@ -22,6 +22,7 @@ from sqlalchemy.engine import URL, make_url
 from server.context import Services, open_services
 from server.db import Database
 from server.migrate import upgrade
+from server.models import Base
 from server.settings import Settings
 
 MEMORY = Path("/dev/shm")
@@ -67,14 +68,14 @@ def _started_postgres() -> str:
 
 
 @pytest.fixture(scope="session")
-def postgres_template(postgres_server: URL) -> Iterator[str]:
-    """Name of a migrated, empty database, the template of each test's own."""
-    name = f"template_{uuid.uuid4().hex[:12]}"
+def postgres_database(postgres_server: URL) -> Iterator[Database]:
+    """A migrated database that every test finds empty."""
+    name = f"test_{uuid.uuid4().hex[:12]}"
     _admin(postgres_server, f"CREATE DATABASE {name}")
     database = Database(_with_name(postgres_server, name))
     upgrade(database)
+    yield database
     database.close()
-    yield name
     _admin(postgres_server, f"DROP DATABASE {name} WITH (FORCE)")
 
 
@@ -89,14 +90,11 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str
         yield f"sqlite:///{path}"
         shutil.rmtree(folder)
         return
-    server, template = (
-        request.getfixturevalue("postgres_server"),
-        request.getfixturevalue("postgres_template"),
-    )
-    name = f"test_{uuid.uuid4().hex[:12]}"
-    _admin(server, f"CREATE DATABASE {name} TEMPLATE {template}")
-    yield _with_name(server, name)
-    _admin(server, f"DROP DATABASE {name} WITH (FORCE)")
+    database: Database = request.getfixturevalue("postgres_database")
+    yield database.url.render_as_string(hide_password=False)
+    with database.engine.begin() as connection:
+        connection.execute(text("SET LOCAL lock_timeout = '10s'"))
+        connection.execute(text(f"TRUNCATE {', '.join(Base.metadata.tables)} RESTART IDENTITY CASCADE"))
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.testclient import TestClient as StarletteClient
 
@@ -15,7 +16,6 @@ from experiments.load import parse_experiment
 from server.app import create_app
 from server.context import Services
 from server.models import Link, Study
-from server.settings import Settings
 from server.studies.importing import add_version, create_study, store_clips
 from server.studies.links import PURPOSE, LinkKind, create_link
 from server.tokens import derived_token
@@ -208,10 +208,18 @@ def good_playback(trial: Any) -> dict[str, Any]:
     }
 
 
+_built: list[FastAPI] = []
+"""The application, built once: putting all routes together takes longer than a test."""
+
+
 @pytest.fixture
-def client(settings: Settings) -> Iterator[TestClient]:
-    """A client of the application with these settings."""
-    with TestClient(create_app(settings), raise_server_exceptions=False) as opened:
+def client(services: Services) -> Iterator[TestClient]:
+    """A client of the application on this test's database and clip store."""
+    if not _built:
+        _built.append(create_app(services.settings))
+    app = _built[0]
+    app.state.services = services
+    with TestClient(app, raise_server_exceptions=False) as opened:
         yield opened
 
 

@@ -4,8 +4,8 @@ from tests.helpers.admins import experimenter, owner, viewer  # noqa: F401 - fix
 from tests.helpers.databases import (  # noqa: F401 - fixtures
     database_url,
     empty_database_url,
+    postgres_database,
     postgres_server,
-    postgres_template,
     services,
     settings,
     sqlite_template,
