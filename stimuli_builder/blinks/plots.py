@@ -64,7 +64,7 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
         stop_s = duration_s if row == rows - 1 else (row + 1) * row_s
         for place, eye in enumerate(eyes):
             _series_row(axes, eye, row * row_s, stop_s, place, rejected)
-        axes.set_xlim(row * row_s, max(stop_s, (row + 1) * row_s))
+        axes.set_xlim(row * row_s, stop_s if rows == 1 else max(stop_s, (row + 1) * row_s))
         axes.spines[["top", "right"]].set_visible(False)
     unit = "px" if eyes[0].series.is_px else "as recorded"
     grid[-1].set_xlabel("time (s)")
@@ -122,6 +122,8 @@ def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":
             [p.closure.max() for p in profiles], np.linspace(0, 1, AMPLITUDE_BINS + 1), color=BLUE, rwidth=0.9
         )
         _tidy(amplitudes, "greatest closure", "blinks")
+        for counted in (durations, amplitudes):
+            counted.yaxis.get_major_locator().set_params(integer=True)
     return figure
 
 

@@ -159,13 +159,13 @@ def _report(
     job: BlinksJob, summaries: Sequence[dict[str, Any]], frame: pd.DataFrame, lost: Sequence[Review]
 ) -> None:
     console = Console()
-    headers = ("blinks", "a minute", "complete", "rejected", "down ms", "up ms", "total ms", "closure")
-    headers = ("blinks", "a minute", "complete", "rejected", "down ms", "up ms", "total ms", "closure")
+    headers = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
+    headers = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
     table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     table.add_column("column", no_wrap=True)
     for header in headers:
         table.add_column(header, justify="right", no_wrap=True)
-    table.caption, table.caption_justify = "ms and closure: medians", "left"
+    table.caption, table.caption_justify = "down, up, total in ms; these and closure: medians", "left"
     for row in summaries:
         medians = [
             f"{row[name].get('median', float('nan')):.0f}" for name in ("down_ms", "up_ms", "duration_ms")

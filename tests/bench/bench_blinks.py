@@ -1,0 +1,109 @@
+"""How exact the blink labels are, how fast, and how well curves of few numbers follow recorded blinks.
+
+Part of `make bench`; alone: pytest tests/bench/bench_blinks.py -o python_files='bench_*.py' -s
+"""
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from stimuli_builder.actor.physiology import Blink, course, plan_blinks
+from stimuli_builder.blinks.blink_model import BlinkModel
+from stimuli_builder.blinks.labelling import LabelledBlink, label_blinks
+from stimuli_builder.blinks.library import load_library
+from stimuli_builder.blinks.profile import Array, BlinkProfile, resample_phases
+from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, textbook_profile
+
+FPS = 300
+OPENING_PX = 34.0
+
+
+def tell(line: str) -> None:
+    sys.stdout.write(f"\n{line}")
+
+
+def recording(noise_px: float, seed: int, seconds: int = 1333) -> tuple[list[Blink], Array]:
+    """Blinks of the synthetic actor and the distance of one eye, 400,000 frames."""
+    plan = plan_blinks(seconds, np.random.default_rng([seed, 4]))
+    closure = course(np.arange(FPS * seconds) / FPS, plan, seed).closure[:, 0]
+    jitter = np.random.default_rng(seed).normal(0, noise_px, closure.size)
+    return plan, np.maximum(OPENING_PX * (1 - closure) + jitter, 0)
+
+
+def matches(plan: Sequence[Blink], found: Sequence[LabelledBlink]) -> list[tuple[float, float, float]]:
+    """Errors of onset, minimum and end, in frames, of each blink found once."""
+    apexes = np.array([blink.apex_s * FPS for blink in plan])
+    taken: dict[int, tuple[float, float, float]] = {}
+    for blink in found:
+        nearest = int(np.argmin(np.abs(apexes - blink.minimum)))
+        truth = plan[nearest]
+        if abs(apexes[nearest] - blink.minimum) < 20 and nearest not in taken:
+            onset, end = (truth.apex_s - truth.down_s) * FPS, (truth.apex_s + truth.up_s) * FPS
+            taken[nearest] = (blink.onset - onset, blink.minimum - apexes[nearest], blink.end - end)
+    return list(taken.values())
+
+
+def test_labels_against_the_synthetic_actor(benchmark):
+    tell("labels on the synthetic actor's course (truth: 5% of the amplitude, apex, 95% recovery)")
+    tell("noise px  precision  recall   |error| in frames of onset, apex, end: median | mean | 95%")
+    for noise_px in (0.05, 0.15, 0.3):
+        found = true = 0
+        errors: list[tuple[float, float, float]] = []
+        for seed in (1, 2, 3, 4):
+            plan, distance = recording(noise_px, seed)
+            blinks = label_blinks(distance, FPS)
+            errors += matches(plan, blinks)
+            found, true = found + len(blinks), true + len(plan)
+        size = np.abs(errors)
+        rows = [np.median(size, axis=0), size.mean(axis=0), np.percentile(size, 95, axis=0)]
+        spread = " | ".join(" ".join(f"{value:5.1f}" for value in row) for row in rows)
+        tell(f"{noise_px:8.2f} {len(errors) / found:10.4f} {len(errors) / true:7.4f}   {spread}")
+    _, distance = recording(0.15, 1)
+    benchmark.pedantic(label_blinks, (distance, FPS), rounds=5)
+    tell(f"{distance.size / benchmark.stats.stats.median / 1e6:.1f} million frames a second\n")
+
+
+def half_gaussians(profile: BlinkProfile) -> Array:
+    """Best two half-Gaussians (the ESPBM's form: height, place, two widths) for a profile."""
+    frames = np.arange(profile.closure.size)
+
+    def curve(p: Array) -> Array:
+        return p[0] * np.exp(-0.5 * ((frames - p[1]) / np.where(frames < p[1], p[2], p[3])) ** 2)
+
+    start = [profile.closure.max(), profile.minimum_index, profile.down_frames / 2, profile.up_frames / 2]
+    bounds = ([0, 0, 1, 1], [2, frames.size, 500, 500])
+    return curve(least_squares(lambda p: curve(p) - profile.closure, start, bounds=bounds).x)
+
+
+def rebuilt(training: list[BlinkProfile], profile: BlinkProfile) -> Array:
+    """The profile through a model that has not seen it, at the profile's own phase lengths."""
+    model = BlinkModel.fit(training)
+    form, _, _ = model.normalised_forms(model.coefficients(profile))
+    closure = np.clip(form[0], 0, 1)
+    normal = BlinkProfile("x", closure, model.down_frames, model.down_frames, model.up_frames, 1.0, "model")
+    return resample_phases(normal, profile.down_frames, profile.up_frames).closure
+
+
+def test_forms_against_recorded_profiles(benchmark):
+    """RMS of closure between recorded profiles and the curves that stand for them."""
+    shipped = list(load_library())
+    rows: dict[str, list[float]] = {}
+    for index, profile in enumerate(shipped):
+        peak = float(profile.closure.max())
+        curves = {
+            "model, 5 components, left out": rebuilt(shipped[:index] + shipped[index + 1 :], profile),
+            "two half-Gaussians, fitted": half_gaussians(profile),
+        }
+        for kind in TEXTBOOK_KINDS:
+            own = profile.down_fraction if kind.startswith("AL") else None
+            made = textbook_profile(kind, profile.duration_frames_30fps, peak_closure=peak, down_fraction=own)
+            curves[f"textbook {kind}, own length and peak"] = made.closure
+        for name, curve in curves.items():
+            rows.setdefault(name, []).append(float(np.sqrt(np.mean((curve - profile.closure) ** 2))))
+    tell(f"RMS of closure against the {len(shipped)} recorded profiles: median (worst)")
+    for name, values in sorted(rows.items(), key=lambda row: float(np.median(row[1]))):
+        tell(f"  {name:38} {np.median(values):.3f} ({max(values):.3f})")
+
+    benchmark.pedantic(BlinkModel.fit, (shipped,), rounds=5)
