@@ -1,6 +1,6 @@
 """`analysis run` (a declared experiment) and `analysis anova` (anyone's long table)."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -76,7 +76,7 @@ def run(
             ratings = (
                 load_csv(csv, declared, study)
                 if csv is not None
-                else load_database(database or default_url(), declared, study)
+                else load_database(database or default_url(), declared, study, report and sensitivity)
             )
             analysis = analyse_study(declared, ratings, phase.value)
     except NoRatingsError as error:
@@ -174,14 +174,14 @@ def _scale(text: str | None) -> tuple[float, float] | None:
 
 
 @contextmanager
-def _working(what: str) -> Iterator[None]:
-    """A spinner on a terminal, silence elsewhere."""
+def _working(what: str) -> Iterator[Callable[[str], None]]:
+    """A spinner on a terminal, silence elsewhere; gives a function that says which step is being taken."""
     console = Console(stderr=True)
-    if console.is_terminal:
-        with console.status(what):
-            yield
-    else:
-        yield
+    if not console.is_terminal:
+        yield lambda _: None
+        return
+    with console.status(what) as status:
+        yield lambda step: status.update(f"{what}: {step}")
 
 
 def _save_json(analysis: "Analysis", path: Path | None) -> None:
@@ -198,13 +198,13 @@ def _save_json(analysis: "Analysis", path: Path | None) -> None:
 def _sensitivity(analysis: "Analysis") -> "tuple[Section, ...]":
     from analysis.sensitivity import sensitivity_sections
 
-    with _working("sensitivity analyses"):
-        return sensitivity_sections(analysis)
+    with _working("sensitivity analyses (--no-sensitivity leaves them out)") as say:
+        return sensitivity_sections(analysis, say)
 
 
 def _save_report(analysis: "Analysis", folder: Path, sections: "tuple[Section, ...]") -> None:
     from analysis.report import write_report
 
-    with _working("figures and report"):
-        paths = write_report(analysis, folder, sections)
+    with _working("writing") as say:
+        paths = write_report(analysis, folder, sections, say)
     typer.echo(f"\nwritten to {folder}: {', '.join(path.name for path in paths)}")

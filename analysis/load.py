@@ -52,7 +52,7 @@ def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> St
         As `read_text_table`; ratings that are text; another experiment's data.
     """
     factors = list(experiment.factor_names)
-    optional = [*ROW_TEXTS, "stimulus", *RUN_TEXTS, *CSV_NUMBERS, *RUN_FLAGS, "saved_at"]
+    optional = [*ROW_TEXTS, *RUN_TEXTS, *CSV_NUMBERS, *RUN_FLAGS, "saved_at"]
     if _has_no_rows(path):
         raise NoRatingsError(f"{path.name} has a header but no ratings yet")
     table = read_text_table(path, ["participant", "response", *factors], optional)
@@ -70,9 +70,9 @@ def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> St
 
 
 def load_database(
-    url: str, experiment: Experiment, study: str | None = None, clips: bool = False
+    url: str, experiment: Experiment, study: str | None = None, exemplars: bool = False
 ) -> StudyRatings:
-    """Read the study's rows from the SQL view `ratings`; `clips` adds the clip's file (`stimulus`).
+    """Read the study's rows from the SQL view `ratings`; `exemplars` adds which exemplar was rated.
 
     Raises
     ------
@@ -83,8 +83,8 @@ def load_database(
     """
     query = RatingsQuery(url, experiment.name, study)
     try:
-        texts = (*ROW_TEXTS, "stimulus") if clips else ROW_TEXTS
-        rows = query.rows(texts, ROW_NUMBERS, experiment.factor_names)
+        numbers = (*ROW_NUMBERS, "exemplar") if exemplars else ROW_NUMBERS
+        rows = query.rows(ROW_TEXTS, numbers, experiment.factor_names)
         if rows.empty:
             named = f"study '{study}'" if study else f"experiment '{experiment.name}'"
             raise NoRatingsError(f"{named} has no ratings yet in {query.name}")

@@ -1,23 +1,120 @@
 """Sensitivity analyses beside the ANOVA: Bayes factors of pairs, the mixed and the ordinal model."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isfinite
+from typing import Any
 
 from analysis.formats import Table
-from analysis.numbers import DASH, fixed
+from analysis.numbers import DASH, fixed, p_value
 from analysis.report import Section
 from analysis.result import Analysis
+from experiments.errors import InputError
 
 PRIOR_SCALE = 2**0.5 / 2
 """Scale r of the Cauchy prior on effect sizes."""
 
 
+MOST_RATINGS = 50_000
+"""Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
+
+
 def sensitivity_sections(
     analysis: Analysis, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[Section, ...]:
-    """Every sensitivity analysis the data allow, as sections of the report."""
+    """Every sensitivity analysis the data allow, as sections; what they do not allow says why."""
     progress("Bayes factors")
-    return (bayes_factors(analysis),)
+    sections = [bayes_factors(analysis)]
+    reason = _no_models(analysis)
+    if reason is not None:
+        return (*sections, Section("Mixed and ordinal models", f"Not fitted: {reason}."))
+    for title, fit in (("Linear mixed model", mixed_model), ("Ordinal mixed model", ordinal_model)):
+        progress(title)
+        try:
+            sections.append(fit(analysis))
+        except InputError as error:
+            sections.append(Section(title, f"Not fitted: {error}."))
+    return tuple(sections)
+
+
+def _no_models(analysis: Analysis) -> str | None:
+    if analysis.exclusions is None or analysis.experiment is None:
+        return "no experiment is declared, so what was rated is unknown"
+    rows = analysis.exclusions.rows
+    if "exemplar" not in rows.columns or rows["exemplar"].isna().any():
+        return "the data do not say which exemplar was rated"
+    if len(rows) > MOST_RATINGS:
+        return f"{len(rows)} ratings are more than {MOST_RATINGS}; use analysis mixed and analysis ordinal"
+    return None
+
+
+def _model_arguments(analysis: Analysis) -> dict[str, Any]:
+    """Rows of the participants in the ANOVA, and the columns that name the blink shown."""
+    if analysis.exclusions is None or analysis.experiment is None:
+        raise InputError("models need a declared experiment")
+    rows = analysis.exclusions.rows
+    rows = rows[rows["participant"].isin(list(analysis.cells.participants)).to_numpy()]
+    return {
+        "rows": rows,
+        "participant": "participant",
+        "rating": "response",
+        "within": list(analysis.anova.factors),
+        "item": [*analysis.experiment.exemplars.own_per, "exemplar"],
+    }
+
+
+def mixed_model(analysis: Analysis) -> Section:
+    """The linear mixed model's tests beside those of the ANOVA."""
+    from analysis.mixed import fit_mixed
+
+    result = fit_mixed(**_model_arguments(analysis))
+    rows = []
+    for effect in result.effects:
+        ours = analysis.anova.effect(effect.effect)
+        df = f"{effect.df_effect}, {fixed(effect.df_error, 1)}"
+        cells = (fixed(effect.f_value, 3), df, p_value(effect.p_value), p_value(ours.univariate.p_gg))
+        rows.append((ours.effect, *cells))
+    header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)")
+    notes = (result.formula, *_parts(result.components), *result.notes)
+    table = Table("mixed", f"Linear mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    text = (
+        "Participants crossed with blinks, by-participant slopes for every effect, REML, type III tests with "
+        f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
+        f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
+    )
+    return Section("Linear mixed model", text, (table,))
+
+
+def _parts(components: Sequence[Any]) -> tuple[str, ...]:
+    said = ", ".join(f"{c.group} {c.term} {fixed(c.sd, 3)}" for c in components)
+    return (f"Standard deviations: {said}.",) if said else ()
+
+
+def ordinal_model(analysis: Analysis) -> Section:
+    """The cumulative-link mixed model's tests beside those of the ANOVA."""
+    from analysis.ordinal import fit_ordinal
+
+    result = fit_ordinal(**_model_arguments(analysis))
+    rows = []
+    for effect in result.effects:
+        ours = analysis.anova.effect(effect.effect)
+        cells = (
+            fixed(effect.chi2, 3),
+            str(effect.df),
+            p_value(effect.p_value),
+            p_value(ours.univariate.p_gg),
+        )
+        rows.append((ours.effect, *cells))
+    header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
+    thresholds = ", ".join(fixed(value) for value in result.thresholds)
+    spreads = f"SD of participants {fixed(result.sd_participant, 3)}, of blinks {fixed(result.sd_item, 3)}."
+    notes = (result.formula, f"Thresholds: {thresholds}. {spreads}", *result.notes)
+    table = Table("ordinal", f"Ordinal mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    text = (
+        "Ratings as ordered categories: cumulative logit with free thresholds, crossed random intercepts of "
+        "participants and blinks, Laplace approximation, joint Wald tests. Without by-participant slopes its "
+        "p are too small where people differ in an effect; read it for direction and shape."
+    )
+    return Section("Ordinal mixed model", text, (table,))
 
 
 def bayes_factors(analysis: Analysis) -> Section:
