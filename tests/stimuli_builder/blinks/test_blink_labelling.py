@@ -58,6 +58,7 @@ def test_known_blinks_are_labelled_at_any_rate(make_known, fps):
 def test_blinks_of_the_synthetic_actor_meet_the_targets():
     # Targets of the tracking design at 300 fps: precision and recall 0.98 for depths from 25%, error of
     # onset, apex and end 5, 2 and 15 frames. The actor's onset is 5% of the amplitude, its end 95% recovery.
+    # Measured medians are 5.1, 0.8 and 11 frames (decision 0110): the onset misses its target by a tenth.
     fps, seconds, seed = 300, 600, 5
     plan = plan_blinks(seconds, np.random.default_rng([seed, 4]))
     closure = course(np.arange(fps * seconds) / fps, plan, seed).closure[:, 0]
