@@ -38,15 +38,16 @@ def encode_clip(frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], f
         The temporary folder cannot take the file (disk full).
     """
     # Fast start rewrites the file from its beginning, so it needs a real one.
-    with tempfile.TemporaryDirectory(prefix="palpebra-clip-") as folder:
-        path = Path(folder) / "clip.mp4"
-        try:
+    try:
+        with tempfile.TemporaryDirectory(prefix="palpebra-clip-") as folder:
+            path = Path(folder) / "clip.mp4"
             _write(path, frames, size_px, fps)
             return path.read_bytes()
-        except OSError as error:
-            raise InputError(
-                f"the clip cannot be written in {folder} ({error.strerror}); free space there or set TMPDIR"
-            ) from error
+    except OSError as error:
+        raise InputError(
+            f"the clip cannot be written in {tempfile.gettempdir()} ({error.strerror}); make room there or "
+            "set TMPDIR"
+        ) from error
 
 
 def _write(path: Path, frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], fps: float) -> None:

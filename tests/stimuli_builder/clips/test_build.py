@@ -1,0 +1,220 @@
+"""Building a set: what is rendered, kept, thrown away, and what happens when it goes wrong."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from multiprocessing import active_children
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.errors import InputError
+from experiments.manifest import MANIFEST_NAME, check_files, read_manifest
+from stimuli_builder.clips import build as build_module
+from stimuli_builder.clips.build import Machines, build
+from stimuli_builder.clips.design_clips import Options, planned_clips
+from stimuli_builder.clips.state import STATE_NAME
+
+from .conftest import Small, make_small
+
+
+@pytest.fixture
+def copied(built: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(built, tmp_path / "clips"))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir()}
+
+
+def test_the_manifest_holds_the_design(small: Small, built: Path) -> None:
+    manifest = read_manifest(built)
+    check_files(manifest, built)
+    assert [(clip.cell, clip.exemplar) for clip in manifest.clips] == [
+        (cell, number)
+        for cell in ("cartoon/real", "cartoon/mine", "own/real", "own/mine")
+        for number in (1, 2)
+    ]
+    clip = manifest.clips[2]
+    assert clip.levels == {"character": "cartoon", "profile": "mine"}
+    assert (clip.profile, clip.duration_frames, clip.profile_repeated) == ("file-mine", 8.0, False)
+    assert manifest.clips[3].profile_repeated
+    assert len(clip.closure) == clip.frames * 10
+    assert np.flatnonzero(clip.closure)[0] // 10 == clip.onset_frame
+    assert clip.width_mm == pytest.approx(128)
+    assert set(contents(built)) == {MANIFEST_NAME} | {clip.file for clip in manifest.clips}
+
+
+def test_both_characters_show_the_same_blinks(built: Path) -> None:
+    clips = read_manifest(built).clips
+    assert [clip.profile for clip in clips[:4]] == [clip.profile for clip in clips[4:]]
+
+
+def test_the_same_seed_gives_the_same_folder(small: Small, built: Path, tmp_path: Path) -> None:
+    small.build(tmp_path / "again")
+    assert contents(tmp_path / "again") == contents(built)
+
+
+def test_another_seed_gives_other_curves(small: Small, built: Path) -> None:
+    planned = planned_clips(small.experiment, Options(seed=1, beside=small.folder))
+    assert [clip.job.curve.closure.tolist() for clip in planned] != [
+        list(clip.closure) for clip in read_manifest(built).clips
+    ]
+
+
+def test_a_finished_build_renders_nothing(small: Small, copied: Path) -> None:
+    stamp = (copied / MANIFEST_NAME).stat().st_mtime_ns
+    report = small.build(copied)
+    assert (report.built, report.reused) == (0, 8)
+    assert (copied / MANIFEST_NAME).stat().st_mtime_ns == stamp
+
+
+def test_only_missing_and_damaged_clips_are_rendered(small: Small, built: Path, copied: Path) -> None:
+    first, second = (copied / clip.file for clip in read_manifest(built).clips[:2])
+    first.unlink()
+    second.write_bytes(b"\0" * second.stat().st_size)
+    assert small.build(copied).built == 2
+    assert contents(copied) == contents(built)
+
+
+def test_a_changed_curve_replaces_its_clips_alone(small_text: str, copied: Path, tmp_path: Path) -> None:
+    changed = make_small(tmp_path / "study", small_text.replace("duration_frames = 8", "duration_frames = 9"))
+    report = changed.build(copied)
+    assert (report.built, report.reused, len(report.removed)) == (4, 4, 4)
+    assert set(contents(copied)) == {MANIFEST_NAME} | {clip.file for clip in report.manifest.clips}
+
+
+def test_a_changed_character_renders_its_clips_again(small_text: str, copied: Path, tmp_path: Path) -> None:
+    changed = make_small(tmp_path / "study", small_text)
+    declaration = changed.folder / "tiny" / "character.toml"
+    declaration.write_text(declaration.read_text().replace("Tiny test", "Other tiny test"))
+    assert changed.build(copied).built == 4
+
+
+def test_an_interrupted_build_goes_on_where_it_stopped(small: Small, built: Path, tmp_path: Path) -> None:
+    out = tmp_path / "clips"
+
+    def stop_at_three(done: int, wanted: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(InputError, match="interrupted; 3 clips are finished"):
+        build(small.experiment, out, small.options, Machines(workers=1), stop_at_three)
+    assert not (out / MANIFEST_NAME).exists()
+    assert len(list(out.glob("*.mp4"))) == 3
+    with (out / STATE_NAME).open("a") as stream:
+        stream.write('{"input_hash": "torn')
+    assert small.build(out).built == 5
+    assert contents(out) == contents(built)
+
+
+def test_a_folder_of_another_experiment_is_left_alone(small_text: str, copied: Path, tmp_path: Path) -> None:
+    other = make_small(tmp_path / "study", small_text.replace('name = "small"', 'name = "other"'))
+    with pytest.raises(InputError, match="holds the clips of 'small'"):
+        other.build(copied)
+
+
+@pytest.mark.slow
+def test_processes_and_a_killed_worker_change_nothing(small: Small, built: Path, tmp_path: Path) -> None:
+    killed = []
+
+    def kill_one(done: int, wanted: int) -> None:
+        if done == 1 and not killed:
+            victim = active_children()[0]
+            os.kill(victim.pid or 0, signal.SIGKILL)
+            killed.append(victim.pid)
+
+    report = build(small.experiment, tmp_path / "clips", small.options, Machines(workers=2), kill_one)
+    assert killed
+    assert report.built == 8
+    assert contents(tmp_path / "clips") == contents(built)
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_gives_the_same_clips(small: Small, built: Path, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        small.build(tmp_path / "clips", Machines(dask=cluster.scheduler_address))
+    assert contents(tmp_path / "clips") == contents(built)
+
+
+def test_no_dask_scheduler_ends_in_one_line(small: Small, tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        small.build(tmp_path / "clips", Machines(dask="nowhere:0:0"))
+
+
+FULL_DISK = """
+import resource, signal, sys
+from pathlib import Path
+from stimuli_builder.cli import main
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+sys.argv = ["stimuli", "build", sys.argv[1], "--out", sys.argv[2], "--workers", "1"]
+main()
+"""
+
+
+def test_a_full_disk_ends_in_one_line_and_leaves_no_half_clip(small: Small, tmp_path: Path) -> None:
+    # A limit on file size stands in for the end of the disk: the write fails after its first part.
+    out = tmp_path / "clips"
+    command = [sys.executable, "-c", FULL_DISK, str(small.toml), str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not list(out.glob("*.mp4"))
+    assert not list(out.glob(".*part*"))
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    small: Small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, content: bytes) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(build_module, "write_bytes", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        small.build(tmp_path / "clips")
+
+
+def test_a_file_in_place_of_the_folder_is_refused(small: Small, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="expected a folder"):
+        small.build(tmp_path / "file")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ('character = "tiny"', 'character = "tinny"', "cell own/real, exemplar 1: no character 'tinny'"),
+        ('character = "cartoon"', 'character = "cartoon", lower_lid = "both"', "no lower-lid layer"),
+        ("height_px = 120", "height_px = 200", "120 px high"),
+        ('profile = "mine.csv"', 'profile = "yours.csv"', "yours.csv"),
+    ],
+)
+def test_what_cannot_be_rendered_is_refused_before_anything_is(
+    small_text: str, tmp_path: Path, old: str, new: str, line: str
+) -> None:
+    wrong = make_small(tmp_path / "study", small_text.replace(old, new))
+    with pytest.raises(InputError, match=line):
+        wrong.build(tmp_path / "clips")
+    assert not (tmp_path / "clips").exists()
+
+
+@pytest.mark.parametrize("damage", ["missing", "bytes"])
+def test_a_missing_or_damaged_level_is_named(small_text: str, tmp_path: Path, damage: str) -> None:
+    wrong = make_small(tmp_path / "study", small_text)
+    level = wrong.folder / "tiny" / "level_0.50.webp"
+    if damage == "missing":
+        level.unlink()
+    else:
+        level.write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"level_0\.50\.webp"):
+        wrong.build(tmp_path / "clips")
+    assert not (tmp_path / "clips" / MANIFEST_NAME).exists()

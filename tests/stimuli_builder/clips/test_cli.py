@@ -1,0 +1,150 @@
+"""The commands plan, build, clip and verify, as a person types them."""
+
+import json
+from pathlib import Path
+
+import av
+import pytest
+from PIL import Image
+
+from stimuli_builder.cli import main
+
+from .conftest import Small
+
+
+def stimuli(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    """Run the command in this process; returns its exit code."""
+    monkeypatch.setattr("sys.argv", ["stimuli", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    return int(stopped.value.code or 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "clips", "trials", "blocks"),
+    [("exp1", 16, 320, 320, [160] * 2), ("exp2", 40, 200, 400, [100] * 4), ("exp3", 4, 80, 160, [80] * 2)],
+)
+def test_plan_gives_the_papers_counts(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    cells: int,
+    clips: int,
+    trials: int,
+    blocks: list[int],
+) -> None:
+    assert stimuli(monkeypatch, "plan", name, "--json") == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert (len(plan["cells"]), plan["unique_clips"], plan["trials_per_participant"]) == (
+        cells,
+        clips,
+        trials,
+    )
+    assert [block["trials"] for block in plan["blocks"]] == blocks
+    assert set(plan) >= {"factors", "expected_minutes"}
+
+
+def test_plan_prints_the_recordings_shown_twice(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from stimuli_builder.blinks.library import load_library
+
+    assert stimuli(monkeypatch, "plan", "exp1") == 0
+    printed = capsys.readouterr().out
+    assert "320 unique clips" in printed
+    assert printed.count("exemplar ") == max(0, 20 - len(load_library()))
+
+
+def test_build_with_preview(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    small: Small,
+    built: Path,
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "clips"
+    assert stimuli(monkeypatch, "build", small.toml, "--out", out, "--workers", 1, "--preview") == 0
+    assert "8 clips" in capsys.readouterr().out
+    assert (out / "manifest.json").read_bytes() == (built / "manifest.json").read_bytes()
+    with Image.open(out / "preview.png") as sheet:
+        assert sheet.height == 4 * 77
+    page = (out / "preview.html").read_text()
+    assert all(clip["file"] in page for clip in json.loads((out / "manifest.json").read_text())["clips"])
+    assert "http://www.w3.org/2000/svg" in page
+    assert page.count("http") == 1
+    assert stimuli(monkeypatch, "build", small.toml, "--out", out, "--quiet-when-current") == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_verify_says_what_it_measured(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], small: Small, built: Path
+) -> None:
+    assert stimuli(monkeypatch, "verify", built, "--characters", small.folder) == 0
+    assert "opening measured in 8" in capsys.readouterr().out
+
+
+def test_one_clip(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "clip.mp4"
+    arguments = (
+        "--profile",
+        "AL_ease",
+        "--duration",
+        7,
+        "--size",
+        "320x120",
+        "--fps",
+        60,
+        "--clip-frames",
+        90,
+    )
+    assert stimuli(monkeypatch, "clip", *arguments, "--no-blur", "--out", out) == 0
+    assert "90 frames at 60 fps" in capsys.readouterr().out
+    with av.open(str(out)) as container:
+        assert len(list(container.decode(video=0))) == 90
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("--profile", "modell"), "no blink profile 'modell'; did you mean 'model'"),
+        (("--profile", "nowhere.csv"), "nowhere.csv"),
+        (("--character", "cartoonn"), "no character 'cartoonn'"),
+        (("--size", "big"), "expected WIDTHxHEIGHT"),
+        (("--size", "4000x360"), "width_px"),
+        (("--lower-lid", "both"), "has no lower-lid layer"),
+        (("--clip-frames", 12), "longer than the clip of 12 frames"),
+        (("--duration", 1), "duration_frames"),
+        (("--profile", "espbm-left-01", "--eyes", "separate"), "shows one eye"),
+    ],
+)
+def test_bad_input_ends_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    arguments: tuple[object, ...],
+    line: str,
+) -> None:
+    out = tmp_path / "clip.mp4"
+    assert stimuli(monkeypatch, "clip", *arguments, "--out", out) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("error: ")
+    assert line in printed
+    assert printed.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_failed_check_exits_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert stimuli(monkeypatch, "verify", tmp_path) == 2
+    assert "error: expected a manifest.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["plan", "build", "clip", "verify"])
+def test_help_has_examples(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    assert stimuli(monkeypatch, command, "--help") == 0
+    assert f"stimuli {command} " in capsys.readouterr().out

@@ -1,0 +1,57 @@
+"""Blinks from files of closure samples."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.library import load_library
+from stimuli_builder.blinks.profile_table import write_profile_table
+from stimuli_builder.clips.profile_files import read_closure_file
+
+
+def test_one_blink_with_named_columns(tmp_path: Path) -> None:
+    file = tmp_path / "blink.csv"
+    file.write_text("closure,closure_other\n0,0\n0.5,0.4\n1,0.9\n0.5,0.5\n0,0\n")
+    (profile,) = read_closure_file(file)
+    assert profile.minimum_index == 2
+    assert profile.profile_id == "file-blink"
+    np.testing.assert_array_equal(profile.closure_other, [0, 0.4, 0.9, 0.5, 0])
+
+
+def test_numbers_alone_are_closure(tmp_path: Path) -> None:
+    file = tmp_path / "plain.csv"
+    file.write_text("0\n0.5\n1\n0.4\n0\n")
+    np.testing.assert_array_equal(read_closure_file(file)[0].closure, [0, 0.5, 1, 0.4, 0])
+
+
+def test_a_table_of_profiles_gives_them_all(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+    write_profile_table(file, load_library()[:3])
+    assert [p.profile_id for p in read_closure_file(file)] == [p.profile_id for p in load_library()[:3]]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("closure\n0\nnan\n1\n0\n", "closure must be a number, sample 2 is"),
+        ("closure\n0\n\nx\n0\n", "closure must be a number"),
+        ("closure\n0\n1.3\n0\n", "between 0 .open. and 1 .closed., sample 2 is 1.3"),
+        ("closure\n0\n-0.2\n0\n", "sample 2 is -0.2"),
+        ("closur\n0\n1\n0\n", "no column 'closure'; did you mean 'closur'"),
+        ("closure\n1\n0.5\n0\n", "must lie inside the blink"),
+        ("", "not a CSV file"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, line: str) -> None:
+    file = tmp_path / "bad.csv"
+    file.write_text(text)
+    with pytest.raises(InputError, match=line) as caught:
+        read_closure_file(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.csv"):
+        read_closure_file(tmp_path / "nowhere.csv")
