@@ -8,11 +8,15 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+from sqlalchemy import text
 
 from server.cli_common import migrated_services
 from server.settings import Settings
+from server.studies.links import LinkKind
 from tests.helpers.studies import StudyInDatabase, add_study
 
 START_LIMIT_S = 60.0
@@ -39,15 +43,20 @@ class ServerProcess:
     def address(self) -> str:
         return f"http://localhost:{self.port}"
 
-    def add_study(self, folder: Path, text: str) -> StudyInDatabase:
+    def add_study(self, folder: Path, declaration: str, frames: int = 8) -> StudyInDatabase:
         """Take in a declaration with tiny clips, live; its `link_token` leads to /run/."""
         with migrated_services(self.settings) as services:
-            return add_study(services, folder, text)
+            return add_study(services, folder, declaration, frames=frames)
 
-    def query(self, work: Callable[..., object], *arguments: object) -> object:
-        """Call `work(session, ...)` on the server's database."""
+    def link(self, study: StudyInDatabase, kind: LinkKind) -> str:
+        """The token of a new link, made while the server runs."""
+        with migrated_services(self.settings) as services:
+            return replace(study, services=services).link(kind)
+
+    def rows(self, statement: str) -> list[dict[str, Any]]:
+        """What an SQL query gives on the server's database."""
         with migrated_services(self.settings) as services, services.database.read() as session:
-            return work(session, *arguments)
+            return [dict(row) for row in session.execute(text(statement)).mappings()]
 
     def start(self) -> "ServerProcess":
         environment = os.environ | {

@@ -6,7 +6,7 @@
  * are counted late; after a long one (more than CATCH_UP_FRAMES) it goes on at the frame that is due.
  */
 
-const CATCH_UP_FRAMES = 3;
+const CATCH_UP_FRAMES = 4;
 
 export class FrameSchedule {
   private first_ms: number | null = null;

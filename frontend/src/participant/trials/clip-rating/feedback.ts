@@ -17,6 +17,6 @@ export function procedureRemark(showings: Shown[], rt_ms: number): MessageKey {
 export async function procedureFeedback(session: Session, place: Stage, showings: Shown[], rt_ms: number): Promise<void> {
   const footer = h("div", { class: "actions" });
   const text = session.t(procedureRemark(showings, rt_ms), { seconds: Math.round(rt_ms / 1000) });
-  place.below.replaceChildren(h("p", { class: "feedback", role: "status" }, text), footer);
+  place.below.replaceChildren(h("h1", { class: "feedback" }, h("span", { role: "status" }, text)), footer);
   await choose(session, footer, [{ label: session.t("continue"), value: true }], true);
 }

@@ -23,7 +23,7 @@ export function waitForStart(session: Session, place: Stage, prompt: string, not
     };
     const go = button(t("start_clip"), () => {});
     go.addEventListener("click", start, { signal });
-    place.below.replaceChildren(h("p", { class: "ready" }, prompt), go, h("p", { class: "count" }, note));
+    place.below.replaceChildren(h("h1", { class: "ready" }, prompt), go, h("p", { class: "count" }, note));
     place.element.querySelector(".clip")?.addEventListener("click", start, { signal });
     listenKeys((event) => {
       if (!isStartKey(event)) return;

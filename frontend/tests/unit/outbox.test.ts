@@ -1,0 +1,110 @@
+import { IDBFactory } from "fake-indexeddb";
+import { describe, expect, it, vi } from "vitest";
+import { NetworkError, type Answer } from "../../src/api/request";
+import { backoff } from "../../src/participant/outbox/backoff";
+import { nextBatch } from "../../src/participant/outbox/batch";
+import { IndexedDbStore } from "../../src/participant/outbox/indexed-db";
+import { Outbox } from "../../src/participant/outbox/outbox";
+import type { OutboxItem } from "../../src/participant/outbox/store";
+
+type Reply = number | "silence";
+
+/** A server that answers as told, then with 200 for ever, and remembers what it stored. */
+function server(replies: Reply[] = []) {
+  const got: { path: string; body: unknown; token: string }[] = [];
+  const send = async (_method: string, path: string, options: { token: string; body: unknown }): Promise<Answer> => {
+    const reply = replies.shift() ?? 200;
+    if (reply === "silence") throw new NetworkError("no answer");
+    got.push({ path, ...options });
+    return { status: reply, body: reply < 300 ? { receipt: path } : { error: { code: "refused", message: "no" } }, retry_after_s: null };
+  };
+  return { got, send };
+}
+
+const noPause = (): Promise<void> => Promise.resolve();
+const paths = (got: { path: string }[]): string[] => got.map((one) => one.path);
+
+async function opened(factory: IDBFactory, replies: Reply[] = [], options = {}) {
+  const fake = server(replies);
+  const store = await IndexedDbStore.open(factory);
+  const outbox = new Outbox(store, { send: fake.send, pause: noPause, ...options });
+  await outbox.open("run", "token");
+  return { ...fake, outbox, store };
+}
+
+describe("outbox", () => {
+  it("keeps what is put before it sends, and forgets it only when acknowledged", async () => {
+    const { outbox, store, got } = await opened(new IDBFactory(), ["silence", 503, 429, 201]);
+    const sent = await outbox.put("PUT", "/a", { n: 1 });
+    expect(await store.all()).toHaveLength(1);
+    expect(await sent.receipt).toEqual({ accepted: true, body: { receipt: "/a" } });
+    expect(await store.all()).toHaveLength(0);
+    expect(paths(got)).toEqual(["/a", "/a", "/a"]);
+  });
+
+  it("sends in the order of putting", async () => {
+    const { outbox, got } = await opened(new IDBFactory(), ["silence"]);
+    await Promise.all(["/a", "/b", "/c"].map((path) => outbox.put("PUT", path, {})));
+    await outbox.drained();
+    expect(paths(got)).toEqual(["/a", "/b", "/c"]);
+  });
+
+  it("takes up after a reload what an earlier page left, with the newer token", async () => {
+    const factory = new IDBFactory();
+    const first = await opened(factory, [], { send: () => new Promise<Answer>(() => {}) });
+    await first.outbox.put("PUT", "/left", { n: 7 });
+    first.outbox.stop();
+    const fake = server();
+    const second = new Outbox(await IndexedDbStore.open(factory), { send: fake.send, pause: noPause });
+    await second.open("run", "newer");
+    expect(await second.drained(1_000)).toBe(true);
+    expect(fake.got).toEqual([{ path: "/left", body: { n: 7 }, token: "newer" }]);
+  });
+
+  it("puts a refused write aside and goes on", async () => {
+    const { outbox, store } = await opened(new IDBFactory(), [409]);
+    const sent = await outbox.put("PUT", "/a", {});
+    const next = await outbox.put("PUT", "/b", {});
+    expect(await sent.receipt).toMatchObject({ accepted: false, refused: { status: 409, code: "refused" } });
+    expect(await next.receipt).toMatchObject({ accepted: true });
+    expect(await store.all()).toHaveLength(0);
+  });
+
+  it("tells when the run's token is not valid any more", async () => {
+    const onUnauthorized = vi.fn();
+    const { outbox } = await opened(new IDBFactory(), [401], { onUnauthorized });
+    await (await outbox.put("PUT", "/a", {})).receipt;
+    expect(onUnauthorized).toHaveBeenCalledOnce();
+  });
+
+  it("sends events together, after the writes", async () => {
+    const { outbox, got } = await opened(new IDBFactory(), ["silence", "silence"]);
+    await Promise.all([outbox.putEvent({ id: "e1" }), outbox.put("PUT", "/a", {}), outbox.putEvent({ id: "e2" })]);
+    await outbox.drained();
+    expect(paths(got)).toContain("/a");
+    expect(got.at(-1)?.body).toEqual({ events: expect.arrayContaining([{ id: "e2" }]) });
+  });
+
+  it("says after the limit that not all was sent", async () => {
+    const { outbox } = await opened(new IDBFactory(), [], { send: () => new Promise<Answer>(() => {}) });
+    await outbox.put("PUT", "/a", {});
+    expect(await outbox.drained(20)).toBe(false);
+  });
+});
+
+describe("batches and back-off", () => {
+  const event = (n: number): OutboxItem =>
+    ({ id: `${n}`, run_id: "r", token: "t", kind: "event", method: "POST", path: "", body: n, sequence: n });
+
+  it("puts at most 100 events into a call", () => {
+    const batch = nextBatch(Array.from({ length: 130 }, (_, n) => event(n)));
+    expect(batch?.items).toHaveLength(100);
+    expect(nextBatch([])).toBeNull();
+  });
+
+  it("waits from half a second to 15 s", () => {
+    const waits = [1, 2, 3, 4, 5, 6, 20].map((failures) => backoff(failures, () => 0.5));
+    expect(waits).toEqual([500, 1_000, 2_000, 4_000, 8_000, 15_000, 15_000]);
+    expect(backoff(1, () => 0)).toBe(375);
+  });
+});

@@ -1,0 +1,100 @@
+import { describe, expect, it } from "vitest";
+import type { AssignedTrial } from "../../src/api/participant";
+import { luminance } from "../../src/participant/flow/appearance";
+import { findings, type Abilities } from "../../src/participant/flow/gates";
+import { owed, Replays } from "../../src/participant/flow/replays";
+import { refreshRate } from "../../src/participant/screen/refresh-rate";
+import { clipHeight, clipWidth, screenChange, zoomed, type ScreenShape } from "../../src/participant/screen/size";
+import { distanceFrom } from "../../src/participant/screens/distance";
+import { keyFor, valueOf } from "../../src/participant/trials/clip-rating/scale-keys";
+
+const trial = (rest: Partial<AssignedTrial> = {}): AssignedTrial => ({
+  trial_index: 0, kind: "main", block: 1, clip_sha256: "ab", clip_url: "/c", frames: 45, fps: 30, bytes: 1, width_px: 800,
+  height_px: 300, width_mm: 130, inter_ocular_px: 400, prompt: null, plays_done: 0, plays_wanted: 1, answered: false, ...rest,
+});
+
+describe("actual size", () => {
+  it("shows the inter-ocular distance as declared", () => {
+    const width = clipWidth(trial(), 60, 4);
+    expect((width / 800) * 400).toBeCloseTo(60 * 4);
+    expect(clipHeight(trial(), width)).toBeCloseTo((width * 300) / 800);
+  });
+  it("falls back to the clip's width in mm, then to its own pixels", () => {
+    expect(clipWidth(trial({ inter_ocular_px: null }), 60, 4)).toBe(520);
+    expect(clipWidth(trial({ inter_ocular_px: null, width_mm: null }), 60, 4)).toBe(800);
+    expect(clipWidth(trial(), 60, null)).toBe(800);
+  });
+
+  const before: ScreenShape = { device_pixel_ratio: 1, screen_width_px: 1_920, screen_height_px: 1_080 };
+  it.each([
+    ["nothing", {}, "none"],
+    ["Chromium's zoom", { device_pixel_ratio: 1.5 }, "zoom"],
+    ["Firefox's zoom", { device_pixel_ratio: 1.5, screen_width_px: 1_280, screen_height_px: 720 }, "zoom"],
+    ["a tablet turned", { screen_width_px: 1_080, screen_height_px: 1_920 }, "none"],
+    ["another monitor", { screen_width_px: 2_560, screen_height_px: 1_440 }, "screen"],
+    ["a finer monitor", { device_pixel_ratio: 2, screen_width_px: 1_512, screen_height_px: 982 }, "screen"],
+  ])("tells %s", (_what, change, kind) => {
+    expect(screenChange(before, { ...before, ...change })).toBe(kind);
+  });
+  it("keeps the size in millimetres under zoom", () => {
+    expect(zoomed(4, before, { ...before, device_pixel_ratio: 2 })).toBe(2);
+  });
+  it("takes the blind spot at 13.5 degrees", () => {
+    expect(distanceFrom(144 * 4, 4)).toBeCloseTo(599.8, 0);
+  });
+  it("reads the refresh rate from the median interval", () => {
+    const stamps = Array.from({ length: 61 }, (_, n) => (n * 1000) / 144 + (n === 30 ? 4 : 0));
+    expect(refreshRate(stamps)).toBeCloseTo(144, 0);
+    expect(refreshRate([1, 2, 3])).toBeNull();
+  });
+});
+
+describe("gates", () => {
+  const fine: Abilities = { secure: true, web_codecs: true, video: true, storage: true, touch_only: false, screen_width_px: 1_440, screen_height_px: 900 };
+  const gates = { minimum_width_px: 800, minimum_height_px: 500, allow_touch: true, full_screen: true, calibrate: "required" as const, viewing_distance: false, inter_ocular_mm: 60 };
+  it.each([
+    [{}, []],
+    [{ secure: false }, ["gate_insecure"]],
+    [{ web_codecs: false }, ["gate_video"]],
+    [{ web_codecs: false, video: false }, ["gate_browser"]],
+    [{ storage: false }, ["gate_storage"]],
+    [{ screen_width_px: 390, screen_height_px: 844 }, ["gate_screen"]],
+    [{ screen_width_px: 768, screen_height_px: 1_024 }, []],
+  ])("finds %o", (change, reasons) => {
+    expect(findings({ ...fine, ...change }, gates).map((finding) => finding.reason)).toEqual(reasons);
+  });
+  it("asks for a keyboard where touch is not allowed", () => {
+    expect(findings({ ...fine, touch_only: true }, { ...gates, allow_touch: false })[0]).toMatchObject({ reason: "gate_touch", closed: true });
+  });
+});
+
+describe("repetitions", () => {
+  it("come once each, at the end of their block or of a later one", () => {
+    const replays = new Replays();
+    replays.add(trial({ trial_index: 4, block: 2 }), 2);
+    replays.add(trial({ trial_index: 4, block: 2 }), 2);
+    expect(replays.peek(1)).toBeNull();
+    expect(replays.peek(3)?.trial.trial_index).toBe(4);
+    replays.shift(3);
+    expect(replays.peek(3)).toBeNull();
+  });
+  it("are owed where an earlier visit stopped before them", () => {
+    expect(owed([trial(), trial({ plays_done: 1, plays_wanted: 2 }), trial({ plays_done: 1 })])).toMatchObject([{ play: 2 }]);
+  });
+});
+
+describe("keys of the scale", () => {
+  it.each([
+    ["1", 1, 7, 1], ["7", 1, 7, 7], ["8", 1, 7, null], ["0", 1, 7, null], ["0", 0, 10, 0], ["0", 1, 10, 10], ["a", 1, 7, null],
+  ])("%s on a scale from %i to %i", (key, minimum, maximum, value) => {
+    expect(valueOf(key, { minimum, maximum })).toBe(value);
+  });
+  it("follow the direction of reading", () => {
+    expect([keyFor("ArrowRight", false), keyFor("ArrowRight", true), keyFor("x", false)]).toEqual([1, -1, 0]);
+  });
+});
+
+it("ink on the surround is chosen by luminance", () => {
+  expect(luminance("#808080")).toBeCloseTo(0.2159, 3);
+  expect(luminance("#ffffff")).toBeCloseTo(1);
+});

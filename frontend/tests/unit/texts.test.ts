@@ -1,0 +1,46 @@
+import { describe, expect, it } from "vitest";
+import { direction, pick, preferred, translator } from "../../src/i18n";
+import { de } from "../../src/i18n/de";
+import { en } from "../../src/i18n/en";
+import { recruiterQuery } from "../../src/participant/flow/identity";
+import { parseBlocks } from "../../src/ui/markdown";
+
+describe("messages", () => {
+  const holes = (text: string): string[] => [...text.matchAll(/\{(\w+)\}/g)].map(([, name]) => name ?? "").sort();
+  it.each(Object.keys(en) as (keyof typeof en)[])("%s has the same holes in both languages", (key) => {
+    expect(holes(de[key])).toEqual(holes(en[key]));
+  });
+  it("are filled in, and fall back to English", () => {
+    expect(translator("de")("step", { step: 1, steps: 4 })).toBe("Schritt 1 von 4");
+    expect(translator("fi")("continue")).toBe("Continue");
+  });
+});
+
+describe("languages", () => {
+  it("are chosen as the browser prefers", () => {
+    expect(preferred(["en", "de"], ["fr", "de-AT", "en"])).toBe("de");
+    expect(preferred(["en", "de"], ["fr"])).toBe("en");
+    expect(pick({ en: "a", de: "b" }, "de")).toBe("b");
+    expect([direction("ar"), direction("de")]).toEqual(["rtl", "ltr"]);
+  });
+});
+
+describe("markdown", () => {
+  it("finds headings, paragraphs and lists with lines that go on", () => {
+    const blocks = parseBlocks("# Title\n\nOne\ntwo.\n\n1. First\n   goes on\n2. Second\n\n- a\n- b\n\n---");
+    expect(blocks).toEqual([
+      { kind: "heading", level: 1, text: "Title" },
+      { kind: "paragraph", text: "One two." },
+      { kind: "list", ordered: true, start: 1, items: ["First goes on", "Second"] },
+      { kind: "list", ordered: false, start: 1, items: ["a", "b"] },
+      { kind: "rule" },
+    ]);
+  });
+  it("takes markup for text", () => {
+    expect(parseBlocks("<script>alert(1)</script>")).toEqual([{ kind: "paragraph", text: "<script>alert(1)</script>" }]);
+  });
+});
+
+it("recruiter parameters are kept, the page's own are not", () => {
+  expect(recruiterQuery("?PROLIFIC_PID=abc&simulate=visual&STUDY_ID=1")).toEqual({ PROLIFIC_PID: "abc", STUDY_ID: "1" });
+});

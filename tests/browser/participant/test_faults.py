@@ -1,0 +1,124 @@
+"""A server that is killed again and again behind a network that loses, doubles, delays and reorders requests.
+
+PALPEBRA_FAULTS=full is the long run: the two minutes without a connection of the issue's text.
+"""
+
+import json
+import os
+import random
+import subprocess
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.browser.conftest import REPOSITORY
+from tests.browser.fault_proxy import FaultProxy
+from tests.browser.server_process import ServerProcess
+from tests.browser.studies import PLAIN, without
+from tests.browser.visit import Visit
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+FULL = os.environ.get("PALPEBRA_FAULTS") == "full"
+PARTICIPANTS, TRIALS = 26, 80
+OFFLINE_S = 120.0 if FULL else 6.0
+SHARE = 0.1
+MANY = without(
+    PLAIN,
+    ("per_cell = 3", "per_cell = 5"),
+    ('split_by = "character"', "repeats = 8"),
+    ("trials = 1", "trials = 0"),
+    ('order = "fixed"', 'order = "random"'),
+).split("[[forms]]")[0] + PLAIN[PLAIN.index("[texts.en]") :]
+
+
+@pytest.fixture
+def driver(tmp_path: Path) -> Path:
+    """The participants' program, built from the page's own sources."""
+    if not (REPOSITORY / "frontend" / "node_modules").is_dir():
+        pytest.skip("the frontend's packages are not installed: run `make setup-test`")
+    command = ["npx", "vite", "build", "--logLevel", "error", "--ssr", "tests/faults/driver.ts", "--outDir", str(tmp_path / "driver")]
+    subprocess.run(command, cwd=REPOSITORY / "frontend", check=True, timeout=120)
+    return next((tmp_path / "driver").glob("driver.*js"))
+
+
+def kill_again_and_again(server: ServerProcess, over: threading.Event, kills: list[float]) -> None:
+    chance = random.Random(5)
+    while not over.wait(chance.uniform(2.0, 6.0)):
+        server.kill()
+        kills.append(time.monotonic())
+        over.wait(chance.uniform(0.0, 1.0))
+        server.start()
+
+
+def test_nothing_acknowledged_is_lost_and_nothing_is_stored_twice(
+    server: ServerProcess, tmp_path: Path, driver: Path
+) -> None:
+    study = server.add_study(tmp_path / "clips", MANY)
+    server.start()
+    proxy = FaultProxy(server.port, SHARE, seed=11).start()
+    out, over, kills = tmp_path / "acknowledged.json", threading.Event(), list[float]()
+    killer = threading.Thread(target=kill_again_and_again, args=(server, over, kills))
+    command = ["node", str(driver), proxy.address, study.link_token, str(PARTICIPANTS), "60"]
+    with out.open("wb") as told_here, (tmp_path / "driver.log").open("wb") as log:
+        node = subprocess.Popen(command, stdout=told_here, stderr=log)
+    killer.start()
+    try:
+        time.sleep(8)
+        proxy.offline = True
+        time.sleep(OFFLINE_S)
+        proxy.offline = False
+        code = node.wait(timeout=420)
+    finally:
+        over.set()
+        node.kill()
+        killer.join()
+        proxy.stop()
+    assert code == 0, (tmp_path / "driver.log").read_text()[-3000:]
+    told = json.loads(out.read_text())
+    compare(told, server.rows("SELECT t.*, r.public_id AS run FROM trial_ratings t JOIN study_runs r ON r.id = t.study_run_id"))
+    assert {row["status"] for row in server.rows("SELECT status FROM study_runs")} == {"complete"}
+    counts = {name: proxy.counts[name] for name in sorted(proxy.counts)}
+    print(f"\n{told['given']} ratings, {len(kills)} kills, {told['reloads']} reloads, {OFFLINE_S:.0f} s offline, {counts}")
+    assert len(kills) >= 3
+
+
+def compare(told: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+    """Each acknowledged rating is stored as it was given; nothing is stored twice; nothing was refused."""
+    stored = {row["rating_id"]: row for row in rows}
+    acknowledged = {one["rating_id"]: one for one in told["acknowledged"]}
+    assert told["refused"] == []
+    lost = [one for one in acknowledged.values() if one["rating_id"] not in stored]
+    assert lost == []
+    for one in acknowledged.values():
+        row = stored[one["rating_id"]]
+        assert (row["run"], row["trial_index"], row["response"]) == (one["run_id"], one["trial_index"], one["response"])
+    assert len({(row["run"], row["trial_index"], row["play"]) for row in rows}) == len(rows)
+    assert len(rows) == len(acknowledged) == PARTICIPANTS * TRIALS >= 2_000
+
+
+def test_a_browser_goes_through_the_same(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", without(PLAIN, ("per_cell = 3", "per_cell = 5")))
+    server.start()
+    proxy = FaultProxy(server.port, SHARE, seed=3).start()
+    over, kills = threading.Event(), list[float]()
+    visit = Visit(page, proxy.address).open(study.link_token).begin().instructions().practice()
+    killer = threading.Thread(target=kill_again_and_again, args=(server, over, kills))
+    killer.start()
+    try:
+        while not page.query_selector(".code"):
+            visit.trials(most=4)
+            if len(kills) < 4 and page.query_selector(".ready"):
+                visit.open(study.link_token)
+                page.wait_for_selector(".prose", timeout=60_000)
+                visit.instructions()
+    finally:
+        over.set()
+        killer.join()
+        proxy.stop()
+    rows = server.rows("SELECT trial_index, play, response FROM ratings WHERE kind = 'main' AND play = 1")
+    assert sorted(row["response"] for row in rows) == [4] * 10
+    assert {row["status"] for row in server.rows("SELECT status FROM study_runs")} == {"complete"}

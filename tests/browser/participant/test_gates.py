@@ -1,0 +1,174 @@
+"""Browsers, screens, links and clips that will not do: the participant reads why, the server knows."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, Route
+
+from tests.browser.server_process import ServerProcess
+from tests.browser.studies import PLAIN, STUDY, without
+from tests.browser.visit import Visit, axe_violations
+
+pytestmark = pytest.mark.browser
+EVENTS = "SELECT type, data FROM run_events"
+
+
+def reasons(server: ServerProcess) -> str:
+    return str([(row["type"], row["data"]) for row in server.rows(EVENTS)])
+
+
+def test_links_that_lead_nowhere(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    visit = Visit(page, server.address).open("no-such-link")
+    page.wait_for_selector("text=This link is not known")
+    assert axe_violations(page) == []
+    study.change(status="closed")
+    visit.open(study.link_token)
+    page.wait_for_selector("text=not open at the moment")
+
+
+@pytest.mark.parametrize(
+    ("hide", "sentence", "reason"),
+    [
+        ("Object.defineProperty(window, 'isSecureContext', {value: false})", "https://", "gate_insecure"),
+        ("delete window.VideoDecoder; HTMLVideoElement.prototype.play = undefined", "recent Chrome", "gate_browser"),
+    ],
+)
+def test_a_browser_that_cannot(
+    server: ServerProcess, tmp_path: Path, page: Page, hide: str, sentence: str, reason: str
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    page.add_init_script(hide)
+    Visit(page, server.address).open(study.link_token)
+    page.wait_for_selector(f"text={sentence}")
+    page.wait_for_load_state("networkidle")
+    assert axe_violations(page) == []
+    assert reason in reasons(server)
+
+
+def test_a_screen_that_is_too_small(server: ServerProcess, tmp_path: Path, chromium: Browser) -> None:
+    study = server.add_study(tmp_path / "clips", without(PLAIN, ("minimum_width_px = 320", "minimum_width_px = 800")))
+    server.start()
+    phone = {"width": 390, "height": 700}
+    context = chromium.new_context(viewport=phone, screen=phone, has_touch=True, is_mobile=True, locale="en-GB")
+    page = context.new_page()
+    Visit(page, server.address).open(study.link_token)
+    page.wait_for_selector("text=800 by 300")
+    page.wait_for_load_state("networkidle")
+    assert axe_violations(page) == []
+    context.close()
+    assert "gate_screen" in reasons(server)
+
+
+def test_without_webcodecs_the_video_element_is_used_and_flagged(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN, frames=20)
+    server.start()
+    page.add_init_script("delete window.VideoDecoder")
+    visit = Visit(page, server.address).open(study.link_token)
+    page.wait_for_selector("text=ordinary video")
+    page.click(".primary")
+    visit.begin().instructions().practice()
+    assert visit.trials(most=3) == 3
+    page.wait_for_selector(".break")
+    rows = server.rows("SELECT * FROM ratings WHERE kind = 'main'")
+    assert {row["method"] for row in rows} == {"video"}
+    assert {row["verdict"] for row in rows} <= {"flagged", "failed"}
+    assert "gate_video" in reasons(server)
+
+
+def test_without_storage_each_answer_waits_for_the_server(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    page.add_init_script("IDBFactory.prototype.open = () => { throw new DOMException('denied', 'SecurityError') }")
+    visit = Visit(page, server.address).open(study.link_token)
+    page.wait_for_selector("text=each answer must reach the server")
+    page.click(".primary")
+    visit.begin().instructions().practice()
+    visit.trials(most=1)
+    page.wait_for_selector(".ready")
+    assert len(server.rows("SELECT 1 FROM ratings WHERE kind = 'main'")) == 1
+    assert "storage_blocked" in reasons(server)
+
+
+def test_a_clip_that_is_corrupt_once_is_fetched_again(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    spoilt: list[str] = []
+
+    def spoil(route: Route) -> None:
+        if route.request.url in spoilt:
+            return route.continue_()
+        spoilt.append(route.request.url)
+        return route.fulfill(body=b"not a clip", content_type="video/mp4")
+
+    page.route("**/clips/*.mp4", spoil)
+    visit = Visit(page, server.address).open(study.link_token).begin().instructions().practice()
+    visit.trials()
+    assert len(server.rows("SELECT 1 FROM ratings WHERE kind = 'main' AND verdict = 'good'")) == 6
+
+
+def test_a_clip_that_is_gone_is_told_and_passed_over(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    gone: list[str] = []
+
+    def lose(route: Route) -> None:
+        if not gone:
+            gone.append(route.request.url)
+        lost = route.request.url == gone[0]
+        return route.fulfill(status=404, body="") if lost else route.continue_()
+
+    page.route("**/clips/*.mp4", lose)
+    visit = Visit(page, server.address).open(study.link_token).begin().instructions()
+    page.click(".primary")
+    page.wait_for_selector("text=Some clips could not be loaded", timeout=60_000)
+    assert axe_violations(page) == []
+    page.click("text=Go on without these clips")
+    page.wait_for_selector("text=This clip cannot be shown", timeout=60_000)
+    assert axe_violations(page) == []
+    assert "clip_unavailable" in reasons(server)
+    assert all("pageerror" not in problem for problem in visit.problems)
+
+
+def test_a_clip_too_large_for_the_window_is_refused(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", without(STUDY, ("full_screen = false", "full_screen = false\ninter_ocular_mm = 300.0")))
+    server.start()
+    Visit(page, server.address).open(study.link_token).begin()
+    page.wait_for_selector(".card")
+    page.click("text=It fits")
+    page.click("text=It is, within")
+    page.wait_for_selector("text=The clip does not fit")
+    assert axe_violations(page) == []
+
+
+def test_zoom_keeps_the_size_and_another_screen_asks_again(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", without(STUDY, ("viewing_distance = true", "viewing_distance = false")))
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin()
+    page.click("text=It fits")
+    page.click("text=It is, within")
+    visit.instructions().practice()
+    page.wait_for_selector(".ready, .attention")
+    before = server.rows("SELECT px_per_mm FROM calibrations ORDER BY id")[-1]["px_per_mm"]
+    page.evaluate("Object.defineProperty(window, 'devicePixelRatio', {value: 2, configurable: true})")
+    visit.trials(most=1)
+    page.wait_for_selector(".ready, .attention, .break")
+    assert server.rows("SELECT px_per_mm FROM calibrations ORDER BY id")[-1]["px_per_mm"] == pytest.approx(before / 2)
+    page.evaluate("Object.defineProperty(screen, 'width', {value: 3000, configurable: true})")
+    page.keyboard.press(" ") if page.query_selector(".ready") else None
+    visit_or_asked(page, visit)
+    page.wait_for_selector("text=Your screen has changed")
+    assert axe_violations(page) == []
+
+
+def visit_or_asked(page: Page, visit: Visit) -> None:
+    """End the trial that was on the screen when it changed."""
+    if page.query_selector(".attention"):
+        page.keyboard.press(page.inner_text(".question strong"))
+    else:
+        visit.page.wait_for_selector(".scale")
+        visit.page.keyboard.press("4")

@@ -1,0 +1,122 @@
+"""Reload, a second tab, another device, no connection, a server that dies: the run goes on."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from tests.browser.server_process import ServerProcess
+from tests.browser.studies import PLAIN
+from tests.browser.visit import Visit, axe_violations
+
+pytestmark = pytest.mark.browser
+RATED = "SELECT trial_index, play, response FROM ratings WHERE kind = 'main' ORDER BY time_elapsed"
+
+
+def started(server: ServerProcess, folder: Path, page: Page, kind: str = "general") -> tuple[Visit, str]:
+    """A visit in front of its first main trial."""
+    study = server.add_study(folder, PLAIN)
+    server.start()
+    link = study.link_token if kind == "general" else server.link(study, "personal")
+    visit = Visit(page, server.address).open(link).begin().instructions().practice()
+    page.wait_for_selector(".ready")
+    return visit, link
+
+
+def test_a_reload_goes_on_at_the_next_unanswered_trial(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    visit, link = started(server, tmp_path / "clips", page)
+    visit.trials(most=2)
+    page.wait_for_selector(".ready")
+    visit.open(link)
+    page.wait_for_selector("text=Welcome back")
+    assert "2 of 6" in page.inner_text(".prose")
+    assert axe_violations(page) == []
+    visit.instructions()
+    assert visit.trials() == 4
+    assert len(server.rows(RATED)) == 6
+    code = visit.code()
+    visit.open(link)
+    page.wait_for_selector(".code")
+    assert visit.code() == code
+
+
+def test_offline_answers_are_kept_and_sent_later(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    visit, _ = started(server, tmp_path / "clips", page)
+    page.context.set_offline(True)
+    visit.trials(most=3)
+    assert server.rows(RATED) == []
+    page.context.set_offline(False)
+    visit.trials()
+    assert len(server.rows(RATED)) == 6
+    types = {row["type"] for row in server.rows("SELECT type FROM run_events")}
+    assert {"offline", "online"} <= types
+
+
+def test_the_server_dies_while_the_page_is_reloaded(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    visit, link = started(server, tmp_path / "clips", page)
+    visit.trials(most=1)
+    page.wait_for_selector(".ready")
+    server.kill()
+    visit.rate("2")
+    page.wait_for_selector(".ready")
+    server.start()
+    visit.open(link)
+    page.wait_for_selector("text=2 of 6")
+    visit.instructions()
+    assert visit.trials() == 4
+    assert [row["response"] for row in server.rows(RATED)] == [4, 2, 4, 4, 4, 4]
+
+
+def test_a_second_tab_is_told_and_may_take_over(
+    server: ServerProcess, tmp_path: Path, context: BrowserContext, page: Page
+) -> None:
+    _, link = started(server, tmp_path / "clips", page)
+    second = context.new_page()
+    visit = Visit(second, server.address).open(link)
+    second.wait_for_selector("text=open in another tab")
+    assert axe_violations(second) == []
+    second.click("text=Go on here")
+    second.wait_for_selector(".prose")
+    page.wait_for_selector("text=goes on in another tab")
+    assert axe_violations(page) == []
+    second.click(".primary")
+    assert visit.trials() == 6
+    assert len(server.rows(RATED)) == 6
+
+
+def test_another_device_goes_on_by_the_personal_link(
+    server: ServerProcess, tmp_path: Path, chromium: Browser, page: Page
+) -> None:
+    visit, link = started(server, tmp_path / "clips", page, kind="personal")
+    visit.trials(most=2)
+    page.wait_for_selector(".ready")
+    other = chromium.new_context(locale="en-GB")
+    elsewhere = Visit(other.new_page(), server.address).open(link)
+    elsewhere.page.wait_for_selector("text=2 of 6")
+    elsewhere.instructions()
+    assert elsewhere.trials() == 4
+    visit.rate("1")
+    page.wait_for_selector("text=continued in another place")
+    other.close()
+    assert [row["response"] for row in server.rows(RATED)] == [4] * 6
+    assert [row["status"] for row in server.rows("SELECT status FROM study_runs")] == ["complete"]
+
+
+def test_stopping_pauses_or_withdraws(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin()
+    page.wait_for_selector("text=What you will do")
+    page.click("text=Stop")
+    page.wait_for_selector("dialog")
+    assert axe_violations(page) == []
+    page.click("text=Pause")
+    page.wait_for_selector("text=See you later")
+    visit.open(study.link_token)
+    page.wait_for_selector("text=What you will do")
+    page.click("text=Stop")
+    page.click("text=Withdraw")
+    page.wait_for_selector("text=You have withdrawn")
+    assert [row["status"] for row in server.rows("SELECT status FROM study_runs")] == ["withdrawn"]
+    visit.open(study.link_token)
+    page.wait_for_selector("text=You have withdrawn")

@@ -1,0 +1,135 @@
+"""A participant in a browser: the screens as a person goes through them."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import ElementHandle, Page
+
+AXE = Path(__file__).resolve().parents[2] / "frontend" / "node_modules" / "axe-core" / "axe.min.js"
+WCAG = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+ANY_SCREEN = ".ready, .attention, .break, form, .code"
+Look = Callable[[str], None]
+
+
+class Visit:
+    """One page of one participant. `look(name)` is called at each screen."""
+
+    def __init__(self, page: Page, address: str, look: Look = lambda name: None) -> None:
+        self.page, self.address, self.look = page, address, look
+        self.problems: list[str] = []
+        page.on("pageerror", lambda error: self.problems.append(str(error)))
+        page.on("console", lambda message: message.type == "error" and self.problems.append(message.text))
+
+    def open(self, link: str, query: str = "") -> "Visit":
+        self.page.goto(f"{self.address}/run/{link}{query}")
+        self.page.wait_for_selector("h1, .trial")
+        return self
+
+    def begin(self) -> "Visit":
+        """Start page, consent, the form before."""
+        page = self.page
+        page.wait_for_selector("text=About")
+        self.look("start")
+        page.click(".primary")
+        page.wait_for_selector(".page > .tick")
+        self.look("consent")
+        page.check("input[type=checkbox]")
+        page.click(".primary")
+        page.wait_for_selector("form")
+        self.look("form")
+        page.fill("input.short", "34")
+        page.check("input[value=normal]")
+        page.click(".primary")
+        return self
+
+    def measure(self) -> "Visit":
+        """Card, ruler and distance."""
+        page = self.page
+        for selector, name, press in (
+            (".card", "card", "text=It fits"),
+            (".ruler-line", "ruler check", "text=It is, within"),
+            (".blind-field", "distance", "text=Enter the distance"),
+            ("input.short", "distance typed", ".primary"),
+        ):
+            page.wait_for_selector(selector)
+            self.look(name)
+            page.click(press)
+        return self
+
+    def instructions(self) -> "Visit":
+        self.page.wait_for_selector(".prose h1, .prose h2")
+        self.look("instructions")
+        self.page.click(".primary")
+        return self
+
+    def practice(self, trials: int = 1) -> "Visit":
+        page = self.page
+        page.wait_for_selector("text=not part of the study")
+        self.look("practice")
+        page.click(".primary")
+        for _ in range(trials):
+            self.rate("5")
+            page.wait_for_selector(".feedback")
+            self.look("feedback")
+            page.keyboard.press("Enter")
+        page.wait_for_selector("text=That was the practice")
+        self.look("practice done")
+        page.click(".primary")
+        return self
+
+    def rate(self, key: str = "4") -> None:
+        """One trial by keyboard: start, watch, answer."""
+        self.page.wait_for_selector(".ready")
+        self.look("ready")
+        self.page.keyboard.press(" ")
+        self._answer(lambda: self.page.keyboard.press(key))
+
+    def _answer(self, press: Callable[[], None]) -> None:
+        scale = self.page.wait_for_selector(".scale")
+        self.look("scale")
+        press()
+        _gone(scale)
+
+    def trials(self, most: int = 1_000, key: str = "4") -> int:
+        """Go through whatever comes until the completion code; returns how many clips were rated."""
+        rated = 0
+        while rated < most:
+            self.page.wait_for_selector(ANY_SCREEN)
+            if self.page.query_selector(".code"):
+                self.look("done")
+                break
+            rated += self._one_screen(key)
+        return rated
+
+    def _one_screen(self, key: str) -> int:
+        page = self.page
+        if page.query_selector(".ready"):
+            self.rate(key)
+            return 1
+        if page.query_selector(".attention"):
+            wanted = page.inner_text(".question strong")
+            self._answer(lambda: page.keyboard.press(wanted))
+            return 0
+        screen = page.query_selector(".break, form")
+        self.look("break" if page.query_selector(".break") else "form after")
+        page.click(".primary:enabled")
+        _gone(screen)
+        return 0
+
+    def code(self) -> str:
+        return self.page.inner_text(".code output")
+
+
+def _gone(element: ElementHandle | None) -> None:
+    if element is not None:
+        element.wait_for_element_state("hidden")
+
+
+def axe_violations(page: Page) -> list[str]:
+    """What axe-core finds against WCAG 2.2 AA on the page as it is."""
+    page.evaluate(AXE.read_text(encoding="utf-8") + "; 0")
+    found: list[dict[str, Any]] = page.evaluate(
+        "tags => axe.run(document, { runOnly: tags }).then(result => result.violations)", WCAG
+    )
+    return [f"{one['id']}: {[node['html'][:120] for node in one['nodes']]}" for one in found]
