@@ -1,14 +1,9 @@
-"""Mixed and ordinal models as tables and report sections."""
-
-from collections.abc import Sequence
-
-import pandas as pd
+"""Mixed and ordinal models as tables."""
 
 from analysis.formats import Table
-from analysis.mixed import MixedResult, Slopes, fit_mixed
+from analysis.mixed import MixedResult
 from analysis.numbers import fixed, p_value
-from analysis.ordinal import OrdinalResult, fit_ordinal
-from analysis.report import Section
+from analysis.ordinal import OrdinalResult
 
 
 def mixed_effects_table(result: MixedResult, name: str) -> Table:
@@ -63,31 +58,3 @@ def ordinal_text(result: OrdinalResult) -> str:
         "where people differ in the size of an effect its p is too small."
     ]
     return " ".join([*said, *(f"{note}." for note in result.notes)])
-
-
-def mixed_section(
-    rows: pd.DataFrame,
-    name: str,
-    participant: str,
-    rating: str,
-    within: Sequence[str],
-    item: str | Sequence[str],
-    slopes: Slopes = "all",
-) -> Section:
-    """Fit the linear mixed model and lay it out for the report."""
-    result = fit_mixed(rows, participant, rating, within, item, slopes)
-    tables = (mixed_effects_table(result, name), mixed_components_table(result, name))
-    return Section("Linear mixed model", mixed_text(result), tables)
-
-
-def ordinal_section(
-    rows: pd.DataFrame,
-    name: str,
-    participant: str,
-    rating: str,
-    within: Sequence[str],
-    item: str | Sequence[str],
-) -> Section:
-    """Fit the ordinal mixed model and lay it out for the report."""
-    result = fit_ordinal(rows, participant, rating, within, item)
-    return Section("Ordinal mixed model", ordinal_text(result), (ordinal_effects_table(result, name),))

@@ -74,7 +74,8 @@ class Criterion:
 
     `h` = log|M| + log|X'V^-1 X|, `r2` the penalised residual sum of squares; `grad_h`, `grad_r2` (m + 1,).
     `curve_at_zero` (m + 1,) is what the second derivative of `value` by theta_k would be at theta_k = 0.
-    `unscaled` (f, f) is the covariance of beta over sigma^2, `unscaled_grad` (m + 1, f, f) its derivative.
+    `unscaled` (f, f) is the covariance of beta over sigma^2; `participants_x` (N, p, f) and `items_x` (J, f)
+    are U'V^-1 X.
     """
 
     n: int
@@ -85,7 +86,8 @@ class Criterion:
     curve_at_zero: Floats = field(repr=False)
     beta: Floats = field(repr=False)
     unscaled: Floats = field(repr=False)
-    unscaled_grad: Floats = field(repr=False)
+    participants_x: Floats = field(repr=False)
+    items_x: Floats = field(repr=False)
 
     @property
     def sigma(self) -> float:
@@ -115,13 +117,14 @@ def criterion(c: CrossProducts, theta: Floats) -> Criterion:
     wc, wb = solved[:, :, :items], solved[:, :, items:]
     # kc: U_c' (I + U_p Lp Lp' U_p')^-1 U_c, the items' cross-product with participants taken out
     kc = np.diag(c.cc) - vc.reshape(-1, items).T @ wc.reshape(-1, items)
-    kb = c.cb - np.einsum("ipj,ipb->jb", vc, wb, optimize=True)
+    kb = c.cb - vc.reshape(-1, items).T @ wb.reshape(-1, f + 1)
     factor = linalg.cho_factor(np.eye(items) + lam**2 * kc)
     inverse = linalg.cho_solve(factor, np.eye(items))
     xc = lam * (inverse @ kb)
     xp = wb - lam * (wc @ xc)
-    d = c.bb - np.einsum("ipa,ipb->ab", vb, xp, optimize=True) - lam * c.cb.T @ xc
-    a, unscaled = d[:f, :f], np.linalg.inv(d[:f, :f])
+    d = c.bb - vb.reshape(-1, f + 1).T @ xp.reshape(-1, f + 1) - lam * c.cb.T @ xc
+    a = d[:f, :f]
+    unscaled = np.asarray(np.linalg.inv(a), dtype=np.float64)
     beta = unscaled @ d[:f, f]
     r2 = float(d[f, f] - d[f, :f] @ beta)
     log_m = np.linalg.slogdet(mp)[1].sum() + 2 * np.log(np.diag(factor[0])).sum()
@@ -131,26 +134,27 @@ def criterion(c: CrossProducts, theta: Floats) -> Criterion:
     tc = inverse @ kb
     q = c.pc - gl @ wc
     within = c.pp - gl @ np.linalg.solve(mp, gl.transpose(0, 2, 1))
-    k = within.sum(axis=0) - lam**2 * np.einsum(
-        "ipj,ijr->pr", q, inverse @ q.transpose(0, 2, 1), optimize=True
-    )
-    k -= np.einsum("ipa,ab,irb->pr", tp[:, :, :f], unscaled, tp[:, :, :f], optimize=True)
+    k = within.sum(axis=0) - lam**2 * _summed_product(q @ inverse, q)
+    k -= _summed_product(tp[:, :, :f] @ unscaled, tp[:, :, :f])
     k_item = float(np.vdot(inverse, kc)) - float(np.vdot(tc[:, :f] @ unscaled, tc[:, :f]))
     up, uc = tp[:, :, f] - tp[:, :, :f] @ beta, tc[:, f] - tc[:, :f] @ beta
     grad_h = np.r_[2 * np.tensordot(c.patterns, k @ lp, 2), 2 * lam * k_item]
     grad_r2 = np.r_[-2 * np.tensordot(c.patterns, up.T @ up @ lp, 2), -2 * lam * float(uc @ uc)]
     curve = 2 * np.r_[np.tensordot(c.patterns, k, 2), k_item]
-    curve -= 2 * (c.n - f) / r2 * np.r_[np.tensordot(c.patterns, up.T @ up, 2), float(uc @ uc)]
-    gradient = _unscaled_grad(c, lp, lam, tp, tc, unscaled)
-    return Criterion(c.n, h, r2, grad_h, grad_r2, curve, beta, unscaled, gradient)
+    curve = curve - 2 * (c.n - f) / r2 * np.r_[np.tensordot(c.patterns, up.T @ up, 2), float(uc @ uc)]
+    return Criterion(c.n, h, r2, grad_h, grad_r2, curve, beta, unscaled, tp[:, :, :f], tc[:, :f])
 
 
-def _unscaled_grad(
-    c: CrossProducts, lp: Floats, lam: float, tp: Floats, tc: Floats, unscaled: Floats
-) -> Floats:
-    """Derivative of (X'V^-1 X)^-1 by every theta: A^-1 X'V^-1 dV V^-1 X A^-1."""
-    f = len(unscaled)
-    scaled, items = tp[:, :, :f] @ unscaled, tc[:, :f] @ unscaled
-    rotated = lp.T @ scaled
-    half = np.stack([np.einsum("ipa,pr,irb->ab", scaled, s, rotated, optimize=True) for s in c.patterns])
+def _summed_product(a: Floats, b: Floats) -> Floats:
+    """Sum over participants of a_i b_i', both (N, p, m)."""
+    p = a.shape[1]
+    return np.asarray(a.transpose(1, 0, 2).reshape(p, -1) @ b.transpose(1, 0, 2).reshape(p, -1).T)
+
+
+def unscaled_gradient(c: CrossProducts, theta: Floats, at: Criterion) -> Floats:
+    """Derivative of (X'V^-1 X)^-1 by every theta, (m + 1, f, f): A^-1 X'V^-1 dV V^-1 X A^-1."""
+    lp, lam = np.tensordot(theta[:-1], c.patterns, 1), float(theta[-1])
+    scaled, items = at.participants_x @ at.unscaled, at.items_x @ at.unscaled
+    rotated = (lp.T @ scaled).reshape(-1, c.f)
+    half = np.stack([(s.T @ scaled).reshape(-1, c.f).T @ rotated for s in c.patterns])
     return np.concatenate([half + half.transpose(0, 2, 1), 2 * lam * (items.T @ items)[None]])

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.reml import CrossProducts, criterion
+from analysis.reml import CrossProducts, criterion, unscaled_gradient
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,9 @@ def uncertainty(c: CrossProducts, theta: Floats) -> Uncertainty:
     values, vectors = np.linalg.eigh(hessian)
     good = values > EIGENVALUE_FLOOR
     parameters = 2 * (vectors[:, good] / values[good]) @ vectors[:, good].T
-    gradient = np.concatenate([sigma**2 * at.unscaled_grad[free], 2 * sigma * at.unscaled[None]])
+    gradient = np.concatenate(
+        [sigma**2 * unscaled_gradient(c, theta, at)[free], 2 * sigma * at.unscaled[None]]
+    )
     return Uncertainty(sigma**2 * at.unscaled, gradient, parameters)
 
 
