@@ -1,0 +1,157 @@
+"""The commands as a person calls them: outputs, exit codes, one line for what is wrong."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from analysis.cli import app
+from experiments.command_line import run_command_line
+from experiments.errors import InputError
+from experiments.load import load_experiment
+from tests.analysis.ratings_file import rows_of, simulate, write_export
+from tests.analysis.study_database import make_database
+
+EXP3 = load_experiment("exp3")
+LONG = "id,y,face,blur\n" + "".join(
+    f"{p},{(p * 3 + f * 2 + b * p) % 7 + 1},f{f},b{b}\n" for p in range(8) for f in range(3) for b in range(2)
+)
+
+
+def call(*arguments: object):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def export(tmp_path):
+    return write_export(tmp_path / "r.csv", EXP3, rows_of(EXP3, simulate(EXP3, 8)))
+
+
+def test_run_prints_the_tables_and_writes_the_json(export, tmp_path) -> None:
+    result = call("run", "exp3", "--csv", export, "--no-report", "--json", tmp_path / "a.json")
+    assert result.exit_code == 0, result.output
+    assert "Lower-lid" in result.stdout
+    assert "SYNTHETIC DATA" in result.stdout
+    assert max(map(len, result.stdout.replace(str(tmp_path), "").splitlines())) <= 80
+    assert json.loads((tmp_path / "a.json").read_text())["exclusions"]["n_runs"] == 8
+
+
+@pytest.mark.slow
+def test_run_writes_the_report_with_its_sensitivity_analyses(export, tmp_path) -> None:
+    result = call("run", "exp3", "--csv", export, "--out", tmp_path / "new" / "folder")
+    assert result.exit_code == 0, result.output
+    report = (tmp_path / "new" / "folder" / "report.md").read_text()
+    for title in ("Bayes factors", "Linear mixed model", "Ordinal mixed model"):
+        assert f"## {title}" in report
+    assert "Not fitted" not in report
+
+
+def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
+    monkeypatch.delenv("DATABASE_URL", raising=False)
+    monkeypatch.delenv("PALPEBRA_DATA_FOLDER", raising=False)
+    monkeypatch.setenv("PALPEBRA_DATA", str(tmp_path))
+    empty = call("run", "exp3", "--no-report")
+    assert empty.exit_code == 1
+    assert "nothing to analyse: there is no database" in empty.stderr
+    make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=list("abcdef"))
+    found = call("run", "exp3", "--no-report")
+    assert found.exit_code == 0
+    assert "6 participants, from palpebra.sqlite" in found.stdout
+    other = call("run", "exp1", "--no-report")
+    assert other.exit_code == 1
+    assert "'exp1' has no ratings yet" in other.stderr
+
+
+def test_run_of_an_empty_export_exits_1(tmp_path) -> None:
+    result = call("run", "exp3", "--csv", write_export(tmp_path / "e.csv", EXP3, []))
+    assert result.exit_code == 1
+    assert "has a header but no ratings yet" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("run", "exp4"), "did you mean"),
+        (("run", "exp3", "--csv", "nowhere.csv"), "no file nowhere.csv"),
+        (("run", "exp3", "--csv", "a.csv", "--database", "sqlite:///b"), "exclude each other"),
+        (("run", "exp3", "--database", "what"), "is no database URL"),
+        (("check-paper", "nowhere.toml"), "no file"),
+        (("anova", "nowhere.csv", "--participant", "a", "--rating", "b", "--within", "c"), "no file"),
+        (("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", ","), "names no column"),
+        (
+            ("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", "c", "--scale", "7"),
+            "like 1:7",
+        ),
+    ],
+)
+def test_wrong_calls_end_in_one_line_and_exit_2(arguments, message, capsys) -> None:
+    result = call(*arguments)
+    assert isinstance(result.exception, InputError)
+
+    def again() -> None:
+        raise result.exception
+
+    with pytest.raises(SystemExit) as caught:
+        run_command_line(again)
+    assert caught.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: ")
+    assert said.count("\n") == 1
+    assert message in said
+
+
+def test_anova_of_anyones_table(tmp_path) -> None:
+    (tmp_path / "t.csv").write_text(LONG + "8,3,f0,b0\n")
+    columns = ("--participant", "id", "--rating", "y", "--within", "blur,face")
+    result = call("anova", tmp_path / "t.csv", *columns, "--json", tmp_path / "o.json", "--two-factor-pairs")
+    assert result.exit_code == 0, result.output
+    data = json.loads((tmp_path / "o.json").read_text())
+    assert [effect["effect"] for effect in data["effects"]] == ["blur", "face", "blur:face"]
+    assert data["n_participants"] == 8
+    assert data["dropped"][0]["participant"] == "8"
+    assert len(data["dropped"][0]["missing_cells"]) == 5
+    assert {pair["effect"] for pair in data["pairwise"]} == {"blur", "face", "blur:face"}
+    assert len(data["marginal_means"]) == 2 + 3 + 6
+    assert "participant 8 dropped" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "within", "message"),
+    [
+        ("id,y,face\n1,2,a\n1,3,b\n", "face", "at least 2 complete participants, got 1"),
+        ("id,y,face\n1,2,a\n2,3,a\n", "face", "at least 2 levels of 'face', got 1"),
+        ("id,y,face\n1,2,a\n2,3,b\n", "fase", "did you mean 'face'"),
+    ],
+)
+def test_tables_without_a_test_are_refused(tmp_path, text, within, message) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    out = tmp_path / "o.json"
+    result = call(
+        "anova", tmp_path / "t.csv", "--participant", "id", "--rating", "y", "--within", within, "--json", out
+    )
+    assert message in str(result.exception)
+    assert not out.exists()
+
+
+def test_a_folder_that_cannot_hold_the_output_is_refused(tmp_path) -> None:
+    (tmp_path / "t.csv").write_text(LONG)
+    columns = ("--participant", "id", "--rating", "y", "--within", "face")
+    result = call("anova", tmp_path / "t.csv", *columns, "--json", tmp_path / "no" / "o.json")
+    assert "does not exist; make it first" in str(result.exception)
+    result = call("anova", tmp_path / "t.csv", *columns, "--out", tmp_path / "t.csv")
+    assert "cannot make the folder" in str(result.exception)
+
+
+def test_constant_ratings_are_analysed_with_reasons(tmp_path) -> None:
+    (tmp_path / "t.csv").write_text("id,y,f\n1,4,a\n1,4,b\n2,4,a\n2,4,b\n")
+    result = call("anova", tmp_path / "t.csv", "--participant", "id", "--rating", "y", "--within", "f")
+    assert result.exit_code == 0, result.output
+    assert "nothing varies" in " ".join(result.stdout.split())
+    assert "gave one and the same rating" in " ".join(result.stdout.split())
+
+
+def test_check_paper_ships_with_the_papers_figures(tmp_path) -> None:
+    result = call("check-paper", "--json", tmp_path / "f.json")
+    assert result.exit_code == 0
+    assert "6 problems and 8 notes" in result.stdout
+    assert len(json.loads((tmp_path / "f.json").read_text())) == 14
