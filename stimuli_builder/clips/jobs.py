@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 RENDER_VERSION = 1
 """Raise this when the same inputs come to give other pictures; every clip is then built again."""
 
+ROOMY_WIDTH_PX = 1200
+"""Up to this width a process keeps two characters at a time; two at the largest would pass 1.5 GB."""
+
 
 @dataclass(frozen=True)
 class Look:
@@ -74,8 +77,7 @@ def render(job: ClipJob) -> bytes:
     return encode_clip(frames, look.size_px, look.fps)
 
 
-# A process holds one character at a time: two at the largest size would pass 1.5 GB.
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)
 def _painter(
     character: str,
     fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
@@ -89,4 +91,6 @@ def _painter(
 
     # The pool already uses every core.
     cv2.setNumThreads(1)
+    if size_px[0] > ROOMY_WIDTH_PX:
+        _painter.cache_clear()
     return FramePainter(load_levels(character, size_px, beside))

@@ -76,9 +76,9 @@ def _leave_interrupts_to_parent() -> None:
 
 
 def _on_dask(jobs: Sequence[ClipJob], order: list[int], address: str) -> Iterator[tuple[int, bytes]]:
-    with _dask_client(address) as (client, finished):
+    with _dask_client(address) as (client, completed):
         futures = {client.submit(render, jobs[i], pure=False, retries=ROUNDS): i for i in order}
-        for future in finished(list(futures)):
+        for future in completed(list(futures), loop=client.loop):
             index = futures.pop(future)
             content = future.result()
             future.release()
@@ -88,17 +88,17 @@ def _on_dask(jobs: Sequence[ClipJob], order: list[int], address: str) -> Iterato
 @contextmanager
 def _dask_client(address: str) -> Iterator[tuple[Any, Any]]:
     try:
-        from distributed import Client, as_completed
+        import distributed
     except ImportError as error:
         raise InputError("--dask needs the extra 'dask': pip install 'palpebra[dask]'") from error
     try:
-        client = Client(address, timeout="10s", set_as_default=False)
+        client = distributed.Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
             f"no Dask scheduler answers at {address} ({type(error).__name__}); "
             "start one with `dask scheduler`"
         ) from error
     try:
-        yield client, as_completed
+        yield client, distributed.as_completed
     finally:
         client.close()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from experiments.manifest import MANIFEST_NAME, check_files, read_manifest
+from experiments.manifest import MANIFEST_NAME, check_files, file_sha256, read_manifest
 from stimuli_builder.clips import build as build_module
 from stimuli_builder.clips.build import Machines, build
 from stimuli_builder.clips.design_clips import Options, planned_clips
@@ -168,8 +168,9 @@ def test_a_full_disk_ends_in_one_line_and_leaves_no_half_clip(small: Small, tmp_
     assert done.returncode == 2
     assert done.stderr.startswith("error: ")
     assert len(done.stderr.strip().splitlines()) == 1
-    assert not list(out.glob("*.mp4"))
+    assert not (out / MANIFEST_NAME).exists()
     assert not list(out.glob(".*part*"))
+    assert all(file_sha256(clip) == clip.stem for clip in out.glob("*.mp4"))
 
 
 def test_a_folder_that_cannot_be_written_is_named(
