@@ -40,6 +40,13 @@ class CellResult(BaseModel):
     counts: list[int]
 
 
+class TimeBin(BaseModel):
+    """Answers within 250 ms from `start_ms` after the clip's end."""
+
+    start_ms: int
+    answers: int
+
+
 class Playback(BaseModel):
     """How the clips were shown."""
 
@@ -63,5 +70,5 @@ class Results(BaseModel):
     margins: list[Margin]
     cells: list[CellResult]
     clips: list[ClipResult]
-    response_times: list[tuple[int, int]] = Field(description="(start of a 250 ms bin in ms, answers in it).")
+    response_times: list[TimeBin]
     playback: Playback

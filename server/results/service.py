@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from server.models import Study, StudyVersion, VersionClip
 from server.results import repository, summary
-from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results
+from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results, TimeBin
 
 _DELAY_EDGES = [10.0 * step for step in range(11)]
 
@@ -30,7 +30,10 @@ def results(session: Session, study: Study, definition: Experiment, phase: str) 
         margins=margins(means, factors),
         cells=_cells(clips),
         clips=clips,
-        response_times=[(250 * place, n) for place, n in repository.response_times(session, study.id, phase)],
+        response_times=[
+            TimeBin(start_ms=250 * place, answers=n)
+            for place, n in repository.response_times(session, study.id, phase)
+        ],
         playback=_playback(session, study, phase),
     )
 

@@ -38,12 +38,19 @@ class BlockOut(BaseModel):
     trials: int
 
 
-class FactorOut(BaseModel):
-    """A factor and its levels (name, label)."""
+class LevelOut(BaseModel):
+    """A level of a factor."""
 
     name: str
     label: str
-    levels: list[tuple[str, str]]
+
+
+class FactorOut(BaseModel):
+    """A factor and its levels."""
+
+    name: str
+    label: str
+    levels: list[LevelOut]
 
 
 class DesignOut(BaseModel):

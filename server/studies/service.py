@@ -30,6 +30,7 @@ from server.studies.schemas import (
     Checked,
     DesignOut,
     FactorOut,
+    LevelOut,
     LevelsTable,
     NewStudy,
     NewVersion,
@@ -61,7 +62,9 @@ def design_out(experiment: Experiment) -> DesignOut:
         experiment=experiment.name,
         title=experiment.title,
         factors=[
-            FactorOut(name=f.name, label=f.label, levels=[(lv.name, lv.label) for lv in f.levels])
+            FactorOut(
+                name=f.name, label=f.label, levels=[LevelOut(name=lv.name, label=lv.label) for lv in f.levels]
+            )
             for f in experiment.factors
         ],
         cells=len(design.cells(experiment)),

@@ -1686,7 +1686,7 @@ export interface components {
         };
         /**
          * FactorOut
-         * @description A factor and its levels (name, label).
+         * @description A factor and its levels.
          */
         FactorOut: {
             /** Name */
@@ -1694,10 +1694,7 @@ export interface components {
             /** Label */
             label: string;
             /** Levels */
-            levels: [
-                string,
-                string
-            ][];
+            levels: components["schemas"]["LevelOut"][];
         };
         /**
          * FormAnswers
@@ -1798,6 +1795,16 @@ export interface components {
         LanguageChange: {
             /** Language */
             language: string;
+        };
+        /**
+         * LevelOut
+         * @description A level of a factor.
+         */
+        LevelOut: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: string;
         };
         /**
          * LevelsPattern
@@ -2495,14 +2502,8 @@ export interface components {
             cells: components["schemas"]["CellResult"][];
             /** Clips */
             clips: components["schemas"]["ClipResult"][];
-            /**
-             * Response Times
-             * @description (start of a 250 ms bin in ms, answers in it).
-             */
-            response_times: [
-                number,
-                number
-            ][];
+            /** Response Times */
+            response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
         };
         /**
@@ -2828,6 +2829,16 @@ export interface components {
              * Format: date-time
              */
             created_at: string;
+        };
+        /**
+         * TimeBin
+         * @description Answers within 250 ms from `start_ms` after the clip's end.
+         */
+        TimeBin: {
+            /** Start Ms */
+            start_ms: number;
+            /** Answers */
+            answers: number;
         };
         /**
          * Timeline

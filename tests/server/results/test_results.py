@@ -23,7 +23,7 @@ def test_margins_and_distributions_of_a_complete_run(viewer: Admin, participant:
     ]
     assert {mean["mean"] for entry in shown["margins"] for mean in entry["means"]} == {6.0}
     assert all(cell["counts"] == [0, 0, 0, 0, 0, 2, 0] for cell in shown["cells"])
-    assert sum(n for _, n in shown["response_times"]) == 8
+    assert sum(entry["answers"] for entry in shown["response_times"]) == 8
 
 
 def test_excluded_runs_do_not_count(experimenter: Admin, participant: Participant) -> None:

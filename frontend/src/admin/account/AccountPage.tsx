@@ -1,0 +1,17 @@
+import { Stack, Title } from "@mantine/core";
+import { PasswordCard } from "./PasswordCard";
+import { SecondFactorCard } from "./SecondFactorCard";
+import { SessionsCard } from "./SessionsCard";
+import { TokensCard } from "./TokensCard";
+
+export function AccountPage() {
+  return (
+    <Stack maw={760}>
+      <Title order={1}>My account</Title>
+      <SecondFactorCard />
+      <PasswordCard />
+      <SessionsCard />
+      <TokensCard />
+    </Stack>
+  );
+}

@@ -1,0 +1,41 @@
+/** The recorded blinks and the model behind the clips. */
+
+import { Stack, Tabs, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { api, unwrap } from "../api";
+import { Answer } from "../ui/Answer";
+import { ModelSliders } from "./ModelSliders";
+import { Recorded } from "./Recorded";
+
+export function FiguresPage() {
+  const library = useQuery({
+    queryKey: ["library"],
+    queryFn: () => unwrap(api.GET("/api/admin/blinks/library")),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+  return (
+    <Stack>
+      <Title order={1}>Blinks</Title>
+      <Text maw={720}>
+        The blinks that clips are made from: recorded ones, and the PCA model fitted to them. Closure is 0 with the eye
+        open and 1 with it closed, at 300 samples a second.
+      </Text>
+      <Answer of={library}>
+        {(data) => (
+          <Tabs defaultValue="model" keepMounted={false}>
+            <Tabs.List>
+              <Tabs.Tab value="model">Model</Tabs.Tab>
+              <Tabs.Tab value="recorded">Recorded ({data.profiles.length})</Tabs.Tab>
+            </Tabs.List>
+            <Tabs.Panel value="model" pt="md">
+              <ModelSliders library={data} />
+            </Tabs.Panel>
+            <Tabs.Panel value="recorded" pt="md">
+              <Recorded library={data} />
+            </Tabs.Panel>
+          </Tabs>
+        )}
+      </Answer>
+    </Stack>
+  );
+}

@@ -1,0 +1,88 @@
+import { Anchor, Card, Group, Stack, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { Link, useParams } from "@tanstack/react-router";
+import { api, unwrap } from "../api";
+import { useMay } from "../queries";
+import { Answer } from "../ui/Answer";
+import { when } from "../ui/format";
+import { RunActions } from "./RunActions";
+import { TrialTable } from "./TrialTable";
+
+export function TimelinePage() {
+  const { study = "", run = "" } = useParams({ strict: false });
+  const mayChange = useMay("experimenter");
+  const timeline = useQuery({
+    queryKey: ["timeline", study, run],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/runs/{run}", { params: { path: { study, run } } })),
+  });
+  return (
+    <Stack>
+      <Anchor component={Link} to={`/studies/${study}/participants`}>
+        All participants
+      </Anchor>
+      <Answer of={timeline}>
+        {(data) => (
+          <Stack>
+            <Group justify="space-between" align="start">
+              <div>
+                <Title order={2} size="h3">
+                  {data.summary.participant}
+                </Title>
+                <Text size="sm" c="dimmed">
+                  {data.summary.status}, began {when(data.summary.started_at)}, agreed {when(data.consented_at)},{" "}
+                  {data.summary.minutes.toFixed(1)} minutes, language {data.summary.language}, through “
+                  {data.summary.link}”
+                </Text>
+                {data.summary.excluded && <Text c="red">Excluded: {data.summary.exclusion_reason}</Text>}
+              </div>
+              {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} />}
+            </Group>
+            <Group align="start">
+              {data.forms.map((form) => (
+                <Facts key={form.form} title={form.form} values={form.answers} />
+              ))}
+              {data.calibrations.map((one) => (
+                <Facts
+                  key={one.saved_at}
+                  title="Calibration"
+                  values={{ "px per mm": one.px_per_mm.toFixed(2), method: one.method, zoom: one.zoom }}
+                />
+              ))}
+              <Facts title="Device" values={data.device} />
+            </Group>
+            <TrialTable trials={data.trials} />
+            {data.events.length > 0 && (
+              <Card withBorder>
+                <Title order={3} size="h5">
+                  Events
+                </Title>
+                {data.events.map((event, place) => (
+                  <Text size="sm" key={`${event.received_at}${String(place)}`}>
+                    {when(event.received_at)}: {event.type.replaceAll("_", " ")}
+                  </Text>
+                ))}
+              </Card>
+            )}
+          </Stack>
+        )}
+      </Answer>
+    </Stack>
+  );
+}
+
+function Facts({ title, values }: { title: string; values: Record<string, unknown> }) {
+  const entries = Object.entries(values);
+  if (entries.length === 0) return null;
+  return (
+    <Card withBorder padding="sm" maw={420}>
+      <Title order={3} size="h5">
+        {title}
+      </Title>
+      {entries.map(([name, value]) => (
+        <Text size="sm" key={name} className="wrap-anywhere">
+          {name}: {typeof value === "object" ? JSON.stringify(value) : String(value)}
+        </Text>
+      ))}
+    </Card>
+  );
+}

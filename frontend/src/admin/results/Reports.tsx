@@ -1,0 +1,82 @@
+import { Anchor, Badge, Button, Card, Group, Progress, Stack, Switch, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { useMay } from "../queries";
+import { Answer } from "../ui/Answer";
+import { when } from "../ui/format";
+import { useChange } from "../ui/useChange";
+
+export function Reports({ study, phase }: { study: string; phase: "pilot" | "live" }) {
+  const path = { params: { path: { study } } };
+  const [sensitivity, setSensitivity] = useState(true);
+  const mayBuild = useMay("experimenter");
+  const reports = useQuery({
+    queryKey: ["reports", study],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/reports", path)),
+    refetchInterval: (query) => (query.state.data?.some(isUnderWay) ? 1_000 : false),
+  });
+  const build = useChange(
+    () => unwrap(api.POST("/api/admin/studies/{study}/reports", { ...path, body: { phase, sensitivity } })),
+    { touches: [["reports", study]] },
+  );
+  return (
+    <Card withBorder>
+      <Group justify="space-between" mb="sm">
+        <Title order={2} size="h4">
+          Analysis reports
+        </Title>
+        {mayBuild && (
+          <Group>
+            <Switch
+              label="with mixed and ordinal models"
+              checked={sensitivity}
+              onChange={(event) => setSensitivity(event.currentTarget.checked)}
+            />
+            <Button onClick={() => build.mutate(undefined)} loading={build.isPending}>
+              Build a report
+            </Button>
+          </Group>
+        )}
+      </Group>
+      <Answer of={reports}>
+        {(rows) =>
+          rows.length === 0 ? (
+            <Text c="dimmed">None yet.</Text>
+          ) : (
+            <Stack gap="xs">
+              {rows.map((row) => (
+                <Report key={row.id} study={study} report={row} />
+              ))}
+            </Stack>
+          )
+        }
+      </Answer>
+    </Card>
+  );
+}
+
+function isUnderWay(report: Schemas["ReportOut"]): boolean {
+  return report.status === "queued" || report.status === "running";
+}
+
+function Report({ study, report }: { study: string; report: Schemas["ReportOut"] }) {
+  const address = (file: string) => `/api/admin/studies/${study}/reports/${report.id}/${file}`;
+  return (
+    <Group gap="sm">
+      <Badge color={report.status === "failed" ? "red.9" : report.status === "done" ? "teal.9" : "gray.7"}>
+        {report.status}
+      </Badge>
+      <Text size="sm">
+        {when(report.created_at)}, {report.phase}
+      </Text>
+      {isUnderWay(report) && <Progress w={160} value={100 * report.progress} animated aria-label={report.message} />}
+      {report.status === "failed" && <Text size="sm">{report.message}</Text>}
+      {report.files.map((file) => (
+        <Anchor key={file} href={address(file)} target="_blank" rel="noopener" size="sm">
+          {file}
+        </Anchor>
+      ))}
+    </Group>
+  );
+}

@@ -1,0 +1,105 @@
+import { Alert, Card, Group, SegmentedControl, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useParams } from "@tanstack/react-router";
+import { useMemo, useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { Answer } from "../ui/Answer";
+import { PlotFigure } from "../ui/PlotFigure";
+import { ClipResults } from "./ClipResults";
+import { cellPlot, delayPlot, marginPlot, timePlot } from "./plots";
+import { Reports } from "./Reports";
+
+type Phase = "pilot" | "live";
+
+export function ResultsTab() {
+  const { study = "" } = useParams({ strict: false });
+  const [phase, setPhase] = useState<Phase>("live");
+  const results = useQuery({
+    queryKey: ["results", study, phase],
+    queryFn: () =>
+      unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { phase } } })),
+    refetchInterval: 15_000,
+  });
+  return (
+    <Stack>
+      <Group justify="space-between">
+        <SegmentedControl
+          aria-label="Data of"
+          value={phase}
+          onChange={(word) => setPhase(word === "pilot" ? "pilot" : "live")}
+          data={[
+            { value: "live", label: "Live" },
+            { value: "pilot", label: "Pilot" },
+          ]}
+        />
+      </Group>
+      <Answer of={results}>
+        {(data) =>
+          data.ratings === 0 ? (
+            <Text c="dimmed">No ratings yet.</Text>
+          ) : (
+            <Shown study={study} data={data} />
+          )
+        }
+      </Answer>
+      <Reports study={study} phase={phase} />
+    </Stack>
+  );
+}
+
+function Shown({ study, data }: { study: string; data: Schemas["Results"] }) {
+  const singles = data.margins.filter((margin) => margin.factors.length <= 2);
+  const cells = useMemo(() => cellPlot(data), [data]);
+  const times = useMemo(() => timePlot(data), [data]);
+  const delays = useMemo(() => delayPlot(data), [data]);
+  return (
+    <Stack>
+      <Alert variant="light">
+        {data.participants} participants, {data.ratings} ratings. These are means as data arrive, for a look at whether
+        all is well; the analysis is the report below.
+      </Alert>
+      <SimpleGrid cols={{ base: 1, md: 2 }}>
+        {singles.map((margin) => (
+          <MarginCard key={margin.factors.join(":")} margin={margin} data={data} />
+        ))}
+        <Card withBorder>
+          <Title order={2} size="h5">
+            Answers in each cell
+          </Title>
+          <PlotFigure options={cells} label="Distribution of answers in each cell" />
+        </Card>
+        <Card withBorder>
+          <Title order={2} size="h5">
+            Response times from the clip's end
+          </Title>
+          <PlotFigure options={times} label="Histogram of response times" />
+        </Card>
+        <Card withBorder>
+          <Title order={2} size="h5">
+            How clips were shown
+          </Title>
+          <Text size="sm">
+            {Object.entries({ ...data.playback.verdicts, ...data.playback.rules, ...data.playback.methods })
+              .map(([word, count]) => `${word}: ${String(count)}`)
+              .join(", ")}
+          </Text>
+          <PlotFigure options={delays} label="Histogram of the time from key to first frame" />
+        </Card>
+      </SimpleGrid>
+      <ClipResults study={study} data={data} />
+    </Stack>
+  );
+}
+
+function MarginCard({ margin, data }: { margin: Schemas["Margin"]; data: Schemas["Results"] }) {
+  const options = useMemo(() => marginPlot(margin, data), [margin, data]);
+  const title = margin.factors.join(" x ");
+  return (
+    <Card withBorder>
+      <Title order={2} size="h5">
+        {title}
+      </Title>
+      <PlotFigure options={options} label={`Marginal means of ${title} with within-participant error bars`} />
+    </Card>
+  );
+}

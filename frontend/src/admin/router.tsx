@@ -1,0 +1,124 @@
+/** Addresses of the admin site; pages load when they are first opened. */
+
+import { createRootRoute, createRoute, createRouter, lazyRouteComponent, Outlet } from "@tanstack/react-router";
+import { Shell } from "./shell/Shell";
+import { NotFound } from "./ui/NotFound";
+
+const root = createRootRoute({ component: Outlet, notFoundComponent: NotFound });
+
+const signIn = createRoute({
+  getParentRoute: () => root,
+  path: "/sign-in",
+  component: lazyRouteComponent(() => import("./account/SignInPage"), "SignInPage"),
+});
+const invitation = createRoute({
+  getParentRoute: () => root,
+  path: "/invitation",
+  component: lazyRouteComponent(() => import("./account/InvitationPage"), "InvitationPage"),
+});
+
+const inside = createRoute({ getParentRoute: () => root, id: "inside", component: Shell });
+const page = { getParentRoute: () => inside };
+const studies = createRoute({
+  ...page,
+  path: "/",
+  component: lazyRouteComponent(() => import("./studies/StudiesPage"), "StudiesPage"),
+});
+const create = createRoute({
+  ...page,
+  path: "/studies/new",
+  component: lazyRouteComponent(() => import("./studies/CreatePage"), "CreatePage"),
+});
+const account = createRoute({
+  ...page,
+  path: "/account",
+  component: lazyRouteComponent(() => import("./account/AccountPage"), "AccountPage"),
+});
+const people = createRoute({
+  ...page,
+  path: "/people",
+  component: lazyRouteComponent(() => import("./people/PeoplePage"), "PeoplePage"),
+});
+const audit = createRoute({
+  ...page,
+  path: "/audit",
+  component: lazyRouteComponent(() => import("./people/AuditPage"), "AuditPage"),
+});
+const figures = createRoute({
+  ...page,
+  path: "/blinks",
+  component: lazyRouteComponent(() => import("./figures/FiguresPage"), "FiguresPage"),
+});
+
+const study = createRoute({
+  ...page,
+  path: "/studies/$study",
+  component: lazyRouteComponent(() => import("./studies/StudyLayout"), "StudyLayout"),
+});
+const tab = { getParentRoute: () => study };
+const tabs = [
+  createRoute({
+    ...tab,
+    path: "/",
+    component: lazyRouteComponent(() => import("./studies/DesignTab"), "DesignTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/texts",
+    component: lazyRouteComponent(() => import("./studies/TextsTab"), "TextsTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/clips",
+    component: lazyRouteComponent(() => import("./studies/ClipsTab"), "ClipsTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/links",
+    component: lazyRouteComponent(() => import("./studies/LinksTab"), "LinksTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/monitor",
+    component: lazyRouteComponent(() => import("./monitor/MonitorTab"), "MonitorTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/results",
+    component: lazyRouteComponent(() => import("./results/ResultsTab"), "ResultsTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/data",
+    component: lazyRouteComponent(() => import("./data/DataTab"), "DataTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/participants",
+    component: lazyRouteComponent(() => import("./participants/ParticipantsTab"), "ParticipantsTab"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/participants/$run",
+    component: lazyRouteComponent(() => import("./participants/TimelinePage"), "TimelinePage"),
+  }),
+  createRoute({
+    ...tab,
+    path: "/settings",
+    component: lazyRouteComponent(() => import("./studies/SettingsTab"), "SettingsTab"),
+  }),
+];
+
+const tree = root.addChildren([
+  signIn,
+  invitation,
+  inside.addChildren([studies, create, account, people, audit, figures, study.addChildren(tabs)]),
+]);
+
+export const router = createRouter({ routeTree: tree, basepath: "/admin", defaultPreload: "intent" });
+
+declare module "@tanstack/react-router" {
+  interface Register {
+    router: typeof router;
+  }
+}

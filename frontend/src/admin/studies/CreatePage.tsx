@@ -1,0 +1,39 @@
+import { Stack, Tabs, TextInput, Title } from "@mantine/core";
+import { useState } from "react";
+import { FromDefinition } from "./FromDefinition";
+import { FromOwnClips } from "./FromOwnClips";
+import { FromShipped } from "./FromShipped";
+
+export function CreatePage() {
+  const [name, setName] = useState("");
+  const wrong = name !== "" && !/^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$/.test(name);
+  return (
+    <Stack maw={900}>
+      <Title order={1}>New study</Title>
+      <TextInput
+        label="Short name"
+        description="Letters, digits, - and _: it names the study in addresses and files."
+        value={name}
+        error={wrong ? "Expected letters, digits, - and _ only, at most 60." : null}
+        onChange={(event) => setName(event.currentTarget.value)}
+        maw={400}
+      />
+      <Tabs defaultValue="shipped" keepMounted={false}>
+        <Tabs.List>
+          <Tabs.Tab value="shipped">From a shipped experiment</Tabs.Tab>
+          <Tabs.Tab value="clips">From your own clips</Tabs.Tab>
+          <Tabs.Tab value="definition">From a definition (TOML)</Tabs.Tab>
+        </Tabs.List>
+        <Tabs.Panel value="shipped" pt="md">
+          <FromShipped name={wrong ? "" : name} />
+        </Tabs.Panel>
+        <Tabs.Panel value="clips" pt="md">
+          <FromOwnClips name={wrong ? "" : name} />
+        </Tabs.Panel>
+        <Tabs.Panel value="definition" pt="md">
+          <FromDefinition name={wrong ? "" : name} />
+        </Tabs.Panel>
+      </Tabs>
+    </Stack>
+  );
+}

@@ -1,0 +1,63 @@
+/** What a definition expands to: factors, cells, blocks, minutes. */
+
+import { Badge, Card, Group, SimpleGrid, Stack, Table, Text, Title } from "@mantine/core";
+import type { Schemas } from "../api";
+
+export function Design({ design }: { design: Schemas["DesignOut"] }) {
+  const figures: [string, string | number][] = [
+    ["cells", design.cells],
+    ["clips a cell", design.exemplars],
+    ["clips", design.unique_clips],
+    ["trials a participant", design.trials_per_participant],
+    ["expected minutes", design.expected_minutes.toFixed(0)],
+  ];
+  return (
+    <Stack>
+      <SimpleGrid cols={{ base: 2, sm: 5 }}>
+        {figures.map(([label, value]) => (
+          <Card withBorder key={label} padding="sm">
+            <Text size="xl" fw={600} className="number">
+              {value}
+            </Text>
+            <Text size="sm" c="dimmed">
+              {label}
+            </Text>
+          </Card>
+        ))}
+      </SimpleGrid>
+      <Title order={2} size="h4">
+        Factors
+      </Title>
+      <Table>
+        <Table.Tbody>
+          {design.factors.map((factor) => (
+            <Table.Tr key={factor.name}>
+              <Table.Th scope="row" w="30%">
+                {factor.label}
+              </Table.Th>
+              <Table.Td>
+                <Group gap={6}>
+                  {factor.levels.map(({ name, label }) => (
+                    <Badge key={name} variant="default" tt="none" title={name}>
+                      {label}
+                    </Badge>
+                  ))}
+                </Group>
+              </Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+      <Title order={2} size="h4">
+        Blocks
+      </Title>
+      <Group gap={6}>
+        {design.blocks.map((block, place) => (
+          <Badge key={`${block.label}-${String(place)}`} variant="default" tt="none">
+            {block.label}: {block.trials} trials
+          </Badge>
+        ))}
+      </Group>
+    </Stack>
+  );
+}

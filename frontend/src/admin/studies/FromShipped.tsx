@@ -1,0 +1,46 @@
+import { Alert, Button, Card, Group, SimpleGrid, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { api, unwrap } from "../api";
+import { Answer } from "../ui/Answer";
+import { useCreate } from "./useCreate";
+
+export function FromShipped({ name }: { name: string }) {
+  const shipped = useQuery({
+    queryKey: ["experiments"],
+    queryFn: () => unwrap(api.GET("/api/admin/experiments")),
+  });
+  const create = useCreate();
+  return (
+    <Answer of={shipped}>
+      {(experiments) => (
+        <SimpleGrid cols={{ base: 1, sm: 3 }}>
+          {experiments.map((experiment) => (
+            <Card withBorder key={experiment.name}>
+              <Title order={2} size="h4">
+                {experiment.title}
+              </Title>
+              <Text size="sm" c="dimmed" mb="md">
+                {experiment.name}
+              </Text>
+              {experiment.clips_ready ? (
+                <Group mt="auto">
+                  <Button
+                    disabled={name === ""}
+                    loading={create.isPending}
+                    onClick={() => create.mutate({ name, shipped: experiment.name })}
+                  >
+                    Create
+                  </Button>
+                </Group>
+              ) : (
+                <Alert color="yellow">
+                  Its clips are not built on this server. Run <code>make run</code>, or upload them.
+                </Alert>
+              )}
+            </Card>
+          ))}
+        </SimpleGrid>
+      )}
+    </Answer>
+  );
+}

@@ -1,0 +1,53 @@
+import { Button, Group } from "@mantine/core";
+import { api, type Schemas, unwrap } from "../api";
+import { ConfirmButton } from "../ui/ConfirmButton";
+import { useChange } from "../ui/useChange";
+
+type Status = Schemas["StudySummary"]["status"];
+const NEXT: Record<Status, Status[]> = {
+  draft: ["pilot", "live"],
+  pilot: ["draft", "live", "closed"],
+  live: ["closed"],
+  closed: ["live"],
+};
+const WORDS: Record<Status, [label: string, question: string]> = {
+  draft: ["Back to draft", "Participants can no longer begin; pilot data stay."],
+  pilot: ["Open as pilot", "Participants can begin; their data are marked as pilot."],
+  live: ["Set live", "Participants can begin and their data count. Changes from now on make new versions."],
+  closed: ["Close", "Nobody can begin any more; those under way may finish."],
+};
+
+export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
+  const path = { params: { path: { study: summary.name } } };
+  const change = useChange(
+    (status: Status) =>
+      unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
+    { touches: [["study", summary.name], ["studies"]], done: "The status is changed." },
+  );
+  const preview = useChange(
+    () =>
+      unwrap(
+        api.POST("/api/admin/studies/{study}/links", {
+          ...path,
+          body: { kind: "preview", label: "preview", labels: [], count: 1, days: 1 },
+        }),
+      ),
+    { touches: [], then: ([link]) => link && window.open(link.url, "_blank", "noopener") },
+  );
+  return (
+    <Group gap="xs">
+      <Button variant="default" onClick={() => preview.mutate(undefined)} loading={preview.isPending}>
+        Preview as a participant
+      </Button>
+      {NEXT[summary.status].map((status) => (
+        <ConfirmButton
+          key={status}
+          label={WORDS[status][0]}
+          question={WORDS[status][1]}
+          confirm={WORDS[status][0]}
+          onConfirm={() => change.mutate(status)}
+        />
+      ))}
+    </Group>
+  );
+}
