@@ -44,12 +44,13 @@ class FaultProxy:
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
-        self._loop.run_until_complete(asyncio.start_server(self._serve, "localhost", self.port))
+        listening = self._loop.run_until_complete(asyncio.start_server(self._serve, "localhost", self.port))
         self._ready.set()
         self._loop.run_forever()
+        listening.close()
         for task in asyncio.all_tasks(self._loop):
             task.cancel()
-        self._loop.run_until_complete(asyncio.sleep(0.05))
+        self._loop.run_until_complete(asyncio.sleep(0.1))
         self._loop.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -105,7 +106,9 @@ class FaultProxy:
 async def _read_request(reader: asyncio.StreamReader) -> bytes:
     """One request with its body, told to close the connection after it."""
     head = await reader.readuntil(HEAD_END)
-    lines = [line for line in head[: -len(HEAD_END)].split(b"\r\n") if not line.lower().startswith(b"connection:")]
+    lines = [
+        line for line in head[: -len(HEAD_END)].split(b"\r\n") if not line.lower().startswith(b"connection:")
+    ]
     sizes = [int(line.split(b":")[1]) for line in lines if line.lower().startswith(b"content-length:")]
     body = await reader.readexactly(sizes[0]) if sizes else b""
     return b"\r\n".join([*lines, b"Connection: close"]) + HEAD_END + body

@@ -19,7 +19,7 @@ from server.settings import Settings
 from server.studies.links import LinkKind
 from tests.helpers.studies import StudyInDatabase, add_study
 
-START_LIMIT_S = 60.0
+START_LIMIT_S = 240.0
 
 
 def free_port() -> int:
@@ -57,6 +57,15 @@ class ServerProcess:
         """What an SQL query gives on the server's database."""
         with migrated_services(self.settings) as services, services.database.read() as session:
             return [dict(row) for row in session.execute(text(statement)).mappings()]
+
+    def rows_soon(self, statement: str, count: int, limit_s: float = 30.0) -> list[dict[str, Any]]:
+        """As `rows`, after waiting until there are `count`: the page sends while the participant goes on."""
+        limit = time.monotonic() + limit_s
+        found = self.rows(statement)
+        while len(found) < count and time.monotonic() < limit:
+            time.sleep(0.2)
+            found = self.rows(statement)
+        return found
 
     def start(self) -> "ServerProcess":
         environment = os.environ | {

@@ -26,13 +26,16 @@ FULL = os.environ.get("PALPEBRA_FAULTS") == "full"
 PARTICIPANTS, TRIALS = 26, 80
 OFFLINE_S = 120.0 if FULL else 6.0
 SHARE = 0.1
-MANY = without(
-    PLAIN,
-    ("per_cell = 3", "per_cell = 5"),
-    ('split_by = "character"', "repeats = 8"),
-    ("trials = 1", "trials = 0"),
-    ('order = "fixed"', 'order = "random"'),
-).split("[[forms]]")[0] + PLAIN[PLAIN.index("[texts.en]") :]
+MANY = (
+    without(
+        PLAIN,
+        ("per_cell = 3", "per_cell = 5"),
+        ('split_by = "character"', "repeats = 8"),
+        ("trials = 1", "trials = 0"),
+        ('order = "fixed"', 'order = "random"'),
+    ).split("[[forms]]")[0]
+    + PLAIN[PLAIN.index("[texts.en]") :]
+)
 
 
 @pytest.fixture
@@ -40,7 +43,17 @@ def driver(tmp_path: Path) -> Path:
     """The participants' program, built from the page's own sources."""
     if not (REPOSITORY / "frontend" / "node_modules").is_dir():
         pytest.skip("the frontend's packages are not installed: run `make setup-test`")
-    command = ["npx", "vite", "build", "--logLevel", "error", "--ssr", "tests/faults/driver.ts", "--outDir", str(tmp_path / "driver")]
+    command = [
+        "npx",
+        "vite",
+        "build",
+        "--logLevel",
+        "error",
+        "--ssr",
+        "tests/faults/driver.ts",
+        "--outDir",
+        str(tmp_path / "driver"),
+    ]
     subprocess.run(command, cwd=REPOSITORY / "frontend", check=True, timeout=120)
     return next((tmp_path / "driver").glob("driver.*js"))
 
@@ -79,10 +92,17 @@ def test_nothing_acknowledged_is_lost_and_nothing_is_stored_twice(
         proxy.stop()
     assert code == 0, (tmp_path / "driver.log").read_text()[-3000:]
     told = json.loads(out.read_text())
-    compare(told, server.rows("SELECT t.*, r.public_id AS run FROM trial_ratings t JOIN study_runs r ON r.id = t.study_run_id"))
+    compare(
+        told,
+        server.rows(
+            "SELECT t.*, r.public_id AS run FROM trial_ratings t JOIN study_runs r ON r.id = t.study_run_id"
+        ),
+    )
     assert {row["status"] for row in server.rows("SELECT status FROM study_runs")} == {"complete"}
     counts = {name: proxy.counts[name] for name in sorted(proxy.counts)}
-    print(f"\n{told['given']} ratings, {len(kills)} kills, {told['reloads']} reloads, {OFFLINE_S:.0f} s offline, {counts}")
+    print(
+        f"\n{told['given']} ratings, {len(kills)} kills, {told['reloads']} reloads, {OFFLINE_S:.0f} s offline, {counts}"
+    )
     assert len(kills) >= 3
 
 
@@ -95,7 +115,11 @@ def compare(told: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     assert lost == []
     for one in acknowledged.values():
         row = stored[one["rating_id"]]
-        assert (row["run"], row["trial_index"], row["response"]) == (one["run_id"], one["trial_index"], one["response"])
+        assert (row["run"], row["trial_index"], row["response"]) == (
+            one["run_id"],
+            one["trial_index"],
+            one["response"],
+        )
     assert len({(row["run"], row["trial_index"], row["play"]) for row in rows}) == len(rows)
     assert len(rows) == len(acknowledged) == PARTICIPANTS * TRIALS >= 2_000
 

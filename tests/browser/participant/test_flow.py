@@ -16,7 +16,9 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.mark.slow
-def test_every_screen_is_accessible_and_the_ratings_arrive(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+def test_every_screen_is_accessible_and_the_ratings_arrive(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
     study = server.add_study(tmp_path / "clips", STUDY)
     server.start()
     found: dict[str, list[str]] = {}
@@ -56,7 +58,9 @@ def test_reading_at_200_percent_needs_no_sideways_scrolling(
     # 1280 x 800 at 200% zoom is a window of 640 x 400 CSS pixels with two device pixels each.
     study = server.add_study(tmp_path / "clips", STUDY)
     server.start()
-    context = chromium.new_context(viewport={"width": 640, "height": 400}, device_scale_factor=2, locale="en-GB")
+    context = chromium.new_context(
+        viewport={"width": 640, "height": 400}, device_scale_factor=2, locale="en-GB"
+    )
     page = context.new_page()
     wide: dict[str, int] = {}
     measure = "document.documentElement.scrollWidth - innerWidth"
@@ -91,13 +95,16 @@ def test_by_touch_and_in_german(server: ServerProcess, tmp_path: Path, chromium:
     page.wait_for_selector(".scale")
     page.tap(".key >> nth=6")
     page.wait_for_selector(".feedback")
+    page.tap(".below .primary")
+    assert [row["response"] for row in server.rows_soon("SELECT response FROM ratings", 1)] == [7]
     assert page.evaluate("document.documentElement.lang") == "de"
     context.close()
-    assert [row["response"] for row in server.rows("SELECT response FROM ratings")] == [7]
 
 
 def test_confirming_changing_and_commenting(server: ServerProcess, tmp_path: Path, page: Page) -> None:
-    declared = without(PLAIN, ('kind = "clip_rating"', 'kind = "clip_rating"\nconfirm = true\ncomment = true\nviews = 2'))
+    declared = without(
+        PLAIN, ('kind = "clip_rating"', 'kind = "clip_rating"\nconfirm = true\ncomment = true\nviews = 2')
+    )
     study = server.add_study(tmp_path / "clips", declared)
     server.start()
     visit = Visit(page, server.address).open(study.link_token).begin().instructions()
@@ -114,14 +121,19 @@ def test_confirming_changing_and_commenting(server: ServerProcess, tmp_path: Pat
     page.fill("textarea", "the lid moved 3 times")
     page.click(".primary")
     page.wait_for_selector(".feedback")
-    row = server.rows("SELECT * FROM ratings")[0]
+    page.click(".below .primary")
+    row = server.rows_soon("SELECT * FROM ratings", 1)[0]
     assert (row["response"], row["changes"], row["comment"]) == (6, 1, "the lid moved 3 times")
     assert row["frames_drawn"] == 16
     assert visit.problems == []
 
 
-def test_right_to_left_turns_the_page_and_the_scale(server: ServerProcess, tmp_path: Path, page: Page) -> None:
-    arabic = PLAIN.replace('languages = ["en", "de"]', 'languages = ["ar"]').replace("[texts.en]", "[texts.ar]")
+def test_right_to_left_turns_the_page_and_the_scale(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    arabic = PLAIN.replace('languages = ["en", "de"]', 'languages = ["ar"]').replace(
+        "[texts.en]", "[texts.ar]"
+    )
     study = server.add_study(tmp_path / "clips", arabic)
     server.start()
     Visit(page, server.address).open(study.link_token)
@@ -148,7 +160,12 @@ def test_a_failed_clip_is_shown_again_at_the_end_of_its_block(
     visit.trials()
     assert visit.problems == []
     rows = server.rows("SELECT * FROM ratings WHERE kind = 'main' ORDER BY time_elapsed")
-    assert [(row["play"], row["verdict"]) for row in rows[:4]] == [(1, "failed"), (1, "good"), (1, "good"), (2, "good")]
+    assert [(row["play"], row["verdict"]) for row in rows[:4]] == [
+        (1, "failed"),
+        (1, "good"),
+        (1, "good"),
+        (2, "good"),
+    ]
     assert rows[0]["trial_index"] == rows[3]["trial_index"]
     assert (rows[0]["response"], rows[3]["response"]) == (3, 4)
     assert len(rows) == 7

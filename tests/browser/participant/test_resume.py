@@ -23,7 +23,9 @@ def started(server: ServerProcess, folder: Path, page: Page, kind: str = "genera
     return visit, link
 
 
-def test_a_reload_goes_on_at_the_next_unanswered_trial(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+def test_a_reload_goes_on_at_the_next_unanswered_trial(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
     visit, link = started(server, tmp_path / "clips", page)
     visit.trials(most=2)
     page.wait_for_selector(".ready")
@@ -47,12 +49,14 @@ def test_offline_answers_are_kept_and_sent_later(server: ServerProcess, tmp_path
     assert server.rows(RATED) == []
     page.context.set_offline(False)
     visit.trials()
-    assert len(server.rows(RATED)) == 6
+    assert len(server.rows_soon(RATED, 6)) == 6
     types = {row["type"] for row in server.rows("SELECT type FROM run_events")}
     assert {"offline", "online"} <= types
 
 
-def test_the_server_dies_while_the_page_is_reloaded(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+def test_the_server_dies_while_the_page_is_reloaded(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
     visit, link = started(server, tmp_path / "clips", page)
     visit.trials(most=1)
     page.wait_for_selector(".ready")

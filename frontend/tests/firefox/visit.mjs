@@ -1,0 +1,59 @@
+// A whole visit in a real Firefox, by WebDriver BiDi: node visit.mjs FIREFOX ADDRESS_OF_THE_LINK
+// Playwright cannot drive Firefox as distributions build it; puppeteer-core can.
+import puppeteer from "puppeteer-core";
+
+const [firefox, address] = process.argv.slice(2);
+const browser = await puppeteer.launch({ browser: "firefox", executablePath: firefox, headless: true });
+const page = await browser.newPage();
+const problems = [];
+page.on("pageerror", (error) => problems.push(String(error)));
+page.setDefaultTimeout(60_000);
+
+const see = (selector) => page.waitForSelector(selector, { visible: true });
+const press = async (selector) => {
+  await see(selector);
+  await page.click(selector);
+};
+const gone = (handle) => page.waitForFunction((element) => !element.isConnected, {}, handle);
+
+async function rate(key) {
+  await see(".ready");
+  await page.keyboard.press(" ");
+  const scale = await see(".scale");
+  await page.keyboard.press(key);
+  await gone(scale);
+}
+
+try {
+  await page.goto(address);
+  await press(".primary");
+  await press(".page > .tick");
+  await press(".primary");
+  await see("input.short");
+  await page.type("input.short", "34");
+  await page.click("input[value=normal]");
+  await press(".primary");
+  await see(".prose ol");
+  await press(".actions .primary");
+  await page.waitForFunction(() => document.body.textContent.includes("not part of the study"));
+  await press(".actions .primary");
+  await rate("5");
+  await see(".feedback");
+  await press(".below .primary");
+  await page.waitForFunction(() => document.body.textContent.includes("That was the practice"));
+  await press(".actions .primary");
+  for (;;) {
+    const found = await see(".ready, .break, form, .code");
+    const name = await found.evaluate((element) => element.className || element.tagName);
+    if (name.includes("code")) break;
+    if (name.includes("ready")) await rate("6");
+    else {
+      await press(".primary:enabled");
+      await gone(found);
+    }
+  }
+  const code = await page.$eval(".code output", (element) => element.textContent);
+  console.log(JSON.stringify({ code, problems, version: await browser.version() }));
+} finally {
+  await browser.close();
+}
