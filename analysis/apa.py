@@ -24,7 +24,7 @@ def _sentence(analysis: Analysis, effect: Effect, multivariate: bool) -> str:
         return f"The {kind} {name} could not be tested: {effect.univariate_reason}."
     verdict = "was significant" if p < SIGNIFICANCE else "was not significant"
     sentence = f"The {kind} {name} {verdict}, {_statistics(effect, multivariate)}."
-    return sentence + (_direction(analysis, effect) if len(effect.factors) == 1 else "")
+    return sentence + (_direction(analysis, effect, p < SIGNIFICANCE) if len(effect.factors) == 1 else "")
 
 
 def _p(effect: Effect, multivariate: bool) -> float:
@@ -54,13 +54,15 @@ def _corrected(effect: Effect) -> str:
     return f"F({df}) = {fixed(u.f_value)}, {apa_p(u.p_gg)}, Greenhouse-Geisser ε = {share(u.epsilon_gg, 2)}"
 
 
-def _direction(analysis: Analysis, effect: Effect) -> str:
+def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:
     factor = effect.factors[0]
     means = sorted((m for m in analysis.means if m.effect == factor), key=lambda m: -m.mean)
     said = [
         f"{analysis.labels.level(factor, m.levels[factor])} (M = {fixed(m.mean)}, SE = {fixed(m.se)})"
         for m in means
     ]
+    if not differs:
+        return f" Means: {', '.join(said)}."
     if len(said) == 2:
         return (
             f" Ratings were {fixed(means[0].mean - means[1].mean)} higher for {said[0]} than for {said[1]}."
