@@ -68,8 +68,8 @@ SEPTIC_ONSET = float(np.interp(ONSET, _septic(np.linspace(0, 1, 4001)), np.linsp
 def _recovery(t: Values, up_s: float) -> Values:
     """Reopening, 0 to 1: a fast part and a slow tail, 95% reached after `up_s`."""
     slow_s = up_s / np.log((1 - FAST_SHARE) / (1 - SETTLED))
-    rise = _septic(t / (0.5 * up_s))
-    tail = (1 - np.exp(-np.maximum(t, 0) / slow_s)) * _septic(t / (0.12 * up_s))
+    rise = _septic(t / (0.84 * up_s))
+    tail = (1 - np.exp(-np.maximum(t, 0) / slow_s)) * _septic(t / (0.6 * up_s))
     return np.asarray(FAST_SHARE * rise + (1 - FAST_SHARE) * tail)
 
 

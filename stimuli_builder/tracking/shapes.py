@@ -63,14 +63,14 @@ def inter_eyelid_distances(points: Points, markers: LidMarkers) -> NDArray[np.fl
 
     Returns
     -------
-    (eyes,) array in pixels, image-left eye first. Zero where the markers meet; a little below zero where
-    the upper marker passes the lower one (see docs/decisions/0101).
+    (eyes,) array in pixels, image-left eye first. Zero where the markers meet or the upper one passes the
+    lower one (see docs/decisions/0101).
     """
     distances = []
     for number, (upper, lower) in enumerate(zip(markers.upper, markers.lower, strict=True)):
         _, down, _ = eye_axis(points[EYE_POINTS * number : EYE_POINTS * (number + 1)])
         distances.append((points[list(lower)].mean(0) - points[list(upper)].mean(0)) @ down)
-    return np.array(distances)
+    return np.maximum(distances, 0.0)
 
 
 def with_border(points: Points) -> Points:

@@ -10,7 +10,6 @@ from experiments.errors import InputError
 from stimuli_builder.actor.face import EYE_WIDTH_PX, eye_landmarks, landmarks, lid_distances
 from stimuli_builder.actor.physiology import blink_closure, course, plan_blinks
 from stimuli_builder.actor.recording import Actor, ActorOptions, choose_frames, label_points, truth_header
-from stimuli_builder.actor.renderer import IRIS_RADIUS
 from stimuli_builder.cli import main
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.shapes import default_markers, inter_eyelid_distances
@@ -85,18 +84,23 @@ def test_the_same_seed_gives_the_same_frames_and_another_does_not(actor):
     assert not np.array_equal(again.frame(1)[0], other.frame(1)[0])
 
 
-def test_truth_lies_where_the_picture_shows_the_lids():
-    """Across the upper lid margin of an open eye the picture changes from lid to eyeball at the truth."""
-    actor = Actor(ActorOptions(seconds=0.2, fps=100, seed=5, noise=0))
-    picture = actor.frame(0)[0].astype(float)
-    points = landmarks(actor.course.closure[0], actor.course.head[0])
-    column, row = np.round(points[7]).astype(int)
-    profile = picture[row - 6 : row + 7, column - 1 : column + 2].mean(1)
-    steepest = row - 6 + 0.5 + np.abs(np.diff(profile)).argmax()
-    assert abs(steepest - points[7, 1]) < 2.5
-    iris = points[[2, 3, 7]].mean(0)
-    assert picture[int(iris[1]), int(iris[0])] < 90
-    assert IRIS_RADIUS * EYE_WIDTH_PX > 10
+def test_truth_lies_where_the_picture_shows_the_eye():
+    """Between open and closed the picture changes inside the true outline, and not below the lower lid."""
+    actor = Actor(ActorOptions(seconds=1.2, fps=50, seed=5, noise=0))
+    closure = actor.course.closure.mean(1)
+    shut, rest = int(closure.argmax()), int(np.abs(closure).argmin())
+    changes = []
+    for number in (rest, shut):
+        picture = actor.frame(number)[0].astype(float)
+        points = landmarks(np.zeros(2), actor.course.head[number])
+        middle, below = points[[2, 3, 7]].mean(0), points[7] + [0, 0.3 * EYE_WIDTH_PX]
+        changes.append(
+            [picture[int(y) - 2 : int(y) + 3, int(x) - 2 : int(x) + 3].mean() for x, y in (middle, below)]
+        )
+    inside, outside = np.abs(np.diff(changes, axis=0))[0]
+    assert closure[shut] > 0.9
+    assert inside > 40
+    assert outside < 12
 
 
 def test_course_is_the_same_however_finely_it_is_sampled():

@@ -102,7 +102,7 @@ def test_a_video_without_a_face(refused, recording, tmp_path, stimuli):
 
 
 def test_variable_frame_rate_is_refused_or_accepted_by_name(refused, recording, tmp_path, stimuli):
-    stamps = np.cumsum([0] + [5, 5, 20] * 66)[:200]
+    stamps = np.cumsum([0] + [5, 5, 20] * 67)[:200]
     path = tmp_path / "variable.mp4"
     write_frames(path, recording.pictures[:200], stamps)
     assert "variable frame rate, steps of 5.0 to 20.0 ms" in refused(path)
