@@ -1,4 +1,4 @@
-"""A bad network: a small HTTP proxy that drops, doubles, delays and reorders requests, or is off altogether."""
+"""A bad network: a small HTTP proxy that drops, doubles, delays and reorders requests, or is off."""
 
 import asyncio
 import contextlib

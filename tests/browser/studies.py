@@ -55,7 +55,7 @@ label = { en = "Your eyesight at this screen", de = "Ihre Sehkraft an diesem Bil
 required = true
 options = [
     { value = "normal", label = { en = "Normal without glasses", de = "Normal ohne Brille" } },
-    { value = "corrected", label = { en = "Normal with glasses or lenses", de = "Normal mit Brille oder Linsen" } },
+    { value = "corrected", label = { en = "Normal with glasses", de = "Normal mit Brille" } },
 ]
 [[forms.fields]]
 type = "likert"
@@ -86,8 +86,8 @@ options = [
 consent = '''
 # How natural does this blink look?
 
-You are invited to a study on how people see eye blinks. You will watch very short clips of a pair of eyes and say
-how natural each blink looks.
+You are invited to a study on how people see eye blinks. You will watch very short clips of a pair of eyes and
+say how natural each blink looks.
 
 - Taking part is voluntary. You can stop at any time by closing the page.
 - We store your answers and how the clips were shown. We store neither your name nor your internet address.

@@ -4,6 +4,7 @@ PALPEBRA_FAULTS=full is the long run: the two minutes without a connection of th
 """
 
 import json
+import logging
 import os
 import random
 import subprocess
@@ -22,6 +23,7 @@ from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
+LOG = logging.getLogger(__name__)
 FULL = os.environ.get("PALPEBRA_FAULTS") == "full"
 PARTICIPANTS, TRIALS = 26, 80
 OFFLINE_S = 120.0 if FULL else 6.0
@@ -99,10 +101,8 @@ def test_nothing_acknowledged_is_lost_and_nothing_is_stored_twice(
         ),
     )
     assert {row["status"] for row in server.rows("SELECT status FROM study_runs")} == {"complete"}
-    counts = {name: proxy.counts[name] for name in sorted(proxy.counts)}
-    print(
-        f"\n{told['given']} ratings, {len(kills)} kills, {told['reloads']} reloads, {OFFLINE_S:.0f} s offline, {counts}"
-    )
+    figures = (told["given"], len(kills), told["reloads"], OFFLINE_S, dict(proxy.counts))
+    LOG.info("%d ratings, %d kills, %d reloads, %.0f s offline, %s", *figures)
     assert len(kills) >= 3
 
 

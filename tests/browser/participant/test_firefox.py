@@ -1,6 +1,7 @@
 """The whole visit in a real Firefox."""
 
 import json
+import logging
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,6 +13,7 @@ from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN
 
 pytestmark = [pytest.mark.firefox, pytest.mark.slow]
+LOG = logging.getLogger(__name__)
 FRAMES = 30
 
 
@@ -32,9 +34,7 @@ def test_a_whole_visit(server: ServerProcess, tmp_path: Path) -> None:
     assert told["code"]
     assert told["problems"] == []
     rows = server.rows("SELECT * FROM ratings WHERE kind = 'main' AND play = 1")
-    print(
-        f"\n{told['version']}: {[(r['method'], r['verdict'], r['frames_missing'], r['key_to_first_frame_ms']) for r in rows]}"
-    )
+    LOG.info("%s: %s", told["version"], [(r["method"], r["verdict"], r["frames_missing"]) for r in rows])
     assert [row["response"] for row in rows] == [6] * 6
     assert all(row["key_to_first_frame_ms"] is not None for row in rows)
     assert {row["run_status"] for row in rows} == {"complete"}

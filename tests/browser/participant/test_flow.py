@@ -141,7 +141,9 @@ def test_right_to_left_turns_the_page_and_the_scale(
     page.click(".primary")
     page.wait_for_selector(".page > .tick")
     box, text = page.locator(".tick input").bounding_box(), page.locator(".tick span").bounding_box()
-    assert box is not None and text is not None and box["x"] > text["x"]
+    assert box is not None
+    assert text is not None
+    assert box["x"] > text["x"]
     assert axe_violations(page) == []
 
 

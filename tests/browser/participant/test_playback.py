@@ -4,6 +4,7 @@ PALPEBRA_PLAYS=full is the measurement of the issue's text: 50 plays of 45 frame
 """
 
 import json
+import logging
 import os
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
+LOG = logging.getLogger(__name__)
 FULL = os.environ.get("PALPEBRA_PLAYS") == "full"
 PLAYS, FRAMES = (50, 45) if FULL else (10, 30)
 REPEATS = PLAYS // 10
@@ -94,7 +96,7 @@ def report(load: str, rows: list[dict[str, Any]]) -> None:
     first = sorted(row["key_to_first_frame_ms"] for row in rows)
     gaps = [row["longest_gap_ms"] for row in rows]
     missing, late = sum(row["frames_missing"] for row in rows), sum(row["frames_late"] for row in rows)
-    print(
-        f"\n{load}: {len(rows)} plays, {missing} frames missing, {late} late, longest gap {max(gaps):.0f} ms, "
-        f"key to first frame median {first[len(first) // 2]:.1f} ms, largest {first[-1]:.1f} ms"
+    figures = (load, len(rows), missing, late, max(gaps), first[len(first) // 2], first[-1])
+    LOG.info(
+        "%s: %d plays, %d missing, %d late, longest gap %.0f ms, key to frame %.1f (most %.1f) ms", *figures
     )

@@ -1,0 +1,128 @@
+"""Every page of the admin site, opened in a real browser: it shows what it should, axe finds nothing, no
+complaint reaches the console (a blocked style or script would), in light and dark, wide and narrow."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.admin.conftest import Dashboard
+
+pytestmark = pytest.mark.browser
+PAGES = {
+    "studies": ("/", "A short study"),
+    "new": ("/studies/new", "New study"),
+    "design": ("/studies/short", "trials a participant"),
+    "texts": ("/studies/short/texts", "Consent (Markdown)"),
+    "clips": ("/studies/short/clips", "8 clips"),
+    "links": ("/studies/short/links", "New links"),
+    "monitor": ("/studies/short/monitor", "How far people come"),
+    "results": ("/studies/short/results", "Analysis reports"),
+    "data": ("/studies/short/data", "Psych-DS dataset"),
+    "participants": ("/studies/short/participants", "Plays not good"),
+    "settings": ("/studies/short/settings", "Versions"),
+    "people": ("/people", "Make a one-time link"),
+    "audit": ("/audit", "account created"),
+    "account": ("/account", "API tokens"),
+    "blinks": ("/blinks", "Component 1"),
+}
+
+
+def accessible(dashboard: Dashboard, axe: str) -> list[str]:
+    # Evaluated by the driver, not by the page: the page's policy allows no foreign script.
+    dashboard.page.evaluate(axe)
+    found = dashboard.page.evaluate(
+        "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'] }).then(r => "
+        "r.violations.map(v => v.id + ': ' + v.nodes.slice(0, 3).map(n => n.html.slice(0, 160)).join(' | ')))"
+    )
+    return list(found)
+
+
+def shoot(dashboard: Dashboard, name: str) -> None:
+    folder = os.environ.get("SCREENSHOTS")
+    if folder:
+        dashboard.page.screenshot(path=Path(folder) / f"admin-{name}.png")
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_shows_what_it_should_and_is_accessible(dashboard: Dashboard, axe: str, name: str) -> None:
+    path, words = PAGES[name]
+    dashboard.complaints.clear()
+    page = dashboard.open(path)
+    page.get_by_text(words).first.wait_for()
+    page.wait_for_timeout(300)
+    shoot(dashboard, name)
+    assert accessible(dashboard, axe) == []
+    assert dashboard.complaints == []
+
+
+@pytest.mark.parametrize("name", ["studies", "monitor", "results"])
+def test_dark_and_narrow(dashboard: Dashboard, axe: str, name: str) -> None:
+    page = dashboard.page
+    page.emulate_media(color_scheme="dark")
+    page.set_viewport_size({"width": 390, "height": 844})
+    try:
+        path, words = PAGES[name]
+        dashboard.open(path).get_by_text(words).first.wait_for()
+        page.wait_for_timeout(300)
+        shoot(dashboard, f"{name}-dark-narrow")
+        width = page.evaluate("document.documentElement.scrollWidth")
+        assert width <= 390, f"the page is {width} px wide on a screen of 390"
+        assert accessible(dashboard, axe) == []
+    finally:
+        page.emulate_media(color_scheme="light")
+        page.set_viewport_size({"width": 1280, "height": 800})
+
+
+def test_the_monitor_is_live(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/monitor")
+    expect(page.get_by_text("finished").first).to_be_visible()
+    assert page.locator("canvas").count() == 4
+
+
+def test_a_participant_is_excluded_and_taken_back(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/participants")
+    page.get_by_role("table").get_by_role("link").first.click()
+    page.get_by_role("button", name="Exclude").click()
+    page.get_by_label("Reason").fill("asked us to")
+    page.get_by_role("dialog").get_by_role("button", name="Exclude").click()
+    expect(page.get_by_text("Excluded: asked us to")).to_be_visible()
+    page.get_by_role("button", name="Undo the exclusion").click()
+    expect(page.get_by_text("Excluded: asked us to")).to_be_hidden()
+
+
+def test_a_misspelt_key_is_shown_at_its_line(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/new")
+    page.get_by_role("tab", name="From a definition (TOML)").click()
+    page.get_by_label("Definition", exact=True).fill('name = "x"\ntitel = "y"\n')
+    expect(page.get_by_text(re.compile("did you mean 'title'"))).to_be_visible()
+    page.get_by_role("button", name="Line 2").click()
+    assert page.evaluate("window.getSelection().toString()") == 'titel = "y"'
+
+
+def test_texts_are_edited_as_a_new_version(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/texts")
+    page.get_by_label("Debrief (Markdown)").fill("Many thanks.")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_text("short, version 2")).to_be_visible()
+
+
+def test_the_keyboard_reaches_the_content(dashboard: Dashboard) -> None:
+    page = dashboard.open("/")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "Skip to the content"
+
+
+def test_signing_out_and_in(dashboard: Dashboard) -> None:
+    page = dashboard.open("/")
+    page.get_by_role("button", name="ada").click()
+    page.get_by_role("menuitem", name="Sign out").click()
+    page.get_by_label("Name").fill("ada")
+    page.get_by_label("Password", exact=True).fill("wrong")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_text("Name or password are wrong.")).to_be_visible()
+    page.get_by_label("Password", exact=True).fill("correct horse battery")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("heading", name="Studies")).to_be_visible()
