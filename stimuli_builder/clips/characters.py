@@ -24,7 +24,8 @@ class Geometry:
     px_per_mm: float
     inter_ocular_mm: float
     opening_mm: float
-    lower_lid: bool
+    lower_range_mm: tuple[float, float] | None
+    """Greatest lift and greatest slide of the lower lid; None without a lower-lid layer."""
 
     def scaled(self, width_px: int, height_px: int) -> tuple[tuple[int, int], int]:
         """Size of the whole frame when `width_px` wide, and the rows to cut above to get `height_px`.
@@ -96,7 +97,7 @@ def _cartoon_geometry() -> Geometry:
     width = 960
     size = (width, round(width * cartoon.FRAME_MM[1] / cartoon.FRAME_MM[0]))
     scale = width / cartoon.FRAME_MM[0]
-    return Geometry(CARTOON, size, scale, cartoon.INTER_OCULAR_MM, cartoon.OPENING_MM, lower_lid=False)
+    return Geometry(CARTOON, size, scale, cartoon.INTER_OCULAR_MM, cartoon.OPENING_MM, None)
 
 
 @lru_cache(maxsize=16)
@@ -110,7 +111,7 @@ def _folder_geometry(folder: Path) -> Geometry:
         found.px_per_mm,
         found.inter_ocular_mm,
         found.opening_mm,
-        found.lower_lid is not None,
+        (found.lower_lid.vertical_mm[-1], found.lower_lid.horizontal_mm[-1]) if found.lower_lid else None,
     )
 
 

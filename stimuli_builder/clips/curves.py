@@ -138,3 +138,34 @@ def clip_curve(
         lower_vertical_mm=vertical if lower in ("both", "vertical") else still,
         lower_horizontal_mm=horizontal if lower in ("both", "horizontal") else still,
     )
+
+
+def within_reach(curve: ClipCurve, range_mm: tuple[float, float] | None) -> tuple[ClipCurve, dict[str, str]]:
+    """Scale lower-lid signals whose peak lies beyond what the character can show.
+
+    A signal scaled as a whole keeps its form; one cut off at its peak would move at once and then stand.
+
+    Parameters
+    ----------
+    range_mm : (float, float) or None
+        Greatest lift and greatest slide of the character's lower lid.
+
+    Returns
+    -------
+    The curve, and for the manifest the factors that are not 1.
+    """
+    vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
+    if range_mm is None or vertical is None or horizontal is None:
+        return curve, {}
+    factors = [
+        min(1.0, limit / peak) if (peak := float(signal.max())) > 0 else 1.0
+        for signal, limit in zip((vertical, horizontal), range_mm, strict=True)
+    ]
+    scaled = replace(
+        curve,
+        lower_vertical_mm=np.round(vertical * factors[0], DECIMALS),
+        lower_horizontal_mm=np.round(horizontal * factors[1], DECIMALS),
+    )
+    names = ("lower_vertical_scale", "lower_horizontal_scale")
+    said = {name: f"{factor:.4f}" for name, factor in zip(names, factors, strict=True) if factor < 1}
+    return scaled, said

@@ -11,7 +11,7 @@ from experiments.design import ClipSpec
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
 from stimuli_builder.clips.characters import Geometry, fingerprint, geometry
-from stimuli_builder.clips.curves import Timing, clip_curve
+from stimuli_builder.clips.curves import Timing, clip_curve, within_reach
 from stimuli_builder.clips.exemplars import exemplar
 from stimuli_builder.clips.jobs import ClipJob, Look
 
@@ -25,6 +25,7 @@ class PlannedClip:
     job: ClipJob
     repeated: bool
     geometry: Geometry
+    lower_scale: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,10 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
     key = design.exemplar_key(experiment, spec)
     shown = exemplar(settings, exemplar_family(key), spec.exemplar, seed, options.beside)
     timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
-    job = ClipJob(look_of(settings, options), clip_curve(shown.profile, timing, settings.lower_lid))
-    return PlannedClip(spec, settings, job, shown.repeated, place)
+    curve = clip_curve(shown.profile, timing, settings.lower_lid)
+    curve, scale = within_reach(curve, place.lower_range_mm)
+    job = ClipJob(look_of(settings, options), curve)
+    return PlannedClip(spec, settings, job, shown.repeated, place, scale)
 
 
 def exemplar_family(key: str) -> str:
@@ -78,7 +81,7 @@ def exemplar_family(key: str) -> str:
 
 def check_look(settings: RenderSettings, place: Geometry) -> None:
     """Refuse a character that cannot do what a cell asks, or cannot be shown at its size."""
-    if settings.lower_lid != "none" and not place.lower_lid:
+    if settings.lower_lid != "none" and place.lower_range_mm is None:
         raise InputError(
             f"character '{settings.character}' has no lower-lid layer; use lower_lid = 'none' or a "
             "character baked with one"

@@ -2,6 +2,7 @@
 
 import json
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from experiments.definition import Experiment
 from experiments.manifest import Clip, Manifest
@@ -90,13 +91,14 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
         closure_other=() if curve.closure_other is None else tuple(curve.closure_other.tolist()),
         inputs={
             RENDER_KEY: job.input_hash,
-            "character": clip.geometry.name,
+            "character": Path(settings.character).name,
             "character_sha256": job.look.fingerprint,
             "profile": settings.profile,
             "amplitude": settings.amplitude,
             "motion_blur": str(settings.motion_blur).lower(),
             "lower_lid": settings.lower_lid,
             "eyes": settings.eyes,
+            **clip.lower_scale,
             "encoder": job.look.encoder,
         },
         seed=seed,

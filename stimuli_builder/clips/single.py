@@ -8,7 +8,7 @@ from experiments.rendering import PROFILES, RenderSettings
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import resample
 from stimuli_builder.clips.characters import geometry
-from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve
+from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve, within_reach
 from stimuli_builder.clips.design_clips import Options, check_look, look_of
 from stimuli_builder.clips.exemplars import Exemplar, exemplar
 from stimuli_builder.clips.jobs import ClipJob, render
@@ -40,10 +40,12 @@ class Made:
 def render_single(wanted: SingleClip, out: Path) -> Made:
     """Render one clip into `out`, whole or not at all."""
     settings = wanted.settings
-    check_look(settings, geometry(settings.character))
+    place = geometry(settings.character)
+    check_look(settings, place)
     shown = _blink(wanted)
     timing = Timing.drawn(settings.fps, shown.phase_samples, wanted.seed, wanted.profile, wanted.exemplar)
     curve = clip_curve(shown.profile, timing, settings.lower_lid, wanted.clip_frames)
+    curve, _ = within_reach(curve, place.lower_range_mm)
     job = ClipJob(look_of(settings, Options(barcode=wanted.barcode)), curve)
     with whole_file(out) as temporary:
         temporary.write_bytes(render(job))

@@ -123,7 +123,7 @@ class _Meters:
     """One opening meter at a time: clips come sorted by character and size."""
 
     def __init__(self, beside: Path | None) -> None:
-        self._beside = beside
+        self._beside, self._folder = beside, beside or Path()
         self._key: tuple[str, str, int, int] | None = None
         self._meter: OpeningMeter | None = None
 
@@ -136,14 +136,9 @@ class _Meters:
         return self._meter
 
     def _made(self, name: str, wanted: str, size_px: tuple[int, int]) -> OpeningMeter | None:
-        place = name if name in shipped_names() else self._found_beside(name)
-        if place is None or fingerprint(place, self._beside) != wanted:
+        place = name if name in shipped_names() or (self._folder / name).is_dir() else None
+        if not place or fingerprint(place, self._beside) != wanted:
             return None
         return OpeningMeter(
             load_levels(place, size_px, self._beside), geometry(place, self._beside).opening_mm
         )
-
-    def _found_beside(self, name: str) -> str | None:
-        folders = (self._beside or Path()).glob("*/character.toml")
-        matching = (file.parent.name for file in folders if f'name = "{name}"' in file.read_text("utf-8"))
-        return next(matching, None)

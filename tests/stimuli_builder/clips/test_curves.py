@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from stimuli_builder.blinks.textbook import textbook_profile
-from stimuli_builder.clips.curves import LEAD_IN_S, LEAD_OUT_S, ClipCurve, Timing, amplitude_of, clip_curve
+from stimuli_builder.clips.curves import (
+    LEAD_IN_S,
+    LEAD_OUT_S,
+    ClipCurve,
+    Timing,
+    amplitude_of,
+    clip_curve,
+    within_reach,
+)
 from stimuli_builder.clips.motion_blur import frame_weights
 
 BLINK = textbook_profile("AL", 9, start_level=0.05, end_level=0.1)
@@ -63,3 +71,15 @@ def test_a_lower_lid_at_rest_has_no_signal() -> None:
 def test_closure_outside_its_range_is_refused(wrong: float) -> None:
     with pytest.raises(InputError):
         ClipCurve(np.array([0.0, wrong, 0.0]), 0, "bad")
+
+
+def test_a_lower_lid_beyond_the_characters_reach_is_scaled_as_a_whole() -> None:
+    curve = clip_curve(amplitude_of(BLINK, "full"), Timing(10, 10, 0, 30), "both")
+    assert curve.lower_horizontal_mm is not None
+    scaled, said = within_reach(curve, (5.0, 0.7))
+    assert scaled.lower_horizontal_mm is not None
+    assert scaled.lower_horizontal_mm.max() == pytest.approx(0.7, abs=1e-5)
+    factor = 0.7 / curve.lower_horizontal_mm.max()
+    np.testing.assert_allclose(scaled.lower_horizontal_mm, curve.lower_horizontal_mm * factor, atol=2e-6)
+    assert said == {"lower_horizontal_scale": f"{factor:.4f}"}
+    assert within_reach(curve, None)[1] == {}
