@@ -121,7 +121,8 @@ async def _not_valid(_request: Request, error: Exception) -> JSONResponse:
 async def _http(_request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, HTTPException):
         raise error
-    code = HTTPStatus(error.status_code).name.lower()
+    # Python has changed its mind about the name of 413.
+    code = "too_large" if error.status_code == 413 else HTTPStatus(error.status_code).name.lower()
     return error_response(error.status_code, code, str(error.detail), headers=error.headers)
 
 

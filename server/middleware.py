@@ -7,6 +7,7 @@ import secrets
 from collections.abc import Mapping
 
 from starlette.datastructures import MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.errors import error_response
@@ -71,10 +72,6 @@ class SecurityHeaders:
         await self.app(scope, receive, send_with_headers)
 
 
-class _TooLarge(Exception):
-    pass
-
-
 class BodyLimit:
     """Refuse bodies over the limit: small for participants, large under /api/admin for uploads."""
 
@@ -90,29 +87,21 @@ class BodyLimit:
         limit = self.upload_limit if scope["path"].startswith("/api/admin/") else self.limit
         declared = dict(scope["headers"]).get(b"content-length", b"0")
         if declared.isdigit() and int(declared) > limit:
-            await self._refuse(limit, scope, receive, send)
+            await error_response(413, "too_large", _too_large(limit))(scope, receive, send)
             return
-        received, started = 0, False
+        received = 0
 
         async def counted() -> Message:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
             if received > limit:
-                raise _TooLarge
+                # Of what reading a body may raise, FastAPI lets only this exception through.
+                raise HTTPException(413, _too_large(limit))
             return message
 
-        async def watched(message: Message) -> None:
-            nonlocal started
-            started = True
-            await send(message)
+        await self.app(scope, counted, send)
 
-        try:
-            await self.app(scope, counted, watched)
-        except _TooLarge:
-            if not started:
-                await self._refuse(limit, scope, receive, send)
 
-    async def _refuse(self, limit: int, scope: Scope, receive: Receive, send: Send) -> None:
-        message = f"The request is too large: at most {limit} bytes are accepted."
-        await error_response(413, "too_large", message, {"limit_bytes": limit})(scope, receive, send)
+def _too_large(limit: int) -> str:
+    return f"The request is too large: at most {limit} bytes are accepted."

@@ -42,17 +42,21 @@ class JsonClient:
 
     def call(self, method: str, path: str, body: Any = None) -> tuple[int, Any]:
         """Status and decoded answer; Refused for a status of 400 or above."""
-        headers = {"content-type": "application/json"}
-        if self.token:
-            headers["authorization"] = f"Bearer {self.token}"
-        text = json.dumps(body) if body is not None else None
-        self._connection.request(method, path, text, headers)
+        self.send(method, path, body)
         answer = self._connection.getresponse()
         content = answer.read()
         decoded = json.loads(content) if content else None
         if answer.status >= 400:
             raise Refused(answer.status, decoded)
         return answer.status, decoded
+
+    def send(self, method: str, path: str, body: Any = None) -> None:
+        """Send a request without waiting for the answer."""
+        headers = {"content-type": "application/json"}
+        if self.token:
+            headers["authorization"] = f"Bearer {self.token}"
+        text = json.dumps(body) if body is not None else None
+        self._connection.request(method, path, text, headers)
 
     def get(self, path: str) -> Any:
         """The answer to GET."""

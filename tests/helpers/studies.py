@@ -224,9 +224,9 @@ def client(services: Services) -> Iterator[TestClient]:
 
 
 @pytest.fixture
-def study(services: Services, tmp_path: Path) -> StudyInDatabase:
+def study(services: Services, quick_folder: Path) -> StudyInDatabase:
     """The short study, live: 2 practice trials, 8 clips in 2 blocks, one attention check a block."""
-    return add_study(services, tmp_path / "clips")
+    return add_study(services, quick_folder / "clips")
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ from tests.helpers.databases import (  # noqa: F401 - fixtures
     empty_database_url,
     postgres_database,
     postgres_server,
+    quick_folder,
     services,
     settings,
     sqlite_template,

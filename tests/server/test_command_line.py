@@ -1,0 +1,180 @@
+"""The command `server` as people call it: arguments, environment, output, exit code."""
+
+import csv
+import io
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from experiments.load import parse_experiment
+from experiments.ratings import csv_header
+from server.context import Services
+from server.models import Clip, Link, Study, StudyRun, StudyVersion
+from server.settings import Settings
+from tests.helpers.databases import run_server_command
+from tests.helpers.studies import SHORT
+from tests.helpers.tiny_clips import make_clip_folder
+
+sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+
+
+@pytest.fixture
+def sources(quick_folder: Path) -> Path:
+    """A folder with a declaration and its clips."""
+    (quick_folder / "short.toml").write_text(SHORT)
+    make_clip_folder(parse_experiment(SHORT), quick_folder / "clips")
+    return quick_folder
+
+
+def add(settings: Settings, sources: Path, *options: str):
+    clips = str(sources / "clips")
+    return run_server_command(
+        settings, "study", "add", str(sources / "short.toml"), "--clips", clips, *options
+    )
+
+
+def test_a_study_from_files_to_data(settings: Settings, services: Services, sources: Path) -> None:
+    added = add(settings, sources, "--open")
+    assert added.returncode == 0, added.stderr
+    assert re.search(r"http://localhost:8000/run/[\w-]{22}$", added.stdout.strip())
+    simulated = run_server_command(settings, "simulate", "short", "--participants", "2", "--seed", "4")
+    assert "2 simulated participants" in simulated.stdout, simulated.stderr
+    out = sources / "short.csv"
+    exported = run_server_command(settings, "export", "short", "--out", str(out))
+    assert exported.returncode == 0, exported.stderr
+    rows = list(csv.DictReader(io.StringIO(out.read_text(encoding="utf-8"))))
+    assert f"{len(rows)} rows" in exported.stdout
+    assert list(rows[0]) == csv_header(["character", "speed"])
+    assert {row["synthetic"] for row in rows} == {"1"}
+    assert {row["run_status"] for row in rows} == {"complete"}
+    with services.database.read() as session:
+        assert [run.synthetic for run in session.query(StudyRun)] == [True, True]
+
+
+@sqlite
+def test_adding_again_changes_nothing_and_a_change_makes_a_version(
+    settings: Settings, services: Services, sources: Path
+) -> None:
+    first, again = add(settings, sources, "--open"), add(settings, sources, "--open")
+    assert first.stdout.splitlines()[-1] == again.stdout.splitlines()[-1]
+    assert "nothing new" in again.stdout
+    (sources / "short.toml").write_text(SHORT.replace("Do you agree?", "Do you agree to take part?"))
+    changed = add(settings, sources)
+    assert "version 2" in changed.stdout, changed.stderr
+    assert "another wording" in changed.stdout
+    with services.database.read() as session:
+        assert session.query(StudyVersion).count() == 2
+        assert session.query(Clip).count() == 8
+        assert (session.query(Study).one().active_version, session.query(Link).count()) == (2, 1)
+
+
+def damage_clip(folder: Path) -> str:
+    clip = next((folder / "clips").glob("*.mp4"))
+    clip.write_bytes(clip.read_bytes() + b"x")
+    return "expected sha256"
+
+
+def remove_clip(folder: Path) -> str:
+    next((folder / "clips").glob("*.mp4")).unlink()
+    return "is missing from"
+
+
+def remove_manifest(folder: Path) -> str:
+    (folder / "clips" / "manifest.json").unlink()
+    return "expected a manifest.json"
+
+
+def break_manifest(folder: Path) -> str:
+    (folder / "clips" / "manifest.json").write_text("{")
+    return "is not valid JSON"
+
+
+def drop_a_clip_from_the_manifest(folder: Path) -> str:
+    path = folder / "clips" / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["clips"] = manifest["clips"][1:]
+    path.write_text(json.dumps(manifest))
+    return "1 are missing from the manifest"
+
+
+def misspell_a_level(folder: Path) -> str:
+    path = folder / "clips" / "manifest.json"
+    path.write_text(path.read_text().replace("a/slow", "a/sloww"))
+    return "missing from the manifest"
+
+
+def misspell_a_key(folder: Path) -> str:
+    (folder / "short.toml").write_text(SHORT.replace("per_cell", "per_cel"))
+    return "did you mean 'per_cell'?"
+
+
+@sqlite
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        damage_clip,
+        remove_clip,
+        remove_manifest,
+        break_manifest,
+        drop_a_clip_from_the_manifest,
+        misspell_a_level,
+        misspell_a_key,
+    ],
+    ids=lambda spoil: spoil.__name__,
+)
+def test_what_cannot_be_taken_in_is_refused_in_one_line(
+    settings: Settings, services: Services, sources: Path, spoil
+) -> None:
+    expected = spoil(sources)
+    refused = add(settings, sources, "--open")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: ")
+    assert refused.stderr.count("\n") == 1
+    assert expected in refused.stderr
+    assert not settings.clip_folder.exists()
+    with services.database.read() as session:
+        assert session.query(Study).count() == 0
+
+
+@sqlite
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("export", "shrot", "--out", "x.csv"), "did you mean 'short'?"),
+        (("study", "status", "short", "lvie"), "did you mean 'live'?"),
+        (("link", "create", "short", "--kind", "persnal"), "did you mean 'personal'?"),
+        (("link", "create", "short", "--count", "3"), "--kind personal"),
+        (("simulate", "short"), "is draft"),
+        (("run", "--host", "192.0.2.1"), "cannot listen on 192.0.2.1:8000"),
+    ],
+)
+def test_other_bad_input_is_one_line_too(
+    settings: Settings, study, services: Services, arguments: tuple[str, ...], expected: str
+) -> None:
+    study.change(status="draft")
+    refused = run_server_command(settings, *arguments)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: ")
+    assert refused.stderr.count("\n") == 1
+    assert expected in refused.stderr
+
+
+@sqlite
+def test_personal_links_come_as_a_table(settings: Settings, study) -> None:
+    arguments = ("link", "create", "short", "--kind", "personal", "--label", "P", "--count", "3")
+    lines = run_server_command(settings, *arguments).stdout.splitlines()
+    assert [line.split(",")[0] for line in lines] == ["P001", "P002", "P003"]
+    listed = run_server_command(settings, "link", "list", "short").stdout
+    assert all(line.split(",")[1] in listed for line in lines)
+    assert "live" in run_server_command(settings, "study", "list").stdout
+
+
+@sqlite
+def test_a_database_of_a_newer_program_is_left_alone(settings: Settings, services: Services) -> None:
+    with services.database.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '9999'")
+    refused = run_server_command(settings, "study", "list")
+    assert refused.returncode == 2
+    assert "newer version" in refused.stderr

@@ -1,0 +1,92 @@
+"""A real server process is killed without warning while ratings arrive: what was acknowledged is there."""
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from server.context import Services
+from server.settings import Settings
+from server.simulation.http import JsonClient
+from server.simulation.person import Person, Rater
+from tests.helpers.databases import server_environment
+from tests.helpers.studies import StudyInDatabase
+
+KILLS = 3
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def start(settings: Settings, port: int) -> subprocess.Popen[bytes]:
+    """Start `server run` and wait until it answers."""
+    command = [sys.executable, "-m", "server", "run", "--port", str(port)]
+    process = subprocess.Popen(command, env=server_environment(settings), start_new_session=True)
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        client = JsonClient(f"http://127.0.0.1:{port}")
+        try:
+            client.get("/healthz")
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return process
+        finally:
+            client.close()
+    raise TimeoutError("the server did not start")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_no_acknowledged_rating_is_lost_or_doubled(
+    services: Services, settings: Settings, tmp_path: Path, study: StudyInDatabase
+) -> None:
+    port, rng = free_port(), random.Random(5)
+    # On the disk, not in memory: this test is about what is really written.
+    real = settings.model_copy(update={"data_folder": tmp_path / "data"})
+    services.database.engine.dispose()
+    process = start(real, port)
+    acknowledged: dict[str, int] = {}
+    sent = 0
+    try:
+        for number in range(KILLS):
+            client = JsonClient(f"http://127.0.0.1:{port}")
+            person = Person(client, Rater(number, 1, {}))
+            person.begin(study.link_token)
+            client.put("/api/run/consent", {"agreed": True})
+            state = client.get("/api/run")
+            last = rng.randrange(3, len(state["trials"]))
+            for trial in state["trials"]:
+                rating_id, body = str(uuid.uuid4()), person.rating(trial, state["trial"]["scale"])
+                if trial["trial_index"] == last:
+                    # The request is under way when the server dies; the client sends it again afterwards.
+                    client.send("PUT", f"/api/run/ratings/{rating_id}", body)
+                    os.killpg(process.pid, signal.SIGKILL)
+                    process.wait()
+                    process = start(real, port)
+                    token, client = client.token, JsonClient(f"http://127.0.0.1:{port}")
+                    client.token = token
+                status, answer = client.call("PUT", f"/api/run/ratings/{rating_id}", body)
+                assert status in (200, 201)
+                sent += 1
+                acknowledged[answer["receipt"]["rating_id"]] = body["response"]
+            client.close()
+    finally:
+        os.killpg(process.pid, signal.SIGTERM)
+        assert process.wait(30) in (0, -signal.SIGTERM)
+    with services.database.read() as session:
+        stored = dict(map(tuple, session.execute(text("SELECT rating_id, response FROM trial_ratings"))))
+        assert session.scalar(text("PRAGMA integrity_check")) == "ok"
+    assert stored == acknowledged
+    assert len(stored) == sent == KILLS * 12

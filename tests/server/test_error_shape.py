@@ -1,0 +1,67 @@
+"""Every endpoint refuses in the one shape, whatever is wrong, and never with a 5xx."""
+
+import re
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.context import Services
+
+pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+
+
+def assert_shape(answer: Any) -> None:
+    assert 400 <= answer.status_code < 500, (answer.request.method, answer.request.url, answer.text[:300])
+    error = answer.json()["error"]
+    assert set(error) == {"code", "message", "details"}
+    assert re.fullmatch(r"[a-z_]+", error["code"])
+    assert error["message"]
+    assert "Traceback" not in error["message"]
+
+
+def test_every_endpoint_without_credentials_or_body(client: TestClient, study: Any) -> None:
+    schema = client.get("/api/openapi.json").json()
+    open_to_all = {"/healthz", "/readyz", "/metrics"}
+    for path, operations in schema["paths"].items():
+        for method in operations:
+            if path in open_to_all or path.startswith("/api/admin"):
+                continue
+            assert_shape(client.request(method, re.sub(r"\{.*?\}", "nonsense", path)))
+
+
+@pytest.mark.parametrize("body", [b"", b"{", b"[]", b'{"language": 7}', b"\xff\xfe", b"null"])
+def test_bodies_that_are_not_what_was_asked_for(client: TestClient, study: Any, body: bytes) -> None:
+    headers = {"content-type": "application/json"}
+    assert_shape(client.post(f"/api/links/{study.link_token}/runs", content=body, headers=headers))
+
+
+@pytest.mark.parametrize("path", ["/api/nothing", "/nothing", "/assets/participant/nothing.js"])
+def test_addresses_where_nothing_is(client: TestClient, path: str) -> None:
+    assert_shape(client.get(path))
+    assert_shape(client.delete("/api/run"))
+
+
+def test_a_failure_of_the_server_tells_nothing_of_its_inside(client: TestClient, services: Services) -> None:
+    services.database.close()
+    with services.database.engine.begin() as connection:
+        connection.exec_driver_sql("DROP VIEW ratings")
+        connection.exec_driver_sql("DROP TABLE links")
+    answer = client.get("/api/links/x")
+    assert answer.status_code == 500
+    assert answer.json()["error"] == {
+        "code": "internal",
+        "message": "The server failed; please try again.",
+        "details": {},
+    }
+
+
+def test_a_body_that_is_too_large(client: TestClient, study: Any) -> None:
+    def endless() -> Any:
+        for _ in range(20):
+            yield b" " * 65536
+
+    url = f"/api/links/{study.link_token}/runs"
+    for content in (b" " * 600_000, endless()):
+        answer = client.post(url, content=content)
+        assert (answer.status_code, answer.json()["error"]["code"]) == (413, "too_large")

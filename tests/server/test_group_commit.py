@@ -1,0 +1,78 @@
+import asyncio
+
+import pytest
+from sqlalchemy import Connection, text
+
+from server.errors import Conflict
+from server.group_commit import GroupCommit
+
+pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+INSERT = text("INSERT INTO clips VALUES (:name, 1, 30, 1, 1, 1, '2026-11-21 00:00:00')")
+
+
+@pytest.fixture
+def writers(services):
+    group = GroupCommit(services.database)
+    yield group
+    group.close()
+
+
+def stored(services) -> set[str]:
+    with services.database.read() as session:
+        return set(session.scalars(text("SELECT sha256 FROM clips")))
+
+
+def insert(name: str):
+    return lambda connection: connection.execute(INSERT, {"name": name}).rowcount
+
+
+def test_each_gets_its_own_result_after_the_commit(writers, services) -> None:
+    async def main() -> list[str]:
+        async def one(number: int) -> str:
+            await writers.run(str(number), insert(f"clip{number}"))
+            assert f"clip{number}" in stored(services)
+            return f"clip{number}"
+
+        return await asyncio.gather(*(one(number) for number in range(50)))
+
+    assert set(asyncio.run(main())) == stored(services)
+
+
+def test_a_refusal_reaches_the_one_and_spares_the_others(writers, services) -> None:
+    def refuse(_: Connection) -> None:
+        raise Conflict("no")
+
+    async def main() -> list[object]:
+        work = [insert("a"), refuse, insert("b")]
+        return await asyncio.gather(*(writers.run("k", do) for do in work), return_exceptions=True)
+
+    results = asyncio.run(main())
+    assert [type(result) for result in results] == [int, Conflict, int]
+    assert stored(services) == {"a", "b"}
+
+
+def test_what_breaks_the_transaction_is_undone_alone(writers, services) -> None:
+    def fail(connection: Connection) -> None:
+        connection.execute(INSERT, {"name": "half"})
+        raise RuntimeError("broken")
+
+    async def main() -> list[object]:
+        work = [insert("a"), fail, insert("a"), insert("b")]
+        return await asyncio.gather(*(writers.run("k", do) for do in work), return_exceptions=True)
+
+    results = asyncio.run(main())
+    assert results[0] == results[3] == 1
+    assert isinstance(results[1], RuntimeError)
+    assert "UNIQUE" in str(results[2])
+    assert stored(services) == {"a", "b"}
+
+
+def test_closing_finishes_what_waits(writers, services) -> None:
+    async def main() -> None:
+        tasks = [asyncio.create_task(writers.run("k", insert(f"c{number}"))) for number in range(20)]
+        await asyncio.sleep(0)
+        await asyncio.to_thread(writers.close)
+        await asyncio.gather(*tasks)
+
+    asyncio.run(main())
+    assert len(stored(services)) == 20

@@ -1,0 +1,83 @@
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.app import create_app
+from server.settings import Settings
+
+pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+
+
+@pytest.fixture
+def pages(settings: Settings) -> Path:
+    for site in ("participant", "admin"):
+        folder = settings.frontend_folder / site
+        folder.mkdir(parents=True)
+        (folder / "index.html").write_text(f"<title>{site}</title>")
+        (folder / "page-1a2b.js").write_text("export {}")
+    (settings.frontend_folder / "admin" / "index.html").write_text('<meta content="__CSP_NONCE__">')
+    (settings.frontend_folder.parent / "secret.txt").write_text("secret")
+    return settings.frontend_folder
+
+
+def test_pages_are_checked_each_time_and_assets_kept(client: TestClient, pages: Path) -> None:
+    page = client.get("/run/some-token")
+    assert (page.status_code, page.headers["cache-control"]) == (200, "no-cache")
+    assert "participant" in page.text
+    asset = client.get("/assets/participant/page-1a2b.js")
+    assert asset.headers["cache-control"] == "public, max-age=31536000, immutable"
+    assert asset.headers["content-type"].startswith("text/javascript")
+
+
+def test_every_admin_address_is_the_admin_page_with_a_nonce_of_its_own(
+    client: TestClient, pages: Path
+) -> None:
+    answers = [client.get(path) for path in ("/admin", "/admin/", "/admin/studies/exp1")]
+    nonces = {answer.text.split('"')[1] for answer in answers}
+    assert len(nonces) == 3
+    for answer in answers:
+        assert f"'nonce-{answer.text.split(chr(34))[1]}'" in answer.headers["content-security-policy"]
+
+
+def test_the_root_leads_to_the_admin_site(client: TestClient) -> None:
+    answer = client.get("/", follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (307, "/admin/")
+
+
+@pytest.mark.parametrize("name", ["../secret.txt", "..%2f..%2fsecret.txt", "%2e%2e/%2e%2e/secret.txt"])
+def test_assets_do_not_climb_out(client: TestClient, pages: Path, name: str) -> None:
+    assert client.get(f"/assets/participant/{name}").status_code == 404
+
+
+def test_pages_that_are_not_built_say_so(client: TestClient) -> None:
+    answer = client.get("/run/some-token")
+    assert (answer.status_code, answer.json()["error"]["code"]) == (503, "pages_not_built")
+
+
+def test_security_headers_stand_on_every_answer(client: TestClient, pages: Path) -> None:
+    for path in ("/run/x", "/api/links/x", "/healthz", "/nothing"):
+        headers = client.get(path).headers
+        policy = headers["content-security-policy"]
+        assert "script-src 'self';" in policy
+        assert "unsafe" not in policy
+        assert headers["cross-origin-opener-policy"] == "same-origin"
+        assert headers["cross-origin-embedder-policy"] == "require-corp"
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["referrer-policy"] == "no-referrer"
+        assert "strict-transport-security" not in headers
+
+
+def test_behind_https_browsers_are_told_to_stay_there(settings: Settings) -> None:
+    secure = settings.model_copy(update={"public_url": "https://lab.example"})
+    with TestClient(create_app(secure)) as client:
+        assert "max-age=" in client.get("/healthz").headers["strict-transport-security"]
+
+
+def test_readiness_tells_of_missing_tables(client: TestClient, settings: Settings, tmp_path: Path) -> None:
+    assert client.get("/readyz").json()["status"] == "ready"
+    empty = settings.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'empty.sqlite'}"})
+    with TestClient(create_app(empty)) as other:
+        answer = other.get("/readyz")
+    assert answer.status_code == 503
+    assert "server database upgrade" in answer.json()["error"]["message"]
