@@ -45,17 +45,9 @@ def driver(tmp_path: Path) -> Path:
     """The participants' program, built from the page's own sources."""
     if not (REPOSITORY / "frontend" / "node_modules").is_dir():
         pytest.skip("the frontend's packages are not installed: run `make setup-test`")
-    command = [
-        "npx",
-        "vite",
-        "build",
-        "--logLevel",
-        "error",
-        "--ssr",
-        "tests/faults/driver.ts",
-        "--outDir",
-        str(tmp_path / "driver"),
-    ]
+    out = str(tmp_path / "driver")
+    command = ["npx", "vite", "build", "-c", "tests/faults/vite.config.ts", "--logLevel", "error"]
+    command += ["--ssr", "tests/faults/driver.ts", "--outDir", out]
     subprocess.run(command, cwd=REPOSITORY / "frontend", check=True, timeout=120)
     return next((tmp_path / "driver").glob("driver.*js"))
 

@@ -12,7 +12,7 @@ const START_PX = (CARD_WIDTH_MM * 96) / 25.4;
 export interface CardView { element: HTMLElement; px_per_mm: () => number }
 
 export function cardView(t: Translate, start_px_per_mm: number | null): CardView {
-  const largest = Math.max(400, Math.min(1_600, window.innerWidth - 80));
+  const largest = Math.max(400, Math.min(1_600, window.innerWidth - 110));
   let width = start_px_per_mm ? start_px_per_mm * CARD_WIDTH_MM : START_PX;
   const id = uniqueId("card");
   const slider = h("input", { type: "range", id, min: SMALLEST_PX, max: Math.round(largest), step: 1 });

@@ -53,6 +53,7 @@ class ScaleView {
     question.id = uniqueId("question");
     const ends = h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, pick(scale.low, language)), h("span", {}, pick(scale.high, language)));
     const group = h("div", { class: "scale", role: "group", "aria-labelledby": question.id, tabindex: -1 }, h("div", { class: "keys" }, ...this.keys), ends);
+    group.style.setProperty("--points", String(this.keys.length));
     const more = this.comment && h("div", { class: "field comment" }, h("label", { for: this.comment.id }, t("comment")), this.comment);
     const confirm = this.confirm && h("div", { class: "actions" }, this.confirm);
     return [question, group, more, confirm].filter((node): node is HTMLElement => node instanceof HTMLElement);
