@@ -17,6 +17,8 @@ from server.export import endpoints as export
 from server.library import endpoints as library
 from server.middleware import BodyLimit, SecurityHeaders
 from server.monitor import endpoints as monitor
+from server.operations import endpoints as operations
+from server.operations.observer import Observer
 from server.participants import endpoints as participants
 from server.reports import endpoints as reports
 from server.results import endpoints as results
@@ -31,6 +33,7 @@ def _routers() -> tuple[APIRouter, ...]:
     """Every router; `pages` comes last because it answers for whole folders of addresses."""
     return (
         health.router,
+        operations.router,
         clips.router,
         participants.router,
         trials.router,
@@ -78,4 +81,5 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     install_error_handlers(app)
     app.add_middleware(BodyLimit, settings=services.settings)
     app.add_middleware(SecurityHeaders, settings=services.settings)
+    app.add_middleware(Observer, settings=services.settings)
     return app

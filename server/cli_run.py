@@ -1,6 +1,11 @@
 """`server run`: serve participants and experimenters."""
 
+import os
+import shutil
 import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 import typer
@@ -14,6 +19,8 @@ from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
 from server.models import Account, Study
+from server.operations.logs import logging_configuration
+from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.settings import Settings
 from server.studies.links import general_link, link_url
 
@@ -47,17 +54,33 @@ def run(
         if welcome:
             _welcome(services)
     # No access log: it would write every participant's internet address.
-    uvicorn.run(
-        "server.app:create_app",
-        factory=True,
-        host=host,
-        port=port,
-        workers=workers,
-        access_log=False,
-        server_header=False,
-        log_level="warning",
-        timeout_graceful_shutdown=GRACE_S,
-    )
+    with _shared_counts(workers):
+        uvicorn.run(
+            "server.app:create_app",
+            factory=True,
+            host=host,
+            port=port,
+            workers=workers,
+            access_log=False,
+            server_header=False,
+            log_config=logging_configuration(settings),
+            timeout_graceful_shutdown=GRACE_S,
+        )
+
+
+@contextmanager
+def _shared_counts(workers: int) -> Iterator[None]:
+    """Several workers count into files of one folder, so that any of them can tell the sum."""
+    if workers == 1 or MULTIPROCESS_VARIABLE in os.environ:
+        yield
+        return
+    folder = tempfile.mkdtemp(prefix="palpebra-metrics-")
+    os.environ[MULTIPROCESS_VARIABLE] = folder
+    try:
+        yield
+    finally:
+        del os.environ[MULTIPROCESS_VARIABLE]
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _check_free(host: str, port: int) -> None:

@@ -73,7 +73,12 @@ def open_database(settings: Settings) -> Database:
 
 def _postgres_engine(url: str, pool: int) -> Engine:
     return create_engine(
-        url, pool_size=pool, max_overflow=pool, pool_timeout=BUSY_TIMEOUT_S, pool_pre_ping=True
+        url,
+        pool_size=pool,
+        max_overflow=pool,
+        pool_timeout=BUSY_TIMEOUT_S,
+        pool_pre_ping=True,
+        hide_parameters=True,  # an error must not quote what a person answered
     )
 
 
@@ -83,6 +88,7 @@ def _sqlite_engine(url: str, pool: int) -> Engine:
         pool_size=pool,
         max_overflow=2 * pool,
         pool_timeout=BUSY_TIMEOUT_S,
+        hide_parameters=True,
         connect_args={"timeout": BUSY_TIMEOUT_S, "check_same_thread": False},
     )
     event.listen(engine, "connect", _prepare_sqlite)

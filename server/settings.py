@@ -4,6 +4,7 @@ import os
 import secrets
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 from pydantic import AliasChoices, Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -60,6 +61,18 @@ class Settings(BaseSettings):
     session_hours: float = Field(default=12.0, gt=0, description="Hours an experimenter stays signed in.")
     logins_per_minute: int = Field(
         default=10, ge=1, description="Sign-in attempts for one account a minute before it must wait."
+    )
+    log_format: Literal["auto", "json", "text"] = Field(
+        default="auto", description="Form of the log on stderr: json, text, or auto (text on a terminal)."
+    )
+    log_requests: Literal["problems", "all", "none"] = Field(
+        default="problems",
+        description="Which requests are logged; problems: those that failed or were slow. Never an address.",
+    )
+    log_slow_ms: float = Field(default=1000.0, gt=0, description="From when on a request counts as slow.")
+    metrics_token: str = Field(
+        default="",
+        description="Token that /metrics asks for; empty: it answers requests from this machine alone.",
     )
 
     @field_validator("database_url")

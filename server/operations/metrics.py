@@ -1,0 +1,79 @@
+"""What is counted for Prometheus: answers by route, how long they took, how many are under way.
+
+Labels are route templates, never addresses: a real address holds a participant's token. With several workers
+the counts of all are added up, by way of files in PROMETHEUS_MULTIPROC_DIR (set by `server run`).
+"""
+
+import os
+from collections.abc import Iterable
+from importlib.metadata import version
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.multiprocess import MultiProcessCollector
+from prometheus_client.registry import Collector
+from sqlalchemy import func, select
+
+from server.db import Database
+from server.models import Study, StudyRun
+
+MULTIPROCESS_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"
+BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
+
+REGISTRY = CollectorRegistry()
+ANSWERS = Counter(
+    "palpebra_answers",
+    "Answers given, by route and status.",
+    ("method", "route", "status"),
+    registry=REGISTRY,
+)
+SECONDS = Histogram(
+    "palpebra_answer_seconds",
+    "Time from the request to the beginning of its answer.",
+    ("route",),
+    buckets=BUCKETS_S,
+    registry=REGISTRY,
+)
+UNDER_WAY = Gauge(
+    "palpebra_requests_under_way",
+    "Requests that are being answered.",
+    multiprocess_mode="livesum",
+    registry=REGISTRY,
+)
+
+
+class StoredCounts(Collector):
+    """Counts taken from the database at the moment they are asked for: the same from every worker."""
+
+    def __init__(self, database: Database) -> None:
+        self.database = database
+
+    def collect(self) -> Iterable[GaugeMetricFamily]:
+        """Runs by study and status; the version of the program."""
+        runs = GaugeMetricFamily(
+            "palpebra_runs", "Runs stored, previews left out.", labels=("study", "phase", "status")
+        )
+        query = (
+            select(Study.name, StudyRun.phase, StudyRun.status, func.count())
+            .join(Study, Study.id == StudyRun.study_id)
+            .where(StudyRun.preview.is_(False))
+            .group_by(Study.name, StudyRun.phase, StudyRun.status)
+        )
+        with self.database.read() as session:
+            for name, phase, status, count in session.execute(query):
+                runs.add_metric((name, phase, status), count)
+        yield runs
+        build = GaugeMetricFamily("palpebra_build_info", "The program that runs.", labels=("version",))
+        build.add_metric((version("palpebra"),), 1)
+        yield build
+
+
+def exposition(database: Database) -> bytes:
+    """Everything in Prometheus' text format."""
+    counted = REGISTRY
+    if folder := os.environ.get(MULTIPROCESS_VARIABLE):
+        counted = CollectorRegistry()
+        MultiProcessCollector(counted, path=folder)
+    stored = CollectorRegistry()
+    stored.register(StoredCounts(database))
+    return generate_latest(counted) + generate_latest(stored)
