@@ -17,6 +17,9 @@ PRIOR_SCALE = 2**0.5 / 2
 MOST_RATINGS = 50_000
 """Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
 
+MOST_CELLS = 16
+"""Above this the mixed model of the report has slopes for main effects only, which is said there."""
+
 
 def sensitivity_sections(
     analysis: Analysis, progress: Callable[[str], None] = lambda _: None
@@ -66,7 +69,8 @@ def mixed_model(analysis: Analysis) -> Section:
     """The linear mixed model's tests beside those of the ANOVA."""
     from analysis.mixed import fit_mixed
 
-    result = fit_mixed(**_model_arguments(analysis))
+    every = len(analysis.cells.cells) <= MOST_CELLS
+    result = fit_mixed(**_model_arguments(analysis), slopes="all" if every else "main")
     rows = []
     for effect in result.effects:
         ours = analysis.anova.effect(effect.effect)
@@ -76,11 +80,17 @@ def mixed_model(analysis: Analysis) -> Section:
     header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)")
     notes = (result.formula, *_parts(result.components), *result.notes)
     table = Table("mixed", f"Linear mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    slopes = "every effect" if every else "the main effects"
     text = (
-        "Participants crossed with blinks, by-participant slopes for every effect, REML, type III tests with "
+        f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
         f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
         f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
     )
+    if not every:
+        text += (
+            f" With more than {MOST_CELLS} cells slopes for every effect take minutes (analysis mixed fits "
+            "them); without them the p of interactions are too small where people differ in them."
+        )
     return Section("Linear mixed model", text, (table,))
 
 
