@@ -39,9 +39,9 @@ def main() -> None:
             print(f"{name} is not baked here: no pictures of it")
             continue
         character = load_levels(name, SIZE)
-        levels = np.vstack([_halved(character.picture(w)) for w in CLOSURES])
-        save(levels, folder / f"{name}-closures.png")
-        save(blink_sheet(character), folder / f"{name}-blink.png")
+        levels = np.vstack([character.picture(w) for w in CLOSURES])
+        save(levels, folder / f"{name}-closures.jpg")
+        save(blink_sheet(character), folder / f"{name}-blink.jpg")
     profile_curves(folder / "profiles.png")
 
 
@@ -57,7 +57,7 @@ def blink_sheet(character: LevelSet) -> Rgb:
             light = character.base.astype(np.float32)
             used = np.flatnonzero(row)
             light[character.window.slices] = painter.light(curve, used, row[used])
-            rows.append(_halved(linear_to_srgb(light / np.float32(FULL_SCALE)), 3))
+            rows.append(_reduced(linear_to_srgb(light / np.float32(FULL_SCALE)), 3))
         columns.append(_titled(np.vstack(rows), title))
     return np.hstack([columns[0], np.full((columns[0].shape[0], 6, 3), 255, np.uint8), columns[1]])
 
@@ -86,17 +86,15 @@ def profile_curves(path: Path) -> None:
 
 
 def save(picture: Rgb, path: Path) -> None:
-    """Write a PNG under 400 KB: in a palette of 256 colours where need be."""
-    image = Image.fromarray(picture)
-    image.save(path, "PNG", optimize=True)
-    if path.stat().st_size > LIMIT_BYTES:
-        image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG).save(
-            path, "PNG", optimize=True
-        )
-    print(f"{path.name}: {path.stat().st_size // 1024} KiB")
+    """Write a JPEG without chroma subsampling, at the best quality that stays under the limit."""
+    for quality in (94, 90, 86, 80, 72, 60):
+        Image.fromarray(picture).save(path, "JPEG", quality=quality, subsampling=0, optimize=True)
+        if path.stat().st_size <= LIMIT_BYTES:
+            break
+    print(f"{path.name}: {path.stat().st_size // 1024} KiB, quality {quality}")
 
 
-def _halved(picture: Rgb, times: int = 2) -> Rgb:
+def _reduced(picture: Rgb, times: int) -> Rgb:
     size = picture.shape[1] // times, picture.shape[0] // times
     return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS))
 

@@ -119,7 +119,8 @@ def test_set_of_clips(benchmark: BenchmarkFixture) -> None:
     say(
         f"\n{len(jobs)} clips on {cores} cores: {wall:.1f} s wall, {cpu:.1f} s CPU (start included); "
         f"600 clips: {wall / len(jobs) * 600 / 60:.1f} min wall, "
-        f"{cpu / len(jobs) * 600 / 2 / 60:.1f} min at full use of 2 cores (must 5, aim 2); greatest process {peak:.2f} GB (must 1.5)"
+        f"{cpu / len(jobs) * 600 / 2 / 60:.1f} min at full use of 2 cores (must 5, aim 2); "
+        f"greatest process {peak:.2f} GB (must 1.5)"
     )
 
 
