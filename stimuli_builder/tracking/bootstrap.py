@@ -26,7 +26,7 @@ def propose_labels(info: VideoInfo, out: Path, weights: Path | None, count: int)
     Raises
     ------
     InputError
-        The extra is not installed, no weights are given, or too few frames show a face.
+        MediaPipe is not installed, no weights are given, or too few frames show a face.
     """
     detect = _detector(weights)
     step = max(1, min(info.frame_count, FARTHEST_LABEL) // LOOKED_AT)
@@ -67,7 +67,9 @@ def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
 def _detector(weights: Path | None) -> Any:
     """A function from a grey picture to 18 points, or None where it sees no face."""
     if find_spec("mediapipe") is None:
-        raise InputError("label --bootstrap needs the optional extra: pip install 'palpebra[bootstrap]'")
+        raise InputError(
+            "label --bootstrap needs the optional package MediaPipe: pip install 'mediapipe>=1.2'"
+        )
     if weights is None or not weights.is_file():
         raise InputError(
             f"expected --weights with a face_landmarker.task file, found {weights or 'none'}; "

@@ -178,12 +178,18 @@ def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
     for frame in range(len(textures)):
         others = np.delete(textures, frame, axis=0)
         mean = others.mean(0)
-        basis, _, _ = principal(others - mean, 1.0, 1)
-        rest = textures[frame] - mean
-        squares += (rest - (rest @ basis[:modes].T) @ basis[:modes]) ** 2
+        squares += _unexplained(others - mean, textures[frame] - mean, modes) ** 2
     variance = squares / len(textures)
     weights = 1 / (variance + WEIGHT_FLOOR * np.median(variance) + 1e-6)
     return np.asarray(weights / weights.mean(), np.float32)
+
+
+def _unexplained(others: Values, rest: Values, modes: int) -> Values:
+    """What `rest` (N,) has beyond the first principal components of centred rows (F, N)."""
+    strengths, directions = np.linalg.eigh(others @ others.T)
+    kept = np.flatnonzero(strengths > 1e-10 * max(strengths[-1], 1e-300))[-modes:]
+    share = directions[:, kept].T @ (others @ rest) / strengths[kept]
+    return np.asarray(rest - (directions[:, kept] @ share) @ others)
 
 
 def warped(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:

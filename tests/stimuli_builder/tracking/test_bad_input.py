@@ -154,7 +154,7 @@ def test_label_bootstrap_without_its_extra_or_weights(stimuli, recording, tmp_pa
     out = tmp_path / "labels.json"
     code, _, error = stimuli("label", recording.video, "--bootstrap", "--out", out)
     assert code == 2
-    assert ("palpebra[bootstrap]" if find_spec("mediapipe") is None else "--weights") in error
+    assert ("pip install 'mediapipe>=1.2'" if find_spec("mediapipe") is None else "--weights") in error
     assert "expected --bootstrap" in stimuli("label", recording.video, "--out", out)[2]
     assert not out.exists()
 
