@@ -80,6 +80,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(router)
     install_error_handlers(app)
     app.add_middleware(BodyLimit, settings=services.settings)
-    app.add_middleware(SecurityHeaders, settings=services.settings)
+    app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)
     return app

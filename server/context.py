@@ -5,6 +5,7 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
+from server.clips.s3 import open_s3
 from server.clips.store import ClipStore, FolderStore
 from server.db import Database, open_database
 from server.group_commit import GroupCommit
@@ -33,7 +34,7 @@ def open_services(settings: Settings) -> Services:
     return Services(
         settings=settings,
         database=database,
-        clips=FolderStore(settings.clip_folder),
+        clips=open_s3(settings) if settings.s3_bucket else FolderStore(settings.clip_folder),
         run_starts=RateLimit(settings.run_starts_per_minute),
         unsupported=RateLimit(settings.unsupported_per_minute),
         versions=Versions(),

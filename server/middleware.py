@@ -17,12 +17,13 @@ NONCE_PLACEHOLDER = "__CSP_NONCE__"
 """Where a page makes style elements by script, its index.html carries this; each answer replaces it."""
 
 
-def content_security_policy(nonce: str | None = None) -> str:
-    """The policy: nothing but this server's own files; no inline script, inline style only with the nonce."""
+def content_security_policy(nonce: str | None = None, clips_from: str | None = None) -> str:
+    """The policy: this server's own files, and clips from their store; inline style only with the nonce."""
+    clips = f" {clips_from}" if clips_from else ""
     style = f"style-src 'self' 'nonce-{nonce}'" if nonce else "style-src 'self'"
     return (
         f"default-src 'none'; script-src 'self'; {style}; img-src 'self' blob: data:; "
-        "media-src 'self' blob:; connect-src 'self'; worker-src 'self'; font-src 'self'; "
+        f"media-src 'self' blob:{clips}; connect-src 'self'{clips}; worker-src 'self'; font-src 'self'; "
         "manifest-src 'self'; base-uri 'none'; frame-ancestors 'none'; form-action 'self'"
     )
 
@@ -32,10 +33,10 @@ def new_nonce() -> str:
     return secrets.token_urlsafe(16)
 
 
-def security_headers(settings: Settings) -> Mapping[str, str]:
+def security_headers(settings: Settings, clips_from: str | None = None) -> Mapping[str, str]:
     """Headers of every answer. Cross-origin isolation also gives the page its finest clock."""
     headers = {
-        "content-security-policy": content_security_policy(),
+        "content-security-policy": content_security_policy(clips_from=clips_from),
         "x-content-type-options": "nosniff",
         "referrer-policy": "no-referrer",
         "x-frame-options": "DENY",
@@ -52,9 +53,9 @@ def security_headers(settings: Settings) -> Mapping[str, str]:
 class SecurityHeaders:
     """Add the security headers to every answer; `no-store` where the answer says nothing of caching."""
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings, clips_from: str | None = None) -> None:
         self.app = app
-        self.headers = {**security_headers(settings), "cache-control": "no-store"}
+        self.headers = {**security_headers(settings, clips_from), "cache-control": "no-store"}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from fastapi import APIRouter, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
-from server.context import SettingsDep
+from server.context import Services, ServicesDep, SettingsDep
 from server.errors import ApiError, NotFound
 from server.middleware import NONCE_PLACEHOLDER, content_security_policy, new_nonce
 
@@ -31,16 +31,16 @@ def home() -> RedirectResponse:
 
 
 @router.get("/run/{link_token}")
-def participant_page(settings: SettingsDep, link_token: str) -> Response:  # noqa: ARG001 - read by the page
+def participant_page(services: ServicesDep, link_token: str) -> Response:  # noqa: ARG001 - read by the page
     """The participant's page; it reads its link from the address."""
-    return _page(settings.frontend_folder / "participant")
+    return _page(services, "participant")
 
 
 @router.get("/admin")
 @router.get("/admin/{rest:path}")
-def admin_page(settings: SettingsDep, rest: str = "") -> Response:  # noqa: ARG001 - read by the page
+def admin_page(services: ServicesDep, rest: str = "") -> Response:  # noqa: ARG001 - read by the page
     """The admin site; its own router reads the address."""
-    return _page(settings.frontend_folder / "admin")
+    return _page(services, "admin")
 
 
 @router.get("/assets/{site}/{name:path}")
@@ -61,18 +61,17 @@ def asset(settings: SettingsDep, site: str, name: str) -> Response:
     raise NotFound(f"There is no file {name}.")
 
 
-def _page(folder: Path) -> Response:
-    index = folder / "index.html"
+def _page(services: Services, site: str) -> Response:
+    index = services.settings.frontend_folder / site / "index.html"
     if not index.is_file():
-        raise PagesNotBuilt(
-            f"The page {folder.name} is not built; run `make run`, or `npm run build` in frontend."
-        )
+        raise PagesNotBuilt(f"The page {site} is not built; run `make run`, or `npm run build` in frontend.")
     text = _read(index, index.stat().st_mtime_ns).decode("utf-8")
     headers = {"cache-control": "no-cache"}
     if NONCE_PLACEHOLDER in text:
         nonce = new_nonce()
         text = text.replace(NONCE_PLACEHOLDER, nonce)
-        headers = {"cache-control": "no-store", "content-security-policy": content_security_policy(nonce)}
+        policy = content_security_policy(nonce, services.clips.origin())
+        headers = {"cache-control": "no-store", "content-security-policy": policy}
     return HTMLResponse(text, headers=headers)
 
 

@@ -62,6 +62,19 @@ class Settings(BaseSettings):
     logins_per_minute: int = Field(
         default=10, ge=1, description="Sign-in attempts for one account a minute before it must wait."
     )
+    s3_bucket: str = Field(
+        default="", description="Bucket of an S3-compatible store for clips; empty: the data folder."
+    )
+    s3_prefix: str = Field(default="", description="Folder of the clips within the bucket.")
+    s3_endpoint: str = Field(
+        default="",
+        description="Address of the object store where it is not Amazon's, as https://s3.lab.example.",
+    )
+    s3_region: str = Field(default="us-east-1", description="Region of the bucket.")
+    s3_presigned: bool = Field(
+        default=False,
+        description="Browsers fetch clips from the store by signed addresses; else through the server.",
+    )
     log_format: Literal["auto", "json", "text"] = Field(
         default="auto", description="Form of the log on stderr: json, text, or auto (text on a terminal)."
     )

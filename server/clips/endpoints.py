@@ -4,7 +4,7 @@ import re
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Response
-from fastapi.responses import StreamingResponse
+from fastapi.responses import RedirectResponse, StreamingResponse
 
 from server.clips.store import CHUNK_BYTES
 from server.context import ServicesDep
@@ -12,11 +12,14 @@ from server.errors import ERROR_RESPONSES, ApiError, NotFound
 
 router = APIRouter(tags=["clips"], responses=ERROR_RESPONSES)
 IMMUTABLE = "public, max-age=31536000, immutable"
+REDIRECT_KEPT_S = 1800
+"""Half of what a signed address of `server.clips.s3` is good for."""
 _RANGE = re.compile(r"^bytes=(\d*)-(\d*)$")
 _CLIP_ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"content": {"video/mp4": {"schema": {"type": "string", "format": "binary"}}}},
     206: {"description": "The part asked for by Range"},
     304: {"description": "The copy the client has is right"},
+    307: {"description": "The clip is to be fetched from the object store"},
 }
 
 
@@ -46,6 +49,8 @@ def get_clip(
     size = services.clips.size(sha256)
     if size is None:
         raise ClipUnknown(f"No clip has the hash {sha256[:12]}...; reload the page to get the current list.")
+    if address := services.clips.address(sha256):
+        return RedirectResponse(address, 307, {"cache-control": f"private, max-age={REDIRECT_KEPT_S}"})
     etag = f'"{sha256}"'
     headers = {"etag": etag, "cache-control": IMMUTABLE, "accept-ranges": "bytes"}
     if if_none_match and (if_none_match.strip() == "*" or etag in if_none_match):

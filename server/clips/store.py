@@ -13,7 +13,7 @@ CHUNK_BYTES = 1 << 20
 
 
 class ClipStore(Protocol):
-    """What a clip store does; the folder is one, an object store could be another."""
+    """What a clip store does: the folder here, an object store in `server.clips.s3`."""
 
     def add(self, source: BinaryIO, sha256: str) -> bool:
         """Store a clip; True where it was not there yet. InputError where the bytes have another hash."""
@@ -26,6 +26,12 @@ class ClipStore(Protocol):
 
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
+
+    def address(self, sha256: str) -> str | None:
+        """Where a browser may fetch the clip itself; None: from this server."""
+
+    def origin(self) -> str | None:
+        """Scheme and host of such addresses; None: this server's."""
 
 
 class FolderStore:
@@ -77,6 +83,14 @@ class FolderStore:
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
         self.path(sha256).unlink(missing_ok=True)
+
+    def address(self, sha256: str) -> str | None:  # noqa: ARG002 - as other stores have it
+        """Clips of a folder come from this server."""
+        return None
+
+    def origin(self) -> str | None:
+        """Clips of a folder come from this server."""
+        return None
 
 
 def _copy(source: BinaryIO, target: Path) -> str:

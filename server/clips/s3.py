@@ -1,0 +1,104 @@
+"""Clips in an S3-compatible object store, passed on by the server or fetched by browsers themselves."""
+
+import hashlib
+import tempfile
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+from urllib.parse import urlsplit
+
+from experiments.errors import InputError
+from server.clips.store import CHUNK_BYTES
+from server.settings import Settings
+
+PRESIGNED_S = 3600
+SPOOL_BYTES = 1 << 24
+IMMUTABLE = "public, max-age=31536000, immutable"
+
+
+class S3Store:
+    """Clips as objects `PREFIX/SHA256.mp4` of one bucket.
+
+    Parameters
+    ----------
+    client: of boto3 for S3. presigned: whether browsers fetch clips from the store by signed addresses.
+    """
+
+    def __init__(self, client: Any, bucket: str, prefix: str = "", *, presigned: bool = False) -> None:
+        self.client, self.bucket, self.presigned = client, bucket, presigned
+        self.prefix = f"{prefix.strip('/')}/" if prefix.strip("/") else ""
+        self._sizes: dict[str, int] = {}
+
+    def add(self, source: BinaryIO, sha256: str) -> bool:
+        """Check the hash of a local copy, then upload: an object appears whole or not at all."""
+        if self.size(sha256) is not None:
+            return False
+        digest = hashlib.sha256()
+        with tempfile.SpooledTemporaryFile(max_size=SPOOL_BYTES) as spool:
+            while piece := source.read(CHUNK_BYTES):
+                digest.update(piece)
+                spool.write(piece)
+            if (found := digest.hexdigest()) != sha256:
+                raise InputError(
+                    f"clip: expected sha256 {sha256[:12]}..., got {found[:12]}...; the file was changed"
+                )
+            spool.seek(0)
+            said = {"ContentType": "video/mp4", "CacheControl": IMMUTABLE}
+            self.client.upload_fileobj(spool, self.bucket, self._name(sha256), ExtraArgs=said)
+        return True
+
+    def size(self, sha256: str) -> int | None:
+        """Length in bytes; None where there is no such clip. It never changes, so it is asked for once."""
+        if sha256 not in self._sizes:
+            try:
+                found = self.client.head_object(Bucket=self.bucket, Key=self._name(sha256))
+            except self.client.exceptions.ClientError as error:
+                if error.response["ResponseMetadata"]["HTTPStatusCode"] == 404:
+                    return None
+                raise
+            self._sizes[sha256] = int(found["ContentLength"])
+        return self._sizes[sha256]
+
+    def read(self, sha256: str, start: int, end: int) -> Iterator[bytes]:
+        """Bytes from `start` up to but without `end`, in pieces of at most a mebibyte."""
+        if start >= end:
+            return
+        part = f"bytes={start}-{end - 1}"
+        found = self.client.get_object(Bucket=self.bucket, Key=self._name(sha256), Range=part)
+        yield from found["Body"].iter_chunks(CHUNK_BYTES)
+
+    def remove(self, sha256: str) -> None:
+        """Delete a clip; nothing happens where it is not there."""
+        self._sizes.pop(sha256, None)
+        self.client.delete_object(Bucket=self.bucket, Key=self._name(sha256))
+
+    def address(self, sha256: str) -> str | None:
+        """A signed address good for an hour, where browsers are to fetch clips from the store."""
+        if not self.presigned:
+            return None
+        what = {"Bucket": self.bucket, "Key": self._name(sha256)}
+        return str(self.client.generate_presigned_url("get_object", Params=what, ExpiresIn=PRESIGNED_S))
+
+    def origin(self) -> str | None:
+        """Scheme and host of the signed addresses, for the content security policy."""
+        address = self.address("0" * 64)
+        return f"{urlsplit(address).scheme}://{urlsplit(address).netloc}" if address else None
+
+    def _name(self, sha256: str) -> str:
+        return f"{self.prefix}{sha256}.mp4"
+
+
+def open_s3(settings: Settings) -> S3Store:
+    """The store of these settings; credentials are found by boto3's own rules (AWS_ACCESS_KEY_ID...)."""
+    try:
+        import boto3
+        from botocore.config import Config
+    except ImportError as error:
+        raise InputError("PALPEBRA_S3_BUCKET needs the extra 's3': pip install 'palpebra[s3]'") from error
+    style = "path" if settings.s3_endpoint else "virtual"
+    client = boto3.client(
+        "s3",
+        endpoint_url=settings.s3_endpoint or None,
+        region_name=settings.s3_region,
+        config=Config(s3={"addressing_style": style}, signature_version="s3v4", retries={"mode": "standard"}),
+    )
+    return S3Store(client, settings.s3_bucket, settings.s3_prefix, presigned=settings.s3_presigned)
