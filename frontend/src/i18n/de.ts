@@ -90,6 +90,7 @@ export const de: Messages = {
   start_clip: "Film starten",
   decoding: "Der Film wird vorbereitet …",
   trial_of: "{number} von {total}",
+  clip_name: "Der Film",
   clip_playing: "Der Film läuft.",
   clip_over: "Der Film ist zu Ende. Bitte bewerten Sie ihn.",
   clip_broken_title: "Dieser Film lässt sich nicht zeigen",

@@ -88,6 +88,7 @@ export const en = {
   start_clip: "Start the clip",
   decoding: "Preparing the clip …",
   trial_of: "{number} of {total}",
+  clip_name: "The clip",
   clip_playing: "The clip is running.",
   clip_over: "The clip is over. Please rate it.",
   clip_broken_title: "This clip cannot be shown",

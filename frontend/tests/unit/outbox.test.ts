@@ -85,6 +85,15 @@ describe("outbox", () => {
     expect(got.at(-1)?.body).toEqual({ events: expect.arrayContaining([{ id: "e2" }]) });
   });
 
+  it("goes on in memory, and says so, when the disk fails", async () => {
+    const { outbox, store, got } = await opened(new IDBFactory());
+    expect(outbox.durable).toBe(true);
+    vi.spyOn(console, "warn").mockImplementation(() => {});
+    vi.spyOn(store, "add").mockRejectedValue(new DOMException("full", "QuotaExceededError"));
+    expect(await (await outbox.put("PUT", "/a", {})).receipt).toMatchObject({ accepted: true });
+    expect([outbox.durable, paths(got)]).toEqual([false, ["/a"]]);
+  });
+
   it("says after the limit that not all was sent", async () => {
     const { outbox } = await opened(new IDBFactory(), [], { send: () => new Promise<Answer>(() => {}) });
     await outbox.put("PUT", "/a", {});

@@ -29,6 +29,8 @@ export class Outbox {
   private failures = 0;
   private running = false;
   private stopped = false;
+  /** The disk is full or was taken away: what is put from now on lives in memory, and must be acknowledged. */
+  private storeFailed = false;
   private wake: () => void = () => {};
   private idle: (() => void)[] = [];
   private run: { run_id: string; token: string } | null = null;
@@ -36,7 +38,7 @@ export class Outbox {
   constructor(private readonly store: OutboxStore, private readonly options: OutboxOptions = {}) {}
 
   get durable(): boolean {
-    return this.store.durable;
+    return this.store.durable && !this.storeFailed;
   }
 
   get state(): OutboxState {
@@ -96,7 +98,7 @@ export class Outbox {
     if (!this.run) throw new Error("expected an open outbox, got one without a run; call open() first");
     this.sequence += 1;
     const kept: OutboxItem = { ...item, ...this.run, sequence: this.sequence };
-    await this.store.add(kept);
+    await this.onDisk(this.store.add(kept));
     this.queue.push(kept);
     this.changed();
     void this.sendAll();
@@ -140,8 +142,9 @@ export class Outbox {
     const accepted = answer.status >= 200 && answer.status < 300;
     const outcome: Outcome = accepted ? { accepted, body: answer.body } : { accepted, refused: refusalOf(answer) };
     const ids = new Set(batch.items.map((item) => item.id));
-    if (outcome.accepted) await this.store.remove([...ids]);
-    else for (const item of batch.items) await this.store.refuse(item, outcome.refused.code);
+    // What cannot be removed is sent once more by the next visit, which does no harm.
+    if (outcome.accepted) await this.onDisk(this.store.remove([...ids]));
+    else for (const item of batch.items) await this.onDisk(this.store.refuse(item, outcome.refused.code));
     this.queue = this.queue.filter((item) => !ids.has(item.id));
     for (const id of ids) {
       this.waiting.get(id)?.(outcome);
@@ -154,6 +157,13 @@ export class Outbox {
     const woken = new Promise<void>((resolve) => (this.wake = resolve));
     const sleep = this.options.pause ?? ((time) => new Promise<void>((resolve) => setTimeout(resolve, time)));
     await Promise.race([sleep(ms), woken]);
+  }
+
+  private onDisk(work: Promise<void>): Promise<void> {
+    return work.catch((error: unknown) => {
+      console.warn("the browser keeps nothing any more", error);
+      this.storeFailed = true;
+    });
   }
 
   private changed(): void {

@@ -62,7 +62,7 @@ function placeFor(session: Session, display: HTMLElement, trial: AssignedTrial):
   const wanted = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
   // Only where calibration is optional can it be too wide: it is then as wide as the window.
   const width = Math.min(wanted, window.innerWidth);
-  const place = stage(session.player.element, width, clipHeight(trial, width), session.t("trial_of", { number: 1, total: 1 }));
+  const place = stage(session.player.element, width, clipHeight(trial, width), session.t("clip_name"));
   display.replaceChildren(place.element);
   return place;
 }
