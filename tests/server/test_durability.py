@@ -75,8 +75,7 @@ def test_no_acknowledged_rating_is_lost_or_doubled(
                     os.killpg(process.pid, signal.SIGKILL)
                     process.wait()
                     process = start(real, port)
-                    token, client = client.token, JsonClient(f"http://127.0.0.1:{port}")
-                    client.token = token
+                    client.close()
                 status, answer = client.call("PUT", f"/api/run/ratings/{rating_id}", body)
                 assert status in (200, 201)
                 sent += 1
