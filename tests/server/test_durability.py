@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 import uuid
-from pathlib import Path
 
 import pytest
 from sqlalchemy import text
@@ -50,13 +49,11 @@ def start(settings: Settings, port: int) -> subprocess.Popen[bytes]:
 @pytest.mark.slow
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_no_acknowledged_rating_is_lost_or_doubled(
-    services: Services, settings: Settings, tmp_path: Path, study: StudyInDatabase
+    services: Services, settings: Settings, study: StudyInDatabase
 ) -> None:
     port, rng = free_port(), random.Random(5)
-    # On the disk, not in memory: this test is about what is really written.
-    real = settings.model_copy(update={"data_folder": tmp_path / "data"})
     services.database.engine.dispose()
-    process = start(real, port)
+    process = start(settings, port)
     acknowledged: dict[str, int] = {}
     sent = 0
     try:
@@ -74,7 +71,7 @@ def test_no_acknowledged_rating_is_lost_or_doubled(
                     client.send("PUT", f"/api/run/ratings/{rating_id}", body)
                     os.killpg(process.pid, signal.SIGKILL)
                     process.wait()
-                    process = start(real, port)
+                    process = start(settings, port)
                     client.close()
                 status, answer = client.call("PUT", f"/api/run/ratings/{rating_id}", body)
                 assert status in (200, 201)
