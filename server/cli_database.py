@@ -1,10 +1,11 @@
-"""`server database`: bring the database to the newest revision, or say which one it has."""
+"""`server database`: bring the database to the newest revision, say which one it has, copy it to another."""
 
 import typer
 
 from server.cli_common import migrated_services, out
 from server.db import open_database
 from server.migrate import current_revision, newest_revision
+from server.operations.cli import copy
 from server.settings import Settings
 
 app = typer.Typer(help="The database's tables.", no_args_is_help=True)
@@ -13,6 +14,7 @@ app = typer.Typer(help="The database's tables.", no_args_is_help=True)
 def register(parent: typer.Typer) -> None:
     """Add `server database` to the command line."""
     parent.add_typer(app, name="database")
+    app.command("copy")(copy)
 
 
 @app.command("upgrade")

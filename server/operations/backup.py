@@ -1,0 +1,135 @@
+"""`server backup`: database, clips and secret key of one moment in one file.
+
+The file is a tar: `backup.json` (what is in it), `tables/NAME.ndjson.gz` (the rows, of neither database's own
+form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips/SHA256.mp4`, `secret_key`.
+"""
+
+import gzip
+import io
+import json
+import os
+import secrets
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import IO
+
+from alembic.runtime.migration import MigrationContext
+from pydantic import BaseModel, Field
+from sqlalchemy import Connection, Table
+
+from experiments.errors import InputError
+from server.clock import iso, now
+from server.context import Services
+from server.operations.rows import Content, Digest, read_rows, snapshot, tables_of
+
+DESCRIPTION, TABLES, CLIPS, KEY = "backup.json", "tables/", "clips/", "secret_key"
+SPOOL_BYTES = 1 << 24
+
+
+class TableDescription(BaseModel):
+    """What a table of the backup holds."""
+
+    rows: int
+    sha256: str
+
+
+class Description(BaseModel):
+    """The first file of a backup."""
+
+    format: int = Field(default=1, description="Raised when the form of the file changes.")
+    program_version: str
+    revision: str = Field(description="Revision of the database the rows were read from.")
+    created_at: str
+    tables: dict[str, TableDescription]
+    clips: list[str] = Field(description="SHA-256 of each clip in the file; empty where left out.")
+
+
+def back_up(services: Services, path: Path, *, with_clips: bool = True) -> Description:
+    """Write a backup of one moment while the server goes on; mode 600, under its name only once complete."""
+    with _written(path) as stream, tarfile.open(fileobj=stream, mode="w|") as tar:
+        with snapshot(services.database) as connection, tempfile.TemporaryDirectory() as folder:
+            described = _describe(connection, services, Path(folder), with_clips)
+            _add_bytes(tar, DESCRIPTION, described.model_dump_json(indent=2).encode())
+            for name in described.tables:
+                tar.add(Path(folder) / name, TABLES + name + ".ndjson.gz", filter=_plain)
+        _add_bytes(tar, KEY, services.settings.key)
+        for sha256 in described.clips:
+            _add_clip(tar, services, sha256)
+    return described
+
+
+def _describe(connection: Connection, services: Services, folder: Path, with_clips: bool) -> Description:
+    """Dump every table into `folder` and describe what was dumped."""
+    revision = MigrationContext.configure(connection).get_current_revision()
+    if revision is None:
+        raise InputError("the database has no tables yet; there is nothing to back up")
+    tables = {table.name: _dump(connection, table, folder / table.name) for table in tables_of(connection)}
+    clips = connection.exec_driver_sql("SELECT sha256 FROM clips ORDER BY sha256").scalars().all()
+    return Description(
+        program_version=version("palpebra"),
+        revision=revision,
+        created_at=iso(now()),
+        tables={name: TableDescription(rows=c.rows, sha256=c.sha256) for name, c in tables.items()},
+        clips=[clip for clip in clips if with_clips and services.clips.size(clip) is not None],
+    )
+
+
+def _dump(connection: Connection, table: Table, path: Path) -> Content:
+    digest = Digest()
+    with gzip.open(path, "wt", encoding="utf-8", compresslevel=6) as stream:
+        for row in read_rows(connection, table):
+            digest.add(row)
+            stream.write(json.dumps(row, ensure_ascii=False) + "\n")
+    return digest.content()
+
+
+def _add_clip(tar: tarfile.TarFile, services: Services, sha256: str) -> None:
+    size = services.clips.size(sha256)
+    if size is None:
+        raise InputError(f"clip {sha256[:12]}... went away during the backup; run it again")
+    with tempfile.SpooledTemporaryFile(max_size=SPOOL_BYTES) as spool:
+        for piece in services.clips.read(sha256, 0, size):
+            spool.write(piece)
+        spool.seek(0)
+        tar.addfile(_entry(f"{CLIPS}{sha256}.mp4", size), spool)
+
+
+def _add_bytes(tar: tarfile.TarFile, name: str, content: bytes) -> None:
+    tar.addfile(_entry(name, len(content)), io.BytesIO(content))
+
+
+def _entry(name: str, size: int) -> tarfile.TarInfo:
+    entry = tarfile.TarInfo(name)
+    entry.size, entry.mode, entry.mtime = size, 0o600, int(now().timestamp())
+    return entry
+
+
+def _plain(entry: tarfile.TarInfo) -> tarfile.TarInfo:
+    """Nothing of the machine's users in the file."""
+    entry.uid = entry.gid = 0
+    entry.uname = entry.gname = ""
+    entry.mode = 0o600
+    return entry
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[IO[bytes]]:
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # It holds the secret key and everybody's answers: for the owner of the file alone.
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink()

@@ -1,0 +1,179 @@
+"""What `server doctor` looks at; each check says what it found and, where it is wrong, what to do."""
+
+import os
+import shutil
+import sqlite3
+import stat
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+from urllib.parse import urlsplit
+
+from sqlalchemy import func, select, text
+
+from server.context import Services
+from server.migrate import current_revision, newest_revision
+from server.models import Account, Clip, Study
+
+Verdict = Literal["ok", "warning", "failed"]
+LEAST_FREE_BYTES = 2 * 1024**3
+OLDEST_PYTHON, OLDEST_SQLITE, OLDEST_POSTGRES = (3, 11), (3, 38, 0), 130000
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the doctor: what was looked at, how it is, what was found, what to do."""
+
+    subject: str
+    verdict: Verdict
+    found: str
+    advice: str = ""
+
+
+def python(_services: Services) -> Iterator[Finding]:
+    """The interpreter is recent enough."""
+    found = ".".join(map(str, sys.version_info[:3]))
+    fine = sys.version_info >= OLDEST_PYTHON
+    yield Finding("python", "ok" if fine else "failed", found, "" if fine else "install Python 3.11 or newer")
+
+
+def data_folder(services: Services) -> Iterator[Finding]:
+    """The data folder can be written and has room."""
+    folder = services.settings.data_folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".doctor-{os.getpid()}"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        advice = "give the user that runs the server the right to write there, or set PALPEBRA_DATA_FOLDER"
+        yield Finding("data folder", "failed", f"{folder}: {error.strerror}", advice)
+        return
+    free = shutil.disk_usage(folder).free
+    fine = free >= LEAST_FREE_BYTES
+    advice = "" if fine else "make room: a full disk stops every rating"
+    yield Finding("data folder", "ok" if fine else "warning", f"{folder}, {free / 1e9:.1f} GB free", advice)
+
+
+def secret_key(services: Services) -> Iterator[Finding]:
+    """The key is there, and no other user can read it."""
+    settings = services.settings
+    path = settings.data_folder / "secret_key"
+    if settings.secret_key:
+        fine = len(settings.secret_key) >= 32
+        advice = "" if fine else "set PALPEBRA_SECRET_KEY to at least 32 random characters"
+        yield Finding("secret key", "ok" if fine else "warning", "from the environment", advice)
+    elif not path.is_file():
+        yield Finding("secret key", "ok", "will be made at the first start")
+    else:
+        mode = stat.S_IMODE(path.stat().st_mode)
+        fine = mode & 0o077 == 0
+        advice = "" if fine else f"run: chmod 600 {path}"
+        yield Finding("secret key", "ok" if fine else "failed", f"{path}, mode {mode:o}", advice)
+
+
+def database(services: Services) -> Iterator[Finding]:
+    """The database opens, has the newest tables, and keeps what it acknowledges."""
+    opened = services.database
+    found, expected = current_revision(opened), newest_revision()
+    where = opened.url.render_as_string(hide_password=True)
+    fine = found == expected
+    said = f"{where}, revision {found or 'none'}"
+    yield Finding(
+        "database", "ok" if fine else "failed", said, "" if fine else "run: server database upgrade"
+    )
+    yield from _sqlite(services) if opened.is_sqlite else _postgres(services)
+
+
+def _sqlite(services: Services) -> Iterator[Finding]:
+    fine = sqlite3.sqlite_version_info >= OLDEST_SQLITE
+    advice = "" if fine else "install a Python with SQLite 3.38 or newer"
+    yield Finding("SQLite", "ok" if fine else "failed", sqlite3.sqlite_version, advice)
+    with services.database.read() as session:
+        said = str(session.scalar(text("PRAGMA quick_check(1)")))
+    advice = "" if said == "ok" else "stop the server and restore the last backup: server restore FILE"
+    yield Finding("SQLite file", "ok" if said == "ok" else "failed", said, advice)
+
+
+def _postgres(services: Services) -> Iterator[Finding]:
+    with services.database.read() as session:
+        number = int(str(session.scalar(text("SHOW server_version_num"))))
+        durable = {name: session.scalar(text(f"SHOW {name}")) for name in ("fsync", "synchronous_commit")}
+        most = int(str(session.scalar(text("SHOW max_connections"))))
+    fine = number >= OLDEST_POSTGRES
+    advice = "" if fine else "use PostgreSQL 13 or newer"
+    yield Finding("PostgreSQL", "ok" if fine else "failed", f"version {number // 10000}", advice)
+    off = [name for name, value in durable.items() if value == "off"]
+    advice = f"set {' and '.join(off)} on: a power cut could lose acknowledged ratings" if off else ""
+    said = ", ".join(f"{name} {value}" for name, value in durable.items())
+    yield Finding("durability", "warning" if off else "ok", said, advice)
+    wanted = 2 * services.settings.database_pool
+    advice = f"a worker may use {wanted}: raise max_connections or lower PALPEBRA_DATABASE_POOL"
+    tight = wanted + 5 > most
+    yield Finding("connections", "warning" if tight else "ok", f"{most} allowed", advice if tight else "")
+
+
+def clips(services: Services) -> Iterator[Finding]:
+    """Every clip that a study names is in the store, with the right length."""
+    with services.database.read() as session:
+        named = session.execute(select(Clip.sha256, Clip.bytes)).all()
+    wrong = [sha256 for sha256, size in named if services.clips.size(sha256) != size]
+    if wrong:
+        advice = "add the study again from its clips (server study add), or restore a backup"
+        yield Finding("clips", "failed", f"{len(wrong)} of {len(named)} missing or cut short", advice)
+    else:
+        yield Finding("clips", "ok", f"{len(named)}, all there")
+
+
+def pages(services: Services) -> Iterator[Finding]:
+    """The pages are built."""
+    for site in ("participant", "admin"):
+        path = services.settings.frontend_folder / site / "index.html"
+        advice = (
+            "" if path.is_file() else "run: npm ci && npm run build (in the folder frontend), or `make run`"
+        )
+        said = "built" if path.is_file() else f"no {path}"
+        yield Finding(f"{site} page", "ok" if path.is_file() else "failed", said, advice)
+
+
+def public_address(services: Services) -> Iterator[Finding]:
+    """Participants reach the server by https, without which browsers give no exact playback."""
+    settings = services.settings
+    host = urlsplit(settings.public_url).hostname or ""
+    local = host in ("localhost", "127.0.0.1", "::1")
+    fine = settings.is_https or local
+    advice = "" if fine else "put https in front (docs/deployment.md) and set PALPEBRA_PUBLIC_URL=https://..."
+    yield Finding("public address", "ok" if fine else "failed", settings.public_url, advice)
+    if local:
+        advice = "set PALPEBRA_PUBLIC_URL before sending links to anybody on another machine"
+        yield Finding("who can reach it", "warning", "this machine alone", advice)
+
+
+def people(services: Services) -> Iterator[Finding]:
+    """Somebody can sign in; there is something to take part in."""
+    with services.database.read() as session:
+        query = select(func.count()).select_from(Account).where(Account.disabled_at.is_(None))
+        owners = session.scalar(query.where(Account.role == "owner")) or 0
+        without = session.scalar(query.where(Account.totp_confirmed_at.is_(None))) or 0
+        studies = session.scalar(select(func.count()).select_from(Study)) or 0
+    advice = "" if owners else "run: server admin link, and open the address it prints"
+    yield Finding("accounts", "ok" if owners else "warning", f"{owners} owners", advice)
+    if without:
+        advice = "ask them to set it up under their account"
+        yield Finding("second factor", "warning", f"{without} accounts without", advice)
+    advice = "" if studies else "run: server study add exp3 --clips FOLDER"
+    yield Finding("studies", "ok" if studies else "warning", str(studies), advice)
+
+
+CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
+    python,
+    data_folder,
+    secret_key,
+    database,
+    clips,
+    pages,
+    public_address,
+    people,
+)
+"""In the order in which one would put things right."""

@@ -1,0 +1,143 @@
+"""`server restore`: a backup into an empty database, clip store and data folder."""
+
+import gzip
+import json
+import os
+import tarfile
+from collections.abc import Callable, Iterator
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from alembic import command
+from pydantic import ValidationError
+from sqlalchemy import Table
+
+from experiments.errors import InputError
+from server.context import Services
+from server.migrate import alembic_config, known_revision
+from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
+from server.operations.rows import Row, refuse_unless_empty, tables_of, write_rows
+from server.settings import Settings
+
+FORMAT = 1
+
+
+def restore(services: Services, path: Path, told: Callable[[str], None] = lambda _line: None) -> Description:
+    """Bring a backup back; afterwards the database has the newest revision.
+
+    The rows go in under the revision they were written by and are migrated from there, all in one
+    transaction; counts and hashes are compared with those of the backup. Each clip's hash is checked.
+
+    Raises
+    ------
+    InputError
+        The file is no backup, is damaged or of a newer program; the database is not empty; the data folder
+        has another secret key.
+    """
+    try:
+        with tarfile.open(path) as tar:
+            described = _description(tar, path)
+            key = _content(tar, KEY)
+            _check_key(services.settings, key)
+            _restore_rows(services, tar, described, told)
+            for sha256 in described.clips:
+                _restore_clip(services, tar, sha256)
+    except (tarfile.TarError, EOFError, gzip.BadGzipFile) as error:
+        raise InputError(f"{path} is damaged or no backup of `server backup`: {error}") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+    _keep_key(services.settings, key)
+    told(f"{len(described.clips)} clips, secret key")
+    return described
+
+
+def _description(tar: tarfile.TarFile, path: Path) -> Description:
+    try:
+        described = Description.model_validate_json(_content(tar, DESCRIPTION))
+    except ValidationError as error:
+        raise InputError(f"{path}: {DESCRIPTION} is not that of a backup") from error
+    if described.format != FORMAT or not known_revision(described.revision):
+        raise InputError(
+            f"{path} was written by version {described.program_version} (revision {described.revision}), "
+            "which this program does not know; install that version or a newer one"
+        )
+    return described
+
+
+def _restore_rows(
+    services: Services, tar: tarfile.TarFile, described: Description, told: Callable[[str], None]
+) -> None:
+    with services.database.write_connection() as connection:
+        refuse_unless_empty(connection, "the database")
+        command.upgrade(alembic_config(connection), described.revision)
+        known = {table.name: table for table in tables_of(connection)}
+        for name in _in_order(known, described):
+            expected = described.tables[name]
+            written = write_rows(connection, known[name], _rows(tar, name))
+            if (written.rows, written.sha256) != (expected.rows, expected.sha256):
+                raise InputError(
+                    f"table {name}: expected {expected.rows} rows, the file holds {written.rows} or other "
+                    "values; the backup is damaged, nothing was restored"
+                )
+            told(f"{name}: {written.rows} rows")
+        command.upgrade(alembic_config(connection), "head")
+
+
+def _in_order(known: dict[str, Table], described: Description) -> list[str]:
+    if unknown := sorted(set(described.tables) - set(known)):
+        raise InputError(f"the backup holds a table '{unknown[0]}' that its revision does not have")
+    return [name for name in known if name in described.tables]
+
+
+def _rows(tar: tarfile.TarFile, name: str) -> Iterator[Row]:
+    with gzip.open(_member(tar, f"{TABLES}{name}.ndjson.gz"), "rt", encoding="utf-8") as stream:
+        for line in stream:
+            yield json.loads(line)
+
+
+def _restore_clip(services: Services, tar: tarfile.TarFile, sha256: str) -> None:
+    # The store checks the hash; only names of the form that we wrote are looked for.
+    if not (len(sha256) == 64 and PurePosixPath(sha256).name == sha256):
+        raise InputError(f"the backup names a clip '{sha256[:80]}', which is no hash")
+    with _member(tar, f"{CLIPS}{sha256}.mp4") as source:
+        services.clips.add(source, sha256)
+
+
+def _member(tar: tarfile.TarFile, name: str) -> IO[bytes]:
+    try:
+        found = tar.extractfile(name)
+    except KeyError:
+        found = None
+    if found is None:
+        raise InputError(f"the backup lacks {name}; it is damaged or no backup of `server backup`")
+    return found
+
+
+def _content(tar: tarfile.TarFile, name: str) -> bytes:
+    return _member(tar, name).read()
+
+
+def _key_path(settings: Settings) -> Path:
+    return settings.data_folder / "secret_key"
+
+
+def _check_key(settings: Settings, key: bytes) -> None:
+    """Links that were handed out hold with their own key alone."""
+    there = settings.secret_key.encode() if settings.secret_key else b""
+    if not there and _key_path(settings).is_file():
+        there = _key_path(settings).read_bytes().strip()
+    if there and there != key:
+        raise InputError(
+            "this installation has another secret key than the backup, so that links already handed out "
+            f"could not be shown again; remove {_key_path(settings)} (or unset PALPEBRA_SECRET_KEY) "
+            "where it is not in use"
+        )
+
+
+def _keep_key(settings: Settings, key: bytes) -> None:
+    path = _key_path(settings)
+    if settings.secret_key or path.is_file():
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
+        stream.write(key)

@@ -1,0 +1,68 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from server.context import Services, open_services
+from server.operations.checks import CHECKS, Finding
+from server.operations.doctor import examine
+from server.settings import Settings
+from tests.helpers.databases import run_server_command
+from tests.helpers.studies import StudyInDatabase
+
+
+def by_subject(services: Services) -> dict[str, Finding]:
+    return {finding.subject: finding for finding in examine(services)}
+
+
+def test_an_installation_in_order(services: Services, study: StudyInDatabase) -> None:
+    for site in ("participant", "admin"):
+        page = services.settings.frontend_folder / site / "index.html"
+        page.parent.mkdir(parents=True)
+        page.write_text("<html>")
+    found = by_subject(services)
+    assert [finding for finding in found.values() if finding.verdict == "failed"] == []
+    assert found["clips"].found == "8, all there"
+    assert found["studies"].found == "1"
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+class TestTroubles:
+    def test_every_trouble_comes_with_advice(self, services: Services, study: StudyInDatabase) -> None:
+        for path in services.settings.clip_folder.rglob("*.mp4"):
+            path.write_bytes(b"cut")
+            break
+        key = services.settings.data_folder / "secret_key"
+        key.write_text("k")
+        key.chmod(0o644)
+        changes = {"secret_key": "", "public_url": "http://lab.example"}
+        wrong = open_services(services.settings.model_copy(update=changes))
+        found = by_subject(wrong)
+        wrong.database.close()
+        assert found["clips"].found == "1 of 8 missing or cut short"
+        assert found["secret key"].advice == f"run: chmod 600 {key}"
+        assert "https" in found["public address"].advice
+        assert found["admin page"].verdict == "failed"
+        for finding in found.values():
+            assert (finding.verdict == "ok") == (finding.advice == ""), finding
+
+    def test_the_command_ends_with_1_where_something_failed(self, settings: Settings) -> None:
+        done = run_server_command(settings, "doctor", "--json")
+        assert done.returncode == 1, done.stderr
+        verdicts = {item["subject"]: item["verdict"] for item in json.loads(done.stdout)}
+        assert verdicts["database"] == "ok"
+        assert verdicts["participant page"] == "failed"
+
+
+def test_a_database_that_cannot_be_opened_is_one_finding_each(tmp_path: Path) -> None:
+    (tmp_path / "x.sqlite").write_bytes(b"no database at all, but long enough to be looked at" * 20)
+    services = open_services(Settings(data_folder=tmp_path, database_url=f"sqlite:///{tmp_path}/x.sqlite"))
+    found = by_subject(services)
+    services.database.close()
+    assert found["database"] == Finding(
+        "database",
+        "failed",
+        "file is not a database",
+        "see DATABASE_URL, then run: server database upgrade",
+    )
+    assert len(found) >= len(CHECKS)

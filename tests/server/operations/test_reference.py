@@ -1,0 +1,19 @@
+import subprocess
+import sys
+
+from tests.conftest import REPOSITORY
+
+
+def test_the_generated_pages_are_current() -> None:
+    command = [sys.executable, str(REPOSITORY / "tools" / "reference.py"), "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_exported_column_is_explained() -> None:
+    from experiments.ratings import RATING_COLUMNS
+
+    page = (REPOSITORY / "docs" / "data-dictionary.md").read_text(encoding="utf-8")
+    for column in RATING_COLUMNS:
+        assert f"| `{column.name}` | {column.type} |" in page
+        assert column.sentence.endswith(".")

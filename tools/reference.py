@@ -1,0 +1,113 @@
+"""Write what is declared in code as documentation: docs/data-dictionary.md, docs/settings.md.
+
+python tools/reference.py           write both
+python tools/reference.py --check   fail where they are not current
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from pydantic_core import PydanticUndefined  # noqa: E402
+from sqlalchemy import Table  # noqa: E402
+
+from experiments.ratings import RATING_COLUMNS, Column  # noqa: E402
+from server.models import Base  # noqa: E402
+from server.settings import Settings  # noqa: E402
+
+MADE = "<!-- Written by `make docs` from the code; change it there. -->"
+
+
+def table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+    """A Markdown table."""
+    yield "| " + " | ".join(header) + " |"
+    yield "|" + "---|" * len(header)
+    for row in rows:
+        yield "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in row) + " |"
+
+
+def column_row(column: Column) -> tuple[str, ...]:
+    """One column of the export."""
+    values = ", ".join(f"`{value}`" for value in column.values)
+    sentence = column.sentence + (f" One of {values}." if values else "")
+    return f"`{column.name}`", column.type, column.unit or "", sentence
+
+
+def stored(of: Table) -> Iterator[str]:
+    """A table of the database: what it is for, and its columns."""
+    model = next(mapper.class_ for mapper in Base.registry.mappers if mapper.local_table is of)
+    yield f"### {of.name}"
+    yield ""
+    yield " ".join((model.__doc__ or "").split())
+    yield ""
+    names = [f"`{column.name}`" + ("" if column.nullable else "*") for column in of.columns]
+    yield "Columns (* never empty): " + ", ".join(names) + "."
+    yield ""
+
+
+def data_dictionary() -> str:
+    """The export's columns, and the tables behind them."""
+    lines = [MADE, "# Data dictionary", ""]
+    lines += [
+        "## One row a play: the view `ratings`, the CSV export",
+        "",
+        "Declared in `experiments/ratings.py`. The CSV has a column a factor in the place of `levels`; there,",
+        "what is missing is empty and booleans are 0 and 1. Times are UTC. Previews and erased people are left out.",
+        "",
+    ]
+    lines += table(("column", "type", "unit", "meaning"), map(column_row, RATING_COLUMNS))
+    lines += ["", "## Tables of the database", ""]
+    lines += [
+        "The tables may change from version to version (by migrations); the view above is the contract.",
+        "",
+    ]
+    for each in Base.metadata.sorted_tables:
+        lines += stored(each)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def setting_row(name: str, field: Any) -> tuple[str, ...]:
+    """One setting."""
+    variable = "DATABASE_URL" if name == "database_url" else f"PALPEBRA_{name.upper()}"
+    default = "" if field.default is PydanticUndefined else field.default
+    if isinstance(default, Path):
+        default = default.relative_to(ROOT) if default.is_absolute() else default
+    kind = " or ".join(map(str, get_args(field.annotation))) or field.annotation.__name__
+    return f"`{variable}`", kind, f"`{default}`" if default != "" else "empty", field.description
+
+
+def settings_reference() -> str:
+    """Every environment variable of the server."""
+    lines = [MADE, "# Settings of the server", "", "All come from the environment.", ""]
+    rows = (setting_row(name, field) for name, field in Settings.model_fields.items())
+    lines += table(("variable", "type", "default", "meaning"), rows)
+    return "\n".join(lines) + "\n"
+
+
+PAGES = {"docs/data-dictionary.md": data_dictionary, "docs/settings.md": settings_reference}
+
+
+def main() -> int:
+    stale = []
+    for name, text in PAGES.items():
+        path = ROOT / name
+        if path.is_file() and path.read_text(encoding="utf-8") == text():
+            continue
+        if "--check" in sys.argv:
+            stale.append(name)
+        else:
+            path.write_text(text(), encoding="utf-8")
+            print(f"wrote {name}")
+    if stale:
+        print(f"not current: {', '.join(stale)}; run `make docs`")
+    return 1 if stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
