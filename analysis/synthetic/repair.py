@@ -15,6 +15,8 @@ Integers = NDArray[np.int64]
 FIRST_MOVES = 40
 """How many random first moves are tried, each with every second move, where no single move helps."""
 
+MAXIMUM_STEPS = 3000
+
 STALLS = 3
 """Fruitless rounds of paired moves before random moves."""
 
@@ -112,26 +114,26 @@ def repair(
     targets: Targets,
     rng: np.random.Generator,
     progress: Callable[[int, int], None] | None = None,
-    maximum_steps: int = 80,
+    maximum_pairs: int = 60,
 ) -> Repaired:
     """Find whole sums of `trials` ratings near `cell_means` (n, cells) that hit every target.
 
     Steepest descent over all changes of one point; where none helps, over random pairs of changes; from a
-    dead end a few random ones lead on. Ends when every target is hit or after `maximum_steps`. `progress`
-    gets (targets missed, step).
+    dead end a few random ones lead on. Ends when every target is hit or after `maximum_pairs` rounds of
+    paired changes. `progress` gets (targets missed, step).
     """
     sums = np.clip(np.rint(cell_means * trials), trials * scale[0], trials * scale[1]).astype(np.int64)
     search = _Search(sums, trials, scale, targets, rng)
-    now, stalled = np.inf, 0
+    now, stalled, paired, step = np.inf, 0, 0, 0
     missed = missed_targets(sums / trials, targets)
-    for step in range(maximum_steps):
-        if not missed:
-            return Repaired(search.sums, (), step)
+    while missed and paired < maximum_pairs and step < MAXIMUM_STEPS:
+        step += 1
         index, loss = search.best()
         if loss < now:
             search.move(index)
             now = loss
         else:
+            paired += 1
             before, now = now, search.two_moves(now)
             stalled = stalled + 1 if now == before else 0
             if stalled == STALLS:
@@ -140,4 +142,4 @@ def repair(
         missed = missed_targets(search.sums / trials, targets)
         if progress is not None:
             progress(len(missed), step)
-    return Repaired(search.sums, missed, maximum_steps)
+    return Repaired(search.sums, missed, step)

@@ -84,8 +84,16 @@ def make_plan(
     widest = max(c.shape[1] for c in space.effects.values())
     if people < widest + 2:
         raise InputError(f"expected at least {widest + 2} participants for {name}, got {people}")
+    if people != experiment.participants:
+        published = _without_p(published)
     published, given_way = make_feasible(with_wishes(published, space, means, effects), space)
     return Plan(experiment, space, published, make_targets(published, space, people), given_way)
+
+
+def _without_p(published: Published) -> Published:
+    """The figures for another number of participants: a printed F then has another p."""
+    tests = tuple(t if t.f is None else t.model_copy(update={"p": None}) for t in published.tests)
+    return published.model_copy(update={"tests": tests})
 
 
 def population_of(plan: Plan, rng: np.random.Generator) -> Population:

@@ -1,8 +1,8 @@
 """What a user wants otherwise: other means, other effect sizes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from analysis.synthetic.published import Direction, PrintedMean, PrintedTest, Published, decimals
+from analysis.synthetic.published import Direction, Place, PrintedMean, PrintedTest, Published, decimals
 from analysis.synthetic.space import DesignSpace
 from experiments.errors import InputError
 
@@ -18,7 +18,7 @@ def with_wishes(
     effects : `blur:amplitude=20.35`, the multivariate F wanted; `=0` for no effect.
 
     Figures that would contradict a wish (the order and the pairs of its factors, a mean at the same place,
-    the printed p of the same effect) are dropped; all others stay.
+    the printed p of the same effect, the means of an effect wished away) are dropped; all others stay.
     """
     wished_means = [_mean(text, space) for text in means]
     wished_tests = [_test(text, space) for text in effects]
@@ -27,8 +27,9 @@ def with_wishes(
         return published
     places = [m.at for m in wished_means]
     named = {t.effect for t in wished_tests}
+    gone = [frozenset(t.effect.split(":")) for t in wished_tests if float(t.f or 1) == 0]
     update = {
-        "means": (*(m for m in published.means if m.at not in places), *wished_means),
+        "means": (*_kept(published.means, places, gone), *wished_means),
         "tests": (
             *(t for t in published.tests if space.effect_called(t.effect) not in named),
             *wished_tests,
@@ -36,10 +37,21 @@ def with_wishes(
         "pairs": tuple(p for p in published.pairs if not any(p.factor in t for t in touched)),
         "directions": tuple(d for d in published.directions if not any(t & _factors(d) for t in touched)),
         "invented_means": tuple(
-            m for m in published.invented_means if not any(set(m.at) <= set(p) for p in places)
+            m
+            for m in published.invented_means
+            if not any(set(m.at) <= set(p) for p in places) and not any(g <= set(m.at) for g in gone)
         ),
     }
     return published.model_copy(update=update)
+
+
+def _kept(
+    means: tuple[PrintedMean, ...], places: list[Place], gone: list[frozenset[str]]
+) -> Iterator[PrintedMean]:
+    """Printed means at no wished place, and not of an effect that is wished away."""
+    for mean in means:
+        if mean.at not in places and not any(effect <= set(mean.at) for effect in gone):
+            yield mean
 
 
 def _factors(direction: Direction) -> set[str]:

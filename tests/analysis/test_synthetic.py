@@ -122,6 +122,17 @@ def test_wishes_replace_printed_figures():
     assert f"{test.f_value:.2f}" == "6.50"
 
 
+def test_another_number_of_participants_keeps_the_printed_f_not_its_p():
+    blur = next(t for t in make_plan("exp1", 60).targets.tests if t.name == "F blur")
+    assert (blur.low, blur.high) == pytest.approx((0.9455, 0.9545))
+
+
+def test_an_effect_wished_away_takes_its_printed_means_along():
+    plan = make_plan("exp1", effects=["blur=0"])
+    assert not any(set(m.at) == {"blur"} for m in plan.published.means)
+    assert any(set(m.at) == {"profile"} for m in plan.published.means)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -37,7 +37,9 @@ fit_lmer <- function(formula, data) {
   devfun <- do.call(mkLmerDevfun, parts)
   opt <- optimizeLmer(devfun, optimizer = "nloptwrap", control = tight$optCtrl)
   theta <- opt$par
-  free <- which(abs(theta) > 1e-4)
+  at_zero <- replace(theta, abs(theta) < 1e-3, 0)
+  if (devfun(at_zero) <= devfun(theta) + 1e-6) theta <- at_zero
+  free <- which(theta != 0)
   partial <- function(x) { full <- theta; full[free] <- x; devfun(full) }
   for (again in 1:4) {
     step <- solve(numDeriv::hessian(partial, theta[free]), numDeriv::grad(partial, theta[free]))
