@@ -50,8 +50,8 @@ def label(
 ) -> None:
     """Propose labels for frames chosen for variety, with a face landmark detector (optional extra).
 
-    Needs MediaPipe (pip install 'mediapipe>=1.2') and a weights file of your own. A detector sets upper-lid points
-    1 to 2 pixels low on half-closed lids: review every frame on the labelling page before training.
+    Needs MediaPipe (pip install 'mediapipe>=1.2') and a weights file of your own. A detector sets upper-lid
+    points 1 to 2 pixels low on half-closed lids: review every frame on the labelling page before training.
 
     Example:
 
