@@ -12,14 +12,17 @@ from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
 from stimuli_builder.characters.photorealistic import anatomy, framing, plan
 from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
+from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose
 from stimuli_builder.characters.photorealistic.framing import Box, Frame, bounding_box
-from stimuli_builder.characters.photorealistic.inbetween import Inbetweener
+from stimuli_builder.characters.photorealistic.inbetween import Inbetweener, Rendered
 from stimuli_builder.characters.photorealistic.parameters import Face
 from stimuli_builder.characters.photorealistic.plan import Quality, Stage, closures_of
 from stimuli_builder.characters.photorealistic.renderer import Shot
+from stimuli_builder.characters.photorealistic.visibility import upper_lid_matte
 from stimuli_builder.characters.writing import write_declaration, write_picture
 
 Code = NDArray[np.float32]
+LOWER_LID_STEPS = 4
 
 
 class Assembly:
@@ -48,16 +51,17 @@ class Assembly:
 
     def levels(self, rendered: int, between: int) -> Iterator[tuple[float, NDArray[np.uint8]]]:
         """Closures and 8-bit pictures of the rendered levels, with `between` moved ones after each."""
-        inbetweener = Inbetweener(self.face, self.frame)
+        inbetweener = self._inbetweener(self.frame.eye_boxes(), self.crop)
         closures = closures_of(rendered)
         picture = to_8_bit(self.level(closures[0]))
         for low, high in pairwise(closures):
             yield low, picture
             upper = to_8_bit(self.level(high))
-            lights = srgb_to_linear(picture), srgb_to_linear(upper)
+            ends = [Rendered(LidPose(w), srgb_to_linear(p)) for w, p in ((low, picture), (high, upper))]
             for step in range(1, between + 1):
-                closure = low + (high - low) * step / (between + 1)
-                yield closure, linear_to_srgb(inbetweener.between(closure, low, high, *lights, self.crop))
+                share = step / (between + 1)
+                closure = low + (high - low) * share
+                yield closure, linear_to_srgb(inbetweener.mix(LidPose(closure), ends[0], ends[1], share))
             picture = upper
         yield closures[-1], picture
 
@@ -84,32 +88,51 @@ class Assembly:
         write_declaration(folder, declaration)
 
     def _write_lower_lid(self, folder: Path) -> LowerLid:
-        crop = self.lower_lid_crop
-        rest = _cut(self.still, crop)
-        poses = [self._write_pose(folder, 0.0, 0.0, rest)]
-        for pose in plan.lower_lid_poses():
-            shot = plan.pose_shot(self.work, self.frame, self.quality, pose)
-            moved = _cut(self._lay(self.still, shot), crop)
-            poses.append(self._write_pose(folder, pose.vertical_mm, pose.horizontal_mm, moved))
-        mattes = []
+        """Poses on a grid between the rendered corners, and mattes."""
+        crop, poses, mattes = self.lower_lid_crop, [], []
+        for pose, image in self.lower_lid_poses():
+            v, h = pose.vertical_mm, pose.horizontal_mm
+            picture = write_picture(folder, f"lower_{round(v * 100):03d}_{round(h * 100):03d}.webp", image)
+            poses.append(LowerLidPose(vertical_mm=v, horizontal_mm=h, **picture.model_dump()))
         for closure in plan.MATTE_CLOSURES:
-            shot = plan.matte_shot(self.work, self.frame, closure)
-            matte = np.zeros((self.frame.height_px, self.frame.width_px, 3), np.float32)
-            for name, pixels in shot.read().items():
-                x, y, width, height = shot.boxes[name]
-                matte[y : y + height, x : x + width] = np.clip(pixels.astype(np.float32), 0, 1)
-            picture = write_picture(
-                folder, f"matte_{round(closure * 256):03d}.webp", to_8_bit(_cut(matte, crop))
-            )
-            mattes.append(Level(closure=closure, file=picture.file, sha256=picture.sha256))
+            matte = np.zeros((self.frame.height_px, self.frame.width_px), np.float32)
+            for side, box in zip((-1, 1), self.frame.lower_lid_boxes().values(), strict=True):
+                x, y, width, height = box
+                covered = upper_lid_matte(self.face, closure, self.frame, side, box)
+                matte[y : y + height, x : x + width] = covered
+            image = to_8_bit(_cut(matte, crop))
+            picture = write_picture(folder, f"matte_{round(closure * 256):03d}.webp", image)
+            mattes.append(Level(closure=closure, **picture.model_dump()))
         return LowerLid(crop=crop, poses=tuple(poses), mattes=tuple(mattes))
 
-    def _write_pose(self, folder: Path, vertical: float, horizontal: float, code: Code) -> LowerLidPose:
-        file = f"lower_{round(vertical * 100):03d}_{round(horizontal * 100):03d}.webp"
-        picture = write_picture(folder, file, to_8_bit(code))
-        return LowerLidPose(
-            vertical_mm=vertical, horizontal_mm=horizontal, file=picture.file, sha256=picture.sha256
-        )
+    def lower_lid_poses(self) -> Iterator[tuple[LidPose, NDArray[np.uint8]]]:
+        """Poses of the open eye, LOWER_LID_STEPS + 1 each way: corners rendered, the others moved between."""
+        crop, steps = self.lower_lid_crop, np.arange(LOWER_LID_STEPS + 1) / LOWER_LID_STEPS
+        corners = {LidPose(0.0): srgb_to_linear(to_8_bit(_cut(self.still, crop)))}
+        for pose in plan.lower_lid_poses():
+            shot = plan.pose_shot(self.work, self.frame, self.quality, pose)
+            corners[pose] = srgb_to_linear(to_8_bit(_cut(self._lay(self.still, shot), crop)))
+        inbetweener = self._inbetweener(self.frame.lower_lid_boxes(), crop)
+
+        def between(pose: LidPose, share: float, low: Rendered, high: Rendered) -> Rendered:
+            if share in (0.0, 1.0):
+                return high if share else low
+            return Rendered(pose, inbetweener.mix(pose, low, high, share))
+
+        for along in steps:
+            h = float(plan.HORIZONTAL_MM * along)
+            edges = []
+            for v in (0.0, plan.VERTICAL_MM):
+                rest, nasal = LidPose(0.0, v), LidPose(0.0, v, plan.HORIZONTAL_MM)
+                low, high = Rendered(rest, corners[rest]), Rendered(nasal, corners[nasal])
+                edges.append(between(LidPose(0.0, v, h), float(along), low, high))
+            for up in steps:
+                pose = LidPose(0.0, float(plan.VERTICAL_MM * up), h)
+                yield pose, linear_to_srgb(between(pose, float(up), edges[0], edges[1]).light)
+
+    def _inbetweener(self, boxes: dict[str, Box], crop: Box) -> Inbetweener:
+        still = srgb_to_linear(to_8_bit(_cut(self.still, crop)))
+        return Inbetweener(self.face, self.frame, boxes, crop, still)
 
     def _lay(self, still: Code, shot: Shot) -> Code:
         """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims."""

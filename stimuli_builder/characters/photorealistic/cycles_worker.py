@@ -1,7 +1,7 @@
 """Render scene files with Cycles: runs under bpy in an environment of its own and imports no Palpebra.
 
 Usage: python cycles_worker.py SETTINGS.json (what renderer.py writes). Jobs arrive as JSON lines on stdin:
-{"scene": FILE, "out": FILE.npz, "kind": "beauty"|"matte"|"eye_mask", "samples": N,
+{"scene": FILE, "out": FILE.npz, "kind": "beauty"|"eye_mask", "samples": N,
 "crops": {NAME: [x, y, width, height], ...}}. Each is answered by one JSON line on stdout:
 {"out": FILE, "seconds": S}. Blender's own chatter goes to stderr.
 """
@@ -171,19 +171,14 @@ def hair_material(name: str, colour: list[float], roughness: float) -> Any:
     return nodes.surface(shader)
 
 
-def emission(name: str, strength: float | None = None, attribute: str | None = None) -> Any:
-    """Unlit material, of one brightness or of a per-vertex value."""
+def emission(name: str, strength: float) -> Any:
+    """Unlit material of one brightness."""
     nodes = Nodes(name)
-    shader = nodes.add("Emission")
-    if attribute is None:
-        shader.inputs["Strength"].default_value = strength
-    else:
-        nodes.link(nodes.attribute(attribute), shader.inputs["Strength"])
-    return nodes.surface(shader)
+    return nodes.surface(nodes.add("Emission", Strength=strength))
 
 
 def materials(kind: str, settings: Settings) -> dict[str, Any]:
-    """Materials by name. A matte shows upper lid and upper lashes white; an eye mask shows the eye white."""
+    """Materials by name. An eye mask shows the eye white."""
     if kind == "beauty":
         made = {
             name: globals()[f"{name}_material"](settings)
@@ -193,14 +188,6 @@ def materials(kind: str, settings: Settings) -> dict[str, Any]:
         made["brow"] = hair_material("brow", settings["brow_colour"], 0.34)
         return made
     black, white = emission("black", 0.0), emission("white", 1.0)
-    if kind == "matte":
-        return {
-            "skin": emission("lid", attribute="upper"),
-            "eye": black,
-            "flesh": black,
-            "upper_lashes": white,
-            "lower_lashes": black,
-        }
     return {"skin": black, "eye": white, "flesh": white}
 
 

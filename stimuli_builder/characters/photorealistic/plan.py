@@ -10,10 +10,8 @@ from stimuli_builder.characters.photorealistic.renderer import Shot
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129, 257)
 MATTE_CLOSURES = tuple(k / 8 for k in range(9))
-VERTICAL_MM = (0.0, 0.5, 1.0)
-HORIZONTAL_MM = (0.0, 0.6, 1.2)
+VERTICAL_MM, HORIZONTAL_MM = 1.0, 1.2
 LOWER_LID_AFTER_LEVELS = 9
-MASK_SAMPLES = 16
 
 
 @dataclass(frozen=True)
@@ -48,16 +46,13 @@ def pose_shot(work: Path, frame: Frame, quality: Quality, pose: LidPose) -> Shot
     return Shot(work / name, pose, frame.lower_lid_boxes(), quality.crop_samples)
 
 
-def matte_shot(work: Path, frame: Frame, closure: float) -> Shot:
-    """Where upper lid and upper lashes cover the lower lids' boxes."""
-    file = work / f"matte_{closure:.4f}.npz"
-    return Shot(file, LidPose(closure), frame.lower_lid_boxes(), MASK_SAMPLES, "matte")
-
-
 def lower_lid_poses() -> list[LidPose]:
-    """The displaced poses, without the resting one, which is the open level itself."""
-    poses = [LidPose(0.0, v, h) for v in VERTICAL_MM for h in HORIZONTAL_MM]
-    return [pose for pose in poses if pose.vertical_mm or pose.horizontal_mm]
+    """The displaced corners of the lower lid's range; the resting one is the open level itself."""
+    return [
+        LidPose(0.0, VERTICAL_MM, 0.0),
+        LidPose(0.0, 0.0, HORIZONTAL_MM),
+        LidPose(0.0, VERTICAL_MM, HORIZONTAL_MM),
+    ]
 
 
 @dataclass(frozen=True)
@@ -82,7 +77,6 @@ def stages(work: Path, frame: Frame, quality: Quality, levels: int) -> list[Stag
             shots.insert(0, base_shot(work, frame, quality))
         plan.append(Stage(count, count > LOWER_LID_AFTER_LEVELS, tuple(shots)))
         if count == min(LOWER_LID_AFTER_LEVELS, levels):
-            lower = [matte_shot(work, frame, closure) for closure in MATTE_CLOSURES]
-            lower += [pose_shot(work, frame, quality, pose) for pose in lower_lid_poses()]
+            lower = [pose_shot(work, frame, quality, pose) for pose in lower_lid_poses()]
             plan.append(Stage(count, True, tuple(lower)))
     return plan

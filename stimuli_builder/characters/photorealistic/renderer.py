@@ -25,7 +25,7 @@ STUDIO_STRENGTH = 0.75
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture to render: a pose, what of it (`beauty`, `matte`, `eye_mask`), where to, which boxes."""
+    """One picture to render: a pose, what of it (`beauty` or `eye_mask`), where to, which boxes."""
 
     file: Path
     pose: LidPose

@@ -5,6 +5,7 @@ The skin's vertices are splatted on the pixel grid, nearest to the camera on top
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +15,7 @@ from stimuli_builder.characters.photorealistic.framing import Box, Frame
 from stimuli_builder.characters.photorealistic.hair import Strand, lashes
 from stimuli_builder.characters.photorealistic.parameters import Face
 
-EYE, UPPER_LID, LOWER_LID, LASH = 0, 1, 2, 3
+EYE, UPPER_LID, LOWER_LID, UPPER_LASH, LOWER_LASH = 0, 1, 2, 3, 4
 _SPLITS = 3
 
 
@@ -30,10 +31,11 @@ def surface(face: Face, skin: SkinMesh, side: int) -> Surface:
     """Skin and lashes of one side of the face (-1 or 1) as dense points."""
     points, kind = _dense_skin(skin, side)
     upper, lower = lashes(skin.edges, side, face.hair, face.seed + 3 + side)
-    strands = _dense_strands([*upper, *lower])
-    return Surface(
-        np.concatenate([points, strands]), np.concatenate([kind, np.full(len(strands), LASH, np.uint8)])
-    )
+    parts, kinds = [points], [kind]
+    for strands, one in ((upper, UPPER_LASH), (lower, LOWER_LASH)):
+        parts.append(_dense_strands(strands))
+        kinds.append(np.full(len(parts[-1]), one, np.uint8))
+    return Surface(np.concatenate(parts), np.concatenate(kinds))
 
 
 def _dense_skin(skin: SkinMesh, side: int) -> tuple[Array, NDArray[np.uint8]]:
@@ -96,7 +98,19 @@ def _close_holes(point: NDArray[np.int64]) -> NDArray[np.int64]:
 def visible_opening_mm(face: Face, closure: float, frame: Frame, side: int) -> float:
     """Tallest run of eyeball pixels over all columns, in mm on the screen, lashes left out."""
     seen = surface(face, build_skin(LidPose(closure)), side)
-    skin_only = Surface(seen.points[seen.kind != LASH], seen.kind[seen.kind != LASH])
+    skin = seen.kind < UPPER_LASH
+    skin_only = Surface(seen.points[skin], seen.kind[skin])
     box = frame.eye_boxes()["left" if side < 0 else "right"]
     eye = view(skin_only, frame, box).kind == EYE
     return float(eye.sum(0).max() / frame.px_per_mm)
+
+
+def upper_lid_matte(face: Face, closure: float, frame: Frame, side: int, box: Box) -> NDArray[np.float32]:
+    """(h, w) share of each pixel of a box covered by upper lid or upper lashes: splats at triple size."""
+    fine = Frame(frame.width_px * 3, frame.height_px * 3)
+    x, y, width, height = box
+    seen = surface(face, build_skin(LidPose(closure)), side)
+    kind = view(seen, fine, (3 * x, 3 * y, 3 * width, 3 * height)).kind
+    lash = cv2.dilate((kind == UPPER_LASH).astype(np.uint8), np.ones((1, 2), np.uint8))
+    covered = np.maximum(lash, kind == UPPER_LID).astype(np.float32)
+    return np.asarray(cv2.resize(covered, (width, height), interpolation=cv2.INTER_AREA), np.float32)
