@@ -3,23 +3,15 @@
 import hashlib
 import json
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.curves import ClipCurve
 
-if TYPE_CHECKING:
-    from stimuli_builder.clips.frames import FramePainter
-
 RENDER_VERSION = 1
 """Raise this when the same inputs come to give other pictures; every clip is then built again."""
-
-ROOMY_WIDTH_PX = 1200
-"""Up to this width a process keeps two characters at a time; two at the largest would pass 1.5 GB."""
 
 
 @dataclass(frozen=True)
@@ -70,27 +62,10 @@ class ClipJob:
 def render(job: ClipJob) -> bytes:
     """Render and encode a clip; returns the bytes of its MP4 file."""
     from stimuli_builder.clips.encode import encode_clip
+    from stimuli_builder.clips.frames import FramePainter
+    from stimuli_builder.clips.levels import kept_levels
 
     look = job.look
-    painter = _painter(look.character, look.fingerprint, look.size_px, look.beside)
+    painter = FramePainter(kept_levels(look.character, look.fingerprint, look.size_px, look.beside))
     frames = painter.frames(job.curve, look.fps, look.motion_blur, look.barcode)
     return encode_clip(frames, look.size_px, look.fps)
-
-
-@lru_cache(maxsize=2)
-def _painter(
-    character: str,
-    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
-    size_px: tuple[int, int],
-    beside: Path | None,
-) -> "FramePainter":
-    import cv2
-
-    from stimuli_builder.clips.frames import FramePainter
-    from stimuli_builder.clips.levels import load_levels
-
-    # The pool already uses every core.
-    cv2.setNumThreads(1)
-    if size_px[0] > ROOMY_WIDTH_PX:
-        _painter.cache_clear()
-    return FramePainter(load_levels(character, size_px, beside))

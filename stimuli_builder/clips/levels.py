@@ -1,6 +1,7 @@
 """A character at one picture size, ready to be blended: its levels as 16-bit linear light."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -16,6 +17,8 @@ from stimuli_builder.clips.lower_lid import LowerLid
 
 Light = NDArray[np.uint16]
 MARGIN_PX = 4
+ROOMY_WIDTH_PX = 1200
+"""Up to this width a process keeps two characters; two at the largest size would pass 1.5 GB."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,21 @@ def load_levels(character: str, size_px: tuple[int, int], beside: Path | None = 
     if character == CARTOON:
         return cartoon_levels(size_px)
     return atlas_levels(find_character(character, beside), size_px)
+
+
+@lru_cache(maxsize=2)
+def kept_levels(
+    character: str,
+    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
+    size_px: tuple[int, int],
+    beside: Path | None,
+) -> LevelSet:
+    """`load_levels`, the last two kept; at great sizes only the last one."""
+    # Every core is already taken by a process of its own.
+    cv2.setNumThreads(1)
+    if size_px[0] > ROOMY_WIDTH_PX:
+        kept_levels.cache_clear()
+    return load_levels(character, size_px, beside)
 
 
 def cartoon_levels(size_px: tuple[int, int]) -> LevelSet:

@@ -14,7 +14,7 @@ from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, Clip, file_sha256, read_manifest
 from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
-from stimuli_builder.clips.levels import load_levels
+from stimuli_builder.clips.levels import kept_levels
 from stimuli_builder.clips.opening import OpeningMeter
 
 TOLERANCE_MM = 0.3
@@ -140,5 +140,5 @@ class _Meters:
         if not place or fingerprint(place, self._beside) != wanted:
             return None
         return OpeningMeter(
-            load_levels(place, size_px, self._beside), geometry(place, self._beside).opening_mm
+            kept_levels(place, wanted, size_px, self._beside), geometry(place, self._beside).opening_mm
         )
