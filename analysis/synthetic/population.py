@@ -28,7 +28,8 @@ def make_population(
 ) -> Population:
     """Choose means by least change from a flat table, then error variances that give the wanted F's.
 
-    An effect without any known mean gets small random contrasts, one without a known F the usual variance.
+    An effect without any known mean gets small random contrasts (none where F = 0 is wanted), one without a
+    known F the usual variance.
     """
     means = _cell_means(published, space, targets)
     variances: dict[str, Floats] = {}
@@ -36,11 +37,15 @@ def make_population(
     for effect, contrasts in space.effects.items():
         q = contrasts.shape[1]
         z = contrasts.T @ means
-        if z @ z < 1e-6:
+        target = wanted.get(effect)
+        none_wanted = target is not None and target.wanted is not None and target.wanted < 0.01
+        if none_wanted:
+            means, z = means - contrasts @ z, np.zeros(q)
+        elif z @ z < 1e-6:
             z = rng.normal(size=q) * published.contrast_sd / np.sqrt(targets.n)
             means = means + contrasts @ z
         share = published.slope_shares.get(effect, 0.0)
-        variances[effect] = _error_variance(z, wanted.get(effect), targets.n, published.contrast_sd, share)
+        variances[effect] = _error_variance(z, target, targets.n, published.contrast_sd, share)
     return Population(means, _covariance(published, space, targets, variances))
 
 
