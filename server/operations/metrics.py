@@ -73,7 +73,7 @@ def exposition(database: Database) -> bytes:
     counted = REGISTRY
     if folder := os.environ.get(MULTIPROCESS_VARIABLE):
         counted = CollectorRegistry()
-        MultiProcessCollector(counted, path=folder)
+        MultiProcessCollector(counted, path=folder)  # type: ignore[no-untyped-call]
     stored = CollectorRegistry()
     stored.register(StoredCounts(database))
     return generate_latest(counted) + generate_latest(stored)

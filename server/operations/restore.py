@@ -6,7 +6,7 @@ import os
 import tarfile
 from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
-from typing import IO
+from typing import BinaryIO, cast
 
 from alembic import command
 from pydantic import ValidationError
@@ -103,14 +103,14 @@ def _restore_clip(services: Services, tar: tarfile.TarFile, sha256: str) -> None
         services.clips.add(source, sha256)
 
 
-def _member(tar: tarfile.TarFile, name: str) -> IO[bytes]:
+def _member(tar: tarfile.TarFile, name: str) -> BinaryIO:
     try:
         found = tar.extractfile(name)
     except KeyError:
         found = None
     if found is None:
         raise InputError(f"the backup lacks {name}; it is damaged or no backup of `server backup`")
-    return found
+    return cast(BinaryIO, found)
 
 
 def _content(tar: tarfile.TarFile, name: str) -> bytes:

@@ -1,0 +1,10 @@
+#!/bin/sh
+# A backup now and every BACKUP_EVERY_S seconds; the newest BACKUP_KEEP stay. Ends at once when told to.
+set -eu
+trap 'exit 0' TERM INT
+while :; do
+    python -m server backup "backups/palpebra-$(date -u +%Y-%m-%dT%H%M%S).tar" --keep "${BACKUP_KEEP:-14}" ||
+        echo "backup failed; the next try is in ${BACKUP_EVERY_S:-86400} s" >&2
+    sleep "${BACKUP_EVERY_S:-86400}" &
+    wait $!
+done
