@@ -15,7 +15,7 @@ from rich.progress import (
 )
 
 from experiments.errors import InputError
-from stimuli_builder.characters.photorealistic.bake import BakeOrder, bake
+from stimuli_builder.characters.photorealistic.bake import BakeOrder, bake, write_atlas
 from stimuli_builder.characters.photorealistic.framing import parse_size
 from stimuli_builder.characters.photorealistic.parameters import PRESETS_FILE, load_preset
 from stimuli_builder.characters.photorealistic.plan import LEVEL_COUNTS, Quality, closures_of
@@ -50,6 +50,9 @@ def bake_photorealistic(
     blender: Annotated[
         Path, typer.Option(help="Environment of Blender; made on first use (360 MB to download).")
     ] = Path(".venv-bake"),
+    render: Annotated[
+        bool, typer.Option(help="--no-render writes the atlas from what is rendered so far.")
+    ] = True,
     threads: Annotated[int, typer.Option(min=1, max=256, help="Render threads.")] = 2,
 ) -> None:
     """Render the photorealistic character with Cycles; coarse levels first, resumable at any moment.
@@ -76,6 +79,10 @@ def bake_photorealistic(
         blender=blender,
         threads=threads,
     )
+    if not render:
+        write_atlas(order)
+        typer.echo(f"{levels} levels of '{preset}' are in {order.out}")
+        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -16,7 +16,7 @@ from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose
 from stimuli_builder.characters.photorealistic.framing import Box, Frame, bounding_box
 from stimuli_builder.characters.photorealistic.inbetween import Inbetweener, Rendered
 from stimuli_builder.characters.photorealistic.parameters import Face
-from stimuli_builder.characters.photorealistic.plan import Quality, Stage, closures_of
+from stimuli_builder.characters.photorealistic.plan import Quality, closures_of
 from stimuli_builder.characters.photorealistic.renderer import Shot
 from stimuli_builder.characters.photorealistic.visibility import upper_lid_matte
 from stimuli_builder.characters.writing import write_declaration, write_picture
@@ -49,26 +49,31 @@ class Assembly:
         shot = plan.level_shot(self.work, self.frame, self.quality, closure)
         return _cut(self._lay(self.still, shot), self.crop)
 
-    def levels(self, rendered: int, between: int) -> Iterator[tuple[float, NDArray[np.uint8]]]:
-        """Closures and 8-bit pictures of the rendered levels, with `between` moved ones after each."""
+    def rendered(self, levels: int) -> list[float]:
+        """Those of an atlas's closures whose shots are there."""
+        closures = closures_of(levels)
+        shots = (plan.level_shot(self.work, self.frame, self.quality, closure) for closure in closures)
+        return [closure for closure, shot in zip(closures, shots, strict=True) if shot.file.exists()]
+
+    def levels(self, levels: int) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+        """Closures and 8-bit pictures of an atlas: rendered where there is a shot, else moved in between."""
         inbetweener = self._inbetweener(self.frame.eye_boxes(), self.crop)
-        closures = closures_of(rendered)
+        closures = self.rendered(levels)
         picture = to_8_bit(self.level(closures[0]))
         for low, high in pairwise(closures):
             yield low, picture
             upper = to_8_bit(self.level(high))
             ends = [Rendered(LidPose(w), srgb_to_linear(p)) for w, p in ((low, picture), (high, upper))]
-            for step in range(1, between + 1):
-                share = step / (between + 1)
-                closure = low + (high - low) * share
+            for closure in [w for w in closures_of(levels) if low < w < high]:
+                share = (closure - low) / (high - low)
                 yield closure, linear_to_srgb(inbetweener.mix(LidPose(closure), ends[0], ends[1], share))
             picture = upper
         yield closures[-1], picture
 
-    def write(self, folder: Path, name: str, stage: Stage, between: int, provenance: dict[str, Any]) -> None:
-        """Write a stage's character, with `between` moved levels after each; the declaration comes last."""
+    def write(self, folder: Path, name: str, levels: int, provenance: dict[str, Any]) -> None:
+        """Write a character of so many levels, with a lower lid if its poses are there; declaration last."""
         pictures = []
-        for closure, picture in self.levels(stage.levels, between):
+        for closure, picture in self.levels(levels):
             pictures.append(
                 (closure, write_picture(folder, f"level_{round(closure * 256):03d}.webp", picture))
             )
@@ -82,10 +87,14 @@ class Assembly:
             crop=self.crop,
             base=write_picture(folder, "open.webp", to_8_bit(self.still)),
             levels=tuple(Level(closure=w, file=p.file, sha256=p.sha256) for w, p in pictures),
-            lower_lid=self._write_lower_lid(folder) if stage.lower_lid else None,
+            lower_lid=self._write_lower_lid(folder) if self._has_lower_lid() else None,
             provenance=provenance,
         )
         write_declaration(folder, declaration)
+
+    def _has_lower_lid(self) -> bool:
+        shots = (plan.pose_shot(self.work, self.frame, self.quality, p) for p in plan.lower_lid_poses())
+        return all(shot.file.exists() for shot in shots)
 
     def _write_lower_lid(self, folder: Path) -> LowerLid:
         """Poses on a grid between the rendered corners, and mattes."""

@@ -10,11 +10,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from experiments.errors import InputError
 from stimuli_builder.characters.photorealistic.assembly import Assembly
 from stimuli_builder.characters.photorealistic.environment import BPY_VERSION, ensure_blender
 from stimuli_builder.characters.photorealistic.framing import Frame
 from stimuli_builder.characters.photorealistic.parameters import Face
-from stimuli_builder.characters.photorealistic.plan import Quality, Stage, stages
+from stimuli_builder.characters.photorealistic.plan import Quality, stages
 from stimuli_builder.characters.photorealistic.renderer import Renderer, describe
 from stimuli_builder.characters.photorealistic.textures import write_textures
 
@@ -58,7 +59,7 @@ def bake(order: BakeOrder, report: Callable[[int, int, str], None]) -> None:
     done = sum(shot.file.exists() for stage in todo for shot in stage.shots)
     report(done, total, "begin")
     if done == total:
-        _write(order, work, todo[-1])
+        write_atlas(order)
         return
     python = ensure_blender(order.blender)
     _ensure_textures(work / "textures", order.face)
@@ -72,13 +73,27 @@ def bake(order: BakeOrder, report: Callable[[int, int, str], None]) -> None:
                 done += 1
                 report(done, total, shot.file.stem)
             if missing or stage is todo[-1]:
-                _write(order, work, stage)
+                write_atlas(order, (stage.levels - 1) * _between(order) + 1)
 
 
-def _write(order: BakeOrder, work: Path, stage: Stage) -> None:
-    assembly = Assembly(work, order.face, order.frame, order.quality)
-    between = (order.levels - 1) // (order.rendered - 1) - 1
-    assembly.write(order.out, order.name, stage, between, _provenance(order, stage, between))
+def _between(order: BakeOrder) -> int:
+    return (order.levels - 1) // (order.rendered - 1)
+
+
+def write_atlas(order: BakeOrder, levels: int | None = None) -> None:
+    """Write the character from the shots that are there; levels not rendered yet are moved in between.
+
+    Raises
+    ------
+    InputError
+        Not even the still frame and both end levels are rendered.
+    """
+    assembly = Assembly(order.work_folder(), order.face, order.frame, order.quality)
+    count = levels or order.levels
+    rendered = assembly.rendered(count)
+    if not {0.0, 1.0} <= set(rendered):
+        raise InputError(f"nothing to write: the open and the closed level are not in {order.work_folder()}")
+    assembly.write(order.out, order.name, count, _provenance(order, count, rendered))
 
 
 def _ensure_textures(folder: Path, face: Face) -> None:
@@ -88,15 +103,15 @@ def _ensure_textures(folder: Path, face: Face) -> None:
         finished.touch()
 
 
-def _provenance(order: BakeOrder, stage: Stage, between: int) -> dict[str, Any]:
-    levels = (stage.levels - 1) * (between + 1) + 1
+def _provenance(order: BakeOrder, levels: int, rendered: list[float]) -> dict[str, Any]:
     size = f"{order.frame.width_px}x{order.frame.height_px}"
     return {
         "command": f"stimuli bake photorealistic --preset {order.name} --levels {levels} "
-        f"--rendered {stage.levels} --size {size} --samples {order.quality.crop_samples} "
+        f"--rendered {order.rendered} --size {size} --samples {order.quality.crop_samples} "
         f"--frame-samples {order.quality.frame_samples}",
         "recipe": RECIPE,
-        "rendered_levels": stage.levels,
+        "rendered_levels": len(rendered),
+        "rendered_closures": rendered,
         "samples": order.quality.crop_samples,
         "frame_samples": order.quality.frame_samples,
         "versions": {

@@ -60,7 +60,9 @@ def skin_maps(plane: Plane, skin: Skin) -> SkinMaps:
     _add_spots(plane, melanin, redness, skin.freckles)
     veins, blue = _vessels(plane)
     redness = (redness + 0.5 * veins) * skin.haemoglobin
-    absorbed = (melanin * skin.melanin - 1)[..., None] * np.array(MELANIN_RGB, np.float32)
+    # Darker skin is not blotchier: what varies from place to place grows more slowly than the mean.
+    extra_melanin = skin.melanin - 1 + (melanin - 1) * skin.melanin**-0.3
+    absorbed = extra_melanin[..., None] * np.array(MELANIN_RGB, np.float32)
     absorbed = absorbed + (redness - 1)[..., None] * np.array(HAEMOGLOBIN_RGB, np.float32)
     albedo = np.array(BASE_RGB, np.float32) * np.exp(-absorbed)
     albedo = albedo * (1 - 0.10 * blue[..., None] * np.array([1, 0.6, 0.3], np.float32))

@@ -16,6 +16,7 @@ from stimuli_builder.characters.photorealistic.hair import Strand, lashes
 from stimuli_builder.characters.photorealistic.parameters import Face
 
 EYE, UPPER_LID, LOWER_LID, UPPER_LASH, LOWER_LASH = 0, 1, 2, 3, 4
+ELSEWHERE = 255
 _SPLITS = 3
 
 
@@ -39,11 +40,11 @@ def surface(face: Face, skin: SkinMesh, side: int) -> Surface:
 
 
 def _dense_skin(skin: SkinMesh, side: int) -> tuple[Array, NDArray[np.uint8]]:
-    """Bilinear points in every quad near the eye, so that splats leave no holes."""
+    """Bilinear points in every quad that can border or cover the eye, so that splats leave no holes."""
     corners = skin.vertices[skin.quads]
     middle = skin.uv[skin.quads].mean(1)
     u, v = (middle[:, 0] - 0.5) * 160 * side - 30, (middle[:, 1] - 0.5) * 100
-    near = (np.abs(u) < 23) & (v > -20) & (v < 24)
+    near = (np.abs(u) < 17) & (v > -12) & (v < 4)
     corners, upper = corners[near], skin.upper[skin.quads[near, 2]]
     share = (np.arange(_SPLITS) + 0.5) / _SPLITS
     parts = []
@@ -73,7 +74,7 @@ class View:
 
 
 def view(seen: Surface, frame: Frame, box: Box) -> View:
-    """Splat a surface on a box's pixels; small holes in skin are closed."""
+    """Splat a surface on a box's pixels; what stays empty between the lids is the eye."""
     x, y, width, height = box
     at = np.floor(frame.project(seen.points) - (x, y)).astype(int)
     inside = (at[:, 0] >= 0) & (at[:, 0] < width) & (at[:, 1] >= 0) & (at[:, 1] < height)
@@ -82,7 +83,14 @@ def view(seen: Surface, frame: Frame, box: Box) -> View:
     point = np.full((height, width), -1, np.int64)
     point[at[index, 1], at[index, 0]] = index
     point = _close_holes(point)
-    kind = np.where(point >= 0, seen.kind[np.maximum(point, 0)], EYE).astype(np.uint8)
+    kind = np.where(point >= 0, seen.kind[np.maximum(point, 0)], ELSEWHERE)
+    rows = np.arange(height)[:, None]
+    upper, lower = (
+        np.where(kind == UPPER_LID, rows, -1).max(0),
+        np.where(kind == LOWER_LID, rows, height).min(0),
+    )
+    between = (rows > upper) & (rows < lower) & (upper >= 0) & (lower < height)
+    kind = np.where((point < 0) & between, EYE, kind).astype(np.uint8)
     return View(kind, point)
 
 

@@ -163,7 +163,7 @@ def test_rendered_pixels_show_the_calibrated_opening(tmp_path: Path) -> None:
 def test_levels_in_between_are_made_from_rendered_ones(tmp_path: Path) -> None:
     wanted = order(tmp_path, levels=5)
     pretend_rendered(wanted)
-    made = list(Assembly(wanted.work_folder(), wanted.face, SMALL, QUALITY).levels(3, between=1))
+    made = list(Assembly(wanted.work_folder(), wanted.face, SMALL, QUALITY).levels(5))
     assert [closure for closure, _ in made] == [0.0, 0.25, 0.5, 0.75, 1.0]
     brightness = [float(picture.mean()) for _, picture in made]
     assert (np.diff(brightness) < 0).all()
