@@ -55,12 +55,12 @@ async function visit(root: HTMLElement, t: Translate, link_token: string, link: 
   const start = { language: chosen, client_id: identity.client_id(), query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
   const started = await persistently(root, t, () => startRun(link_token, start));
   const outbox = new Outbox(store, { onUnauthorized: () => root.dispatchEvent(new CustomEvent("taken-over")) });
-  await flush(outbox, started);
+  const unsent = await flush(outbox, started);
   const run = await persistently(root, t, () => fetchRun(started.run_token));
   setLanguage(run.language);
   const t_run = translator(run.language);
   if (run.status !== "active") return ended(root, t_run, run, started, identity);
-  const session = openSession(root, link, run, outbox);
+  const session = openSession(root, link, run, outbox, unsent);
   for (const { reason } of found) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
   await play(session, started, store.durable);
 }

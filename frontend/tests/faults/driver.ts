@@ -64,10 +64,10 @@ async function participant(): Promise<void> {
 async function visit(factory: IDBFactory, client_id: string): Promise<boolean> {
   const started = await insist<StartedRun>("POST", `/api/links/${link}/runs`, { body: { language: "en", client_id, query: {}, device: {} } });
   const outbox = new Outbox(await IndexedDbStore.open(factory), { send: watched(started.run_id) });
-  await flush(outbox, started);
+  const unsent = await flush(outbox, started);
   const run = await insist<RunDocument>("GET", "/api/run", { token: started.run_token });
   if (!run.consented_at) await outbox.put("PUT", "/api/run/consent", { agreed: true });
-  const waiting = new Set(outbox.unsent().map((item) => (item.body as RatingBody).trial_index));
+  const waiting = new Set(unsent.map((item) => (item.body as RatingBody).trial_index));
   for (const trial of run.trials.filter((one) => !one.answered && !waiting.has(one.trial_index))) {
     await sleep(Number(pace_ms) * (0.5 + Math.random()));
     const id = crypto.randomUUID();

@@ -3,6 +3,7 @@ import type { LinkDocument, RunDocument, StartedRun } from "../../api/participan
 import { translator } from "../../i18n";
 import { EventLog } from "../outbox/events";
 import type { Outbox } from "../outbox/outbox";
+import type { OutboxItem } from "../outbox/store";
 import { choosePlayer, hasWebCodecs } from "../playback/choose";
 import { ClipCache } from "../preload/clip-cache";
 import { measureRefreshRate } from "../screen/refresh-rate";
@@ -14,16 +15,20 @@ import { owed, Replays } from "./replays";
 const SEND_FIRST_MS = 8_000;
 const RATING_PATH = "/api/run/ratings/";
 
-/** Send what an earlier visit left, so that the run document knows of it. */
-export async function flush(outbox: Outbox, started: StartedRun): Promise<void> {
+/**
+ * Send what an earlier visit left, so that the run document knows of it. Returns what could not be sent yet: it
+ * must count as given, since it may arrive after the document was made and before the page reads it.
+ */
+export async function flush(outbox: Outbox, started: StartedRun): Promise<OutboxItem[]> {
   await outbox.open(started.run_id, started.run_token);
   await outbox.drained(SEND_FIRST_MS);
+  return outbox.unsent();
 }
 
-export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocument, outbox: Outbox): Session {
+export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocument, outbox: Outbox, unsent: OutboxItem[]): Session {
   const screen = new ScreenState();
   screen.restore(run.calibration);
-  countUnsent(run, outbox);
+  countUnsent(run, unsent);
   const session: Session = {
     link, run, root, outbox, screen,
     language: run.language,
@@ -43,8 +48,8 @@ export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocum
 }
 
 /** A rating still in the outbox counts as given, though the server does not know of it yet. */
-function countUnsent(run: RunDocument, outbox: Outbox): void {
-  for (const item of outbox.unsent().filter(({ path }) => path.startsWith(RATING_PATH))) {
+function countUnsent(run: RunDocument, unsent: OutboxItem[]): void {
+  for (const item of unsent.filter(({ path }) => path.startsWith(RATING_PATH))) {
     const body = item.body as { trial_index: number; play: number };
     const trial = run.trials.find((one) => one.trial_index === body.trial_index);
     if (trial) Object.assign(trial, { answered: true, plays_done: Math.max(trial.plays_done, body.play) });
@@ -54,6 +59,8 @@ function countUnsent(run: RunDocument, outbox: Outbox): void {
 /** Measure the refresh rate, and tell the server what it deals with. */
 export async function describeDevice(session: Session, storage: boolean): Promise<void> {
   session.screen.refresh_rate_hz = await measureRefreshRate();
+  // A simulated visit may be over by now.
+  if (session.completion || session.over.signal.aborted) return;
   await session.api.device({
     refresh_rate_hz: session.screen.refresh_rate_hz,
     user_agent: navigator.userAgent,
