@@ -16,12 +16,14 @@ app = typer.Typer(
 def _gather() -> None:
     from stimuli_builder.actor.cli import register as register_actor
     from stimuli_builder.blinks.cli import register as register_blinks
+    from stimuli_builder.characters.cli import register as register_characters
     from stimuli_builder.clips.cli import register as register_clips
     from stimuli_builder.tracking.cli import register as register_tracking
 
     register_actor(app)
     register_tracking(app)
     register_blinks(app)
+    register_characters(app)
     register_clips(app)
 
 
