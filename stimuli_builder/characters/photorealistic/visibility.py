@@ -90,7 +90,10 @@ def view(seen: Surface, frame: Frame, box: Box) -> View:
         np.where(kind == LOWER_LID, rows, height).min(0),
     )
     between = (rows > upper) & (rows < lower) & (upper >= 0) & (lower < height)
-    kind = np.where((point < 0) & between, EYE, kind).astype(np.uint8)
+    # Slits narrower than three pixels are the ragged end of the splatted patch, not the eye.
+    empty = ((point < 0) & between).astype(np.uint8)
+    eye = cv2.morphologyEx(empty, cv2.MORPH_OPEN, np.ones((1, 3), np.uint8)) > 0
+    kind = np.where(eye, EYE, kind).astype(np.uint8)
     return View(kind, point)
 
 
