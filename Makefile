@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help run test check setup setup-test lock format types bench load screenshots docs api clean
+.PHONY: help run test check setup setup-test lock format types bench load audit screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -41,6 +41,16 @@ lock: ## resolve the Python dependencies again, with hashes
 
 bench: setup-test ## speed, memory and accuracy, as figures and ratios
 	@$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' --benchmark-only --benchmark-columns=min,median,rounds -s
+
+load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
+	@$(BIN)/python tools/load.py $(LOAD)
+
+docs: setup-test ## write docs/data-dictionary.md and docs/settings.md from the code
+	@$(BIN)/python tools/reference.py
+
+audit: setup-test ## ask the advisory databases about every locked package (needs the internet)
+	@$(BIN)/python -m pip_audit --disable-pip --require-hashes -r deploy/requirements.lock --progress-spinner off
+	@cd frontend && npm audit --omit=dev
 
 clean: ## remove what the build made (never the data folder)
 	@rm -rf frontend/dist frontend/node_modules .mypy_cache .ruff_cache .import_linter_cache build *.egg-info
