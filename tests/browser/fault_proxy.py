@@ -50,7 +50,7 @@ class FaultProxy:
         listening.close()
         for task in asyncio.all_tasks(self._loop):
             task.cancel()
-        self._loop.run_until_complete(asyncio.sleep(0.1))
+        self._loop.run_until_complete(asyncio.sleep(0.5))
         self._loop.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -59,7 +59,7 @@ class FaultProxy:
             answer = b"" if self.offline else await self._pass_on(request)
             writer.write(answer)
             await writer.drain()
-        writer.close()
+        await _closed(writer)
 
     async def _pass_on(self, request: bytes) -> bytes:
         """The answer, or nothing: the connection then closes without one."""
@@ -93,14 +93,24 @@ class FaultProxy:
     async def _forward(self, request: bytes) -> bytes:
         try:
             reader, writer = await asyncio.open_connection("localhost", self.upstream_port)
-            writer.write(request)
-            await writer.drain()
-            answer = await reader.read(-1)
-            writer.close()
         except OSError:
             self.counts["server_down"] += 1
             return b""
-        return answer
+        try:
+            writer.write(request)
+            await writer.drain()
+            return await reader.read(-1)
+        except OSError:
+            self.counts["server_down"] += 1
+            return b""
+        finally:
+            await _closed(writer)
+
+
+async def _closed(writer: asyncio.StreamWriter) -> None:
+    writer.close()
+    with contextlib.suppress(OSError):
+        await writer.wait_closed()
 
 
 async def _read_request(reader: asyncio.StreamReader) -> bytes:
