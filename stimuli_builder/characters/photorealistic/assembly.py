@@ -32,7 +32,7 @@ class Assembly:
         self.work, self.face, self.frame, self.quality = work, face, frame, quality
         still = develop(plan.base_shot(work, frame, quality).read()["frame"], face.exposure_ev)
         # The open level's own samples go into the still frame, so that nothing changes when a blink begins.
-        self.still = self._lay(still, plan.level_shot(work, frame, quality, 0.0))
+        self.still = self.lay(still, plan.level_shot(work, frame, quality, 0.0))
 
     @property
     def crop(self) -> Box:
@@ -46,8 +46,10 @@ class Assembly:
 
     def level(self, closure: float) -> Code:
         """(h, w, 3) code values in 0-1 of the crop at a rendered closure."""
+        if closure == 0.0:
+            return _cut(self.still, self.crop)
         shot = plan.level_shot(self.work, self.frame, self.quality, closure)
-        return _cut(self._lay(self.still, shot), self.crop)
+        return _cut(self.lay(self.still, shot), self.crop)
 
     def rendered(self, levels: int) -> list[float]:
         """Those of an atlas's closures whose shots are there."""
@@ -120,7 +122,7 @@ class Assembly:
         corners = {LidPose(0.0): srgb_to_linear(to_8_bit(_cut(self.still, crop)))}
         for pose in plan.lower_lid_poses():
             shot = plan.pose_shot(self.work, self.frame, self.quality, pose)
-            corners[pose] = srgb_to_linear(to_8_bit(_cut(self._lay(self.still, shot), crop)))
+            corners[pose] = srgb_to_linear(to_8_bit(_cut(self.lay(self.still, shot), crop)))
         inbetweener = self._inbetweener(self.frame.lower_lid_boxes(), crop)
 
         def between(pose: LidPose, share: float, low: Rendered, high: Rendered) -> Rendered:
@@ -143,7 +145,7 @@ class Assembly:
         still = srgb_to_linear(to_8_bit(_cut(self.still, crop)))
         return Inbetweener(self.face, self.frame, boxes, crop, still)
 
-    def _lay(self, still: Code, shot: Shot) -> Code:
+    def lay(self, still: Code, shot: Shot) -> Code:
         """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims."""
         laid = still.copy()
         for name, pixels in shot.read().items():
