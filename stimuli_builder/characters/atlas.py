@@ -230,7 +230,9 @@ class LowerLidLayer:
             what = f"lower-lid pose ({at[0]:g}, {at[1]:g}) mm"
             images[at] = srgb_to_linear(decode_picture(self._character.folder, pose, size, what))
         rest = images[(0.0, 0.0)]
-        return np.stack([np.stack([images[(v, h)] - rest for h in self.horizontal_mm]) for v in self.vertical_mm])
+        return np.stack(
+            [np.stack([images[(v, h)] - rest for h in self.horizontal_mm]) for v in self.vertical_mm]
+        )
 
 
 def load_character(folder: Path) -> Character:
