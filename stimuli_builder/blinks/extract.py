@@ -1,12 +1,13 @@
 """Cut the profiles of measured blinks out of their series, one eye at a time or both together."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.labelling import LabelOptions, RefusedMinimum, find_blinks
+from stimuli_builder.blinks.labelling import LabelledBlink, LabelOptions, RefusedMinimum, find_blinks
 from stimuli_builder.blinks.measure import (
     MeasuredBlink,
     closure_at_300,
@@ -40,13 +41,29 @@ def blinks_of(
     *,
     closed_distance: float | None = None,
     complete_from: float = 0.95,
+    edges: Mapping[int, tuple[int, int]] = MappingProxyType({}),
 ) -> EyeBlinks:
-    """Label and measure one series."""
+    """Label and measure one series; `edges` puts (onset, end) of a person's in place, by minimum frame."""
     labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)
+    labelled = [_moved(series, blink, edges.get(blink.minimum)) for blink in labelled]
     measured = measure_blinks(
         series, labelled, options, closed_distance=closed_distance, complete_from=complete_from
     )
     return EyeBlinks(series, smoothed(series, options), tuple(measured), tuple(refused))
+
+
+def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | None) -> LabelledBlink:
+    if edges is None:
+        return blink
+    onset, end = edges
+    last = series.distance.size - 1
+    if end > last:
+        raise InputError(f"the review ends a blink of {series.column} at frame {end}; the last is {last}")
+    if not np.isfinite(series.distance[onset : end + 1]).all():
+        raise InputError(
+            f"the review moves a blink of {series.column} ({onset} to {end}) over frames without a value"
+        )
+    return replace(blink, onset=onset, end=end)
 
 
 def require_blinks(eye: EyeBlinks, options: LabelOptions, *, any_duration: bool = False) -> None:

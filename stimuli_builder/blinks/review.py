@@ -1,7 +1,9 @@
-"""A person's second look at the labels: blinks rejected or accepted again, kept with the reason."""
+"""A person's second look at the labels: blinks rejected or accepted again, with the reason, or moved ends."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -17,14 +19,28 @@ MATCH_FRAMES = 10
 """A decision belongs to the blink whose minimum is within so many frames (at 300 fps) of its own."""
 
 
+EDGE_COLUMNS = ("onset_frame", "end_frame")
+"""Columns a review file may have besides: where a person moved a blink's start or end; empty where not."""
+
+
 @dataclass(frozen=True)
 class Review:
-    """One decision about one blink, found again by its column and minimum, not by its number."""
+    """One decision about one blink, found again by its column and minimum, not by its number.
+
+    `onset_frame` and `end_frame` take the place of the labelled ones; None leaves them.
+    """
 
     column: str
     minimum_frame: int
     decision: Decision
     reason: str
+    onset_frame: int | None = None
+    end_frame: int | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether the blink's start or end was moved."""
+        return self.onset_frame is not None or self.end_frame is not None
 
 
 def read_reviews(path: Path) -> list[Review]:
@@ -33,8 +49,12 @@ def read_reviews(path: Path) -> list[Review]:
         return []
     table = read_table(path)
     expected = [field.name for field in fields(Review)]
-    if list(table.columns) != expected:
-        raise InputError(f"{path.name} is no review file: expected the columns {', '.join(expected)}")
+    if list(table.columns) not in (expected[: -len(EDGE_COLUMNS)], expected):
+        needed = ", ".join(expected[: -len(EDGE_COLUMNS)])
+        raise InputError(
+            f"{path.name} is no review file: expected the columns {needed}, and perhaps "
+            f"{' and '.join(EDGE_COLUMNS)}"
+        )
     return [_review(row, number, path) for number, row in enumerate(table.to_dict("records"), start=2)]
 
 
@@ -46,20 +66,42 @@ def _review(row: dict[object, object] | dict[str, object], number: int, path: Pa
         raise InputError(
             f"{path.name} row {number}: unknown decision '{word}'{did_you_mean(word, ['accept', 'reject'])}"
         )
+    frame = _frame(values, "minimum_frame", number, path)
+    if frame is None:
+        raise InputError(f"{path.name} row {number}: minimum_frame must be a whole number")
+    onset, end = (_frame(values, name, number, path) for name in EDGE_COLUMNS)
+    if not (frame if onset is None else onset + 1) <= frame <= (frame if end is None else end - 1):
+        raise InputError(
+            f"{path.name} row {number}: expected onset_frame before and end_frame after minimum_frame {frame}"
+        )
+    reason = values["reason"] if isinstance(values["reason"], str) else ""
+    return Review(str(values["column"]), frame, decision, reason, onset, end)
+
+
+def _frame(values: dict[str, object], name: str, number: int, path: Path) -> int | None:
+    """Frame number in a column, None where the column is missing or empty."""
+    value = values.get(name)
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return None
     try:
-        frame = int(str(values["minimum_frame"]))
-    except ValueError as error:
-        raise InputError(f"{path.name} row {number}: minimum_frame must be a whole number") from error
-    reason = values["reason"]
-    return Review(str(values["column"]), frame, decision, reason if isinstance(reason, str) else "")
+        # A column of whole numbers with empty cells is read as floats, one with a word as text.
+        frame = float(str(value))
+    except ValueError:
+        frame = -1.0
+    if not (frame >= 0 and frame.is_integer()):
+        raise InputError(f"{path.name} row {number}: {name} must be a whole number, got {value!r}")
+    return int(frame)
 
 
 def write_reviews(path: Path, reviews: Sequence[Review]) -> None:
-    """Write all decisions, one row a blink."""
+    """Write all decisions, one row a blink; the columns of moved ends only where an end was moved."""
     with whole_file(path) as partial:
         columns = [field.name for field in fields(Review)]
-        rows = [asdict(review) for review in reviews]
-        pd.DataFrame(rows, columns=columns).to_csv(partial, index=False, lineterminator="\n")
+        table = pd.DataFrame([asdict(review) for review in reviews], columns=columns)
+        table = table.astype(dict.fromkeys(EDGE_COLUMNS, "Int64"))
+        if not any(review.moves for review in reviews):
+            table = table.drop(columns=list(EDGE_COLUMNS))
+        table.to_csv(partial, index=False, lineterminator="\n")
 
 
 def parse_choice(text: str, decision: Decision, blinks: Sequence[MeasuredBlink]) -> Review:
@@ -84,16 +126,56 @@ def parse_choice(text: str, decision: Decision, blinks: Sequence[MeasuredBlink])
 
 
 def merge(old: Sequence[Review], new: Sequence[Review], reach_frames: float) -> list[Review]:
-    """Return the decisions with the new ones in place of old ones about the same blinks."""
-    kept = [
-        review
-        for review in old
-        if not any(
-            later.column == review.column and abs(later.minimum_frame - review.minimum_frame) <= reach_frames
-            for later in new
-        )
-    ]
-    return kept + list(new)
+    """Return the decisions with the new ones in place of old ones about the same blinks; moved ends stay."""
+    kept = []
+    merged = list(new)
+    for review in old:
+        same = [
+            place
+            for place, later in enumerate(merged)
+            if later.column == review.column
+            and abs(later.minimum_frame - review.minimum_frame) <= reach_frames
+        ]
+        if not same:
+            kept.append(review)
+        for place in same:
+            if not merged[place].moves:
+                merged[place] = replace(
+                    merged[place], onset_frame=review.onset_frame, end_frame=review.end_frame
+                )
+    return kept + merged
+
+
+def moved_edges(
+    blinks: Sequence[MeasuredBlink], decided: Mapping[tuple[str, int], Review], column: str
+) -> dict[int, tuple[int, int]]:
+    """Return minimum -> (onset, end) of a column's blinks whose start or end a person moved.
+
+    Raises
+    ------
+    InputError
+        A moved blink would reach into its neighbour.
+    """
+    own = [blink for blink in blinks if blink.column == column]
+    edges: list[tuple[int, int, int]] = []
+    moved = {}
+    for blink in own:
+        review = decided.get((column, blink.number))
+        onset, end = blink.onset_frame, blink.end_frame
+        if review is not None and review.moves:
+            onset = onset if review.onset_frame is None else review.onset_frame
+            end = end if review.end_frame is None else review.end_frame
+            moved[blink.minimum_frame] = (onset, end)
+        edges.append((blink.number, onset, end))
+    for (number, onset, end), (later, start, stop) in pairwise(edges):
+        overlaps = start < end
+        changed = own[number - 1].minimum_frame in moved or own[later - 1].minimum_frame in moved
+        if overlaps and changed:
+            raise InputError(
+                f"the review moves blink {number} ({onset} to {end}) and blink {later} ({start} to {stop}) "
+                f"of {column} into each other; move the start or end apart"
+            )
+    return moved
 
 
 def match_frames(fps: float) -> float:

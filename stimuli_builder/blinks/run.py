@@ -20,6 +20,7 @@ from stimuli_builder.blinks.review import (
     decide,
     match_frames,
     merge,
+    moved_edges,
     parse_choice,
     read_reviews,
     write_reviews,
@@ -56,6 +57,7 @@ def run_blinks(job: BlinksJob) -> None:
     _check(job)
     eyes = label_recording(job)
     reviews, decided, lost = _reviewed(job, eyes)
+    eyes = [_with_moved_edges(job, eye, decided) for eye in eyes]
     frame = blinks_frame([blink for eye in eyes for blink in eye.blinks], decided)
     accepted = [_accepted_only(eye, decided) for eye in eyes]
     names = [eye_of(eye.series.column) for eye in accepted]
@@ -123,6 +125,15 @@ def _reviewed(
         raise InputError(f"{job.review}: there is no such review file; --reject N=reason begins one")
     reviews = merge(old, new, reach)
     return reviews, *decide(blinks, reviews, reach)
+
+
+def _with_moved_edges(job: BlinksJob, eye: EyeBlinks, decided: Mapping[tuple[str, int], Review]) -> EyeBlinks:
+    edges = moved_edges(eye.blinks, decided, eye.series.column)
+    if not edges:
+        return eye
+    return blinks_of(
+        eye.series, job.options, closed_distance=job.closed, complete_from=job.complete_from, edges=edges
+    )
 
 
 def _accepted_only(eye: EyeBlinks, decided: Mapping[tuple[str, int], Review]) -> EyeBlinks:

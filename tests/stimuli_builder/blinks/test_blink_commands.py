@@ -208,3 +208,49 @@ def test_every_column_and_preset_is_in_the_guide(word):
 def test_every_command_is_in_the_guide_and_has_help(stimuli, command):
     assert f"stimuli {command}" in GUIDE
     assert stimuli(*command.split(), "--help").code == 0
+
+
+def test_a_review_moves_the_start_and_end_of_a_blink(stimuli, series_file, tmp_path):
+    review, out = tmp_path / "review.csv", tmp_path / "b.csv"
+    common = ("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", out)
+    assert stimuli(*common).code == 0
+    before = pd.read_csv(out)
+    onset, minimum, end = (int(before[f"{name}_frame"][1]) for name in ("onset", "minimum", "end"))
+    header = "column,minimum_frame,decision,reason,onset_frame,end_frame"
+    review.write_text(f"{header}\ngap_l,{minimum + 1},accept,,{onset - 4},{end + 6}\n", encoding="utf-8")
+    assert stimuli(*common, "--review", review).code == 0
+    after = pd.read_csv(out)
+    assert (after["onset_frame"] - before["onset_frame"]).tolist() == [0, -4, 0, 0]
+    assert (after["end_frame"] - before["end_frame"]).tolist() == [0, 6, 0, 0]
+    assert after["down_frames"][1] == minimum - onset + 4
+    longer = len(read_profile_table(tmp_path / "b.profiles.csv")[1].closure)
+    assert longer == end - onset + 11
+
+    assert stimuli(*common, "--review", review, "--reject", "2=talking").code == 0
+    assert f"gap_l,{minimum},reject,talking,{onset - 4},{end + 6}" in review.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("gap_l,{minimum},accept,,{minimum},", "expected onset_frame before"),
+        ("gap_l,{minimum},accept,,,x", "end_frame must be a whole number"),
+        ("gap_l,{minimum},accept,,,{far}", "into each other"),
+        ("gap_l,{last},accept,,,99999", "the last is"),
+    ],
+)
+def test_moved_ends_that_cannot_be(stimuli, series_file, tmp_path, row, words):
+    review, out = tmp_path / "review.csv", tmp_path / "b.csv"
+    common = ("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", out)
+    assert stimuli(*common).code == 0
+    table = pd.read_csv(out)
+    line = row.format(
+        minimum=table["minimum_frame"][1],
+        far=table["minimum_frame"][2] + 1,
+        last=table["minimum_frame"][3],
+    )
+    header = "column,minimum_frame,decision,reason,onset_frame,end_frame"
+    review.write_text(f"{header}\n{line}\n", encoding="utf-8")
+    ended = stimuli(*common, "--review", review)
+    assert ended.code == 2
+    assert words in ended.err
