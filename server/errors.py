@@ -8,6 +8,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
+from sqlalchemy.exc import DataError
 from starlette.exceptions import HTTPException
 
 from experiments.errors import InputError
@@ -94,6 +95,8 @@ def install_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(InputError, _bad_input)
     app.add_exception_handler(RequestValidationError, _not_valid)
     app.add_exception_handler(HTTPException, _http)
+    app.add_exception_handler(OverflowError, _out_of_range)
+    app.add_exception_handler(DataError, _out_of_range)
     app.add_exception_handler(Exception, _unexpected)
 
 
@@ -124,6 +127,14 @@ async def _http(_request: Request, error: Exception) -> JSONResponse:
     # Python has changed its mind about the name of 413.
     code = "too_large" if error.status_code == 413 else HTTPStatus(error.status_code).name.lower()
     return error_response(error.status_code, code, str(error.detail), headers=error.headers)
+
+
+async def _out_of_range(_request: Request, _error: Exception) -> JSONResponse:
+    # What no database column can hold: SQLite's driver and PostgreSQL say so only when they get it.
+    message = (
+        "A value is out of range: a number is too large, or a text holds a character that cannot be stored."
+    )
+    return error_response(422, "out_of_range", message)
 
 
 async def _unexpected(_request: Request, error: Exception) -> JSONResponse:

@@ -20,6 +20,8 @@ QUIET = (
     "uvicorn",
     "uvicorn.error",
     "uvicorn.asgi",
+    "alembic",
+    "alembic",
     "sqlalchemy",
     "botocore",
     "boto3",

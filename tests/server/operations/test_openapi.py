@@ -45,6 +45,8 @@ def failures(caller: TestClient, found: list[Any], headers: dict[str, str]) -> l
             given_args = case.as_transport_kwargs(base_url=str(caller.base_url))
             sent = {**(given_args.pop("headers", None) or {}), **headers}
             given_args.pop("cookies", None)
+            if isinstance(given_args.get("data"), bytes):
+                given_args["content"] = given_args.pop("data")
             answer = caller.request(headers=sent, **given_args)
             if answer.status_code >= 500 and answer.status_code != 503:
                 wrong.append(f"{case.method} {case.formatted_path}: {answer.text[:200]}")
