@@ -11,6 +11,7 @@ import argparse
 import asyncio
 import os
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -229,6 +230,8 @@ def main() -> int:
         "kill": lambda: under_fire(int(200 * share), seconds, workers),
         "export": lambda: export(int(EXPORTED_ROWS * share)),
     }
+    # Ended from outside it still stops its servers: SystemExit passes every `finally`.
+    signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(143))
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(
         resource.RLIMIT_NOFILE, (hard if hard != resource.RLIM_INFINITY else max(soft, 65536), hard)

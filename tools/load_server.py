@@ -12,7 +12,7 @@ import time
 import urllib.request
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -76,13 +76,18 @@ class LoadServer:
 
     def cpu_s(self) -> float:
         """Processor time used by all of them so far."""
-        return sum(sum(process.cpu_times()[:2]) for process in self.processes())
+        used = 0.0
+        for process in self.processes():
+            with suppress(psutil.Error):
+                used += sum(process.cpu_times()[:2])
+        return used
 
     def kill_worker(self, number: int) -> None:
         """kill -9 of a worker (its supervisor starts another), or of the one process, started again here."""
-        workers = [p for p in self.processes()[1:] if "spawn_main" in " ".join(p.cmdline())]
-        if workers:
-            workers[number % len(workers)].kill()
+        if self.workers > 1:
+            workers = [process for process in self.processes()[1:] if _is_worker(process)]
+            if workers:
+                workers[number % len(workers)].kill()
         elif self.process is not None:
             self.process.kill()
             self.process.wait()
@@ -102,17 +107,19 @@ class LoadServer:
 def load_server(kind: str, workers: int) -> Iterator[LoadServer]:
     """A started server with a live study on `sqlite` or `postgres`."""
     folder = Path(tempfile.mkdtemp(prefix="palpebra-load-"))
-    with _database(kind, folder) as url:
-        server = LoadServer(Settings(data_folder=folder / "data", database_url=url), workers)
-        try:
-            upgrade(server.services.database)
-            server.link = add_study(server.services, folder / "clips", STUDY, frames=45).link_token
-            server.start()
-            yield server
-        finally:
-            server.stop()
-            server.services.database.close()
-    shutil.rmtree(folder, ignore_errors=True)
+    try:
+        with _database(kind, folder) as url:
+            server = LoadServer(Settings(data_folder=folder / "data", database_url=url), workers)
+            try:
+                upgrade(server.services.database)
+                server.link = add_study(server.services, folder / "clips", STUDY, frames=45).link_token
+                server.start()
+                yield server
+            finally:
+                server.stop()
+                server.services.database.close()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
@@ -136,6 +143,13 @@ def kill_postgres(server: LoadServer) -> None:
         pid = connection.exec_driver_sql("SELECT pg_backend_pid()").scalar()
         psutil.Process(int(str(pid))).kill()
         connection.invalidate()
+
+
+def _is_worker(process: psutil.Process) -> bool:
+    try:
+        return "spawn_main" in " ".join(process.cmdline())
+    except psutil.Error:  # it ended between the two looks
+        return False
 
 
 def _free_port() -> int:

@@ -1,0 +1,39 @@
+"""Write the backup of the present revision; see README.md."""
+
+import tempfile
+from pathlib import Path
+
+from fastapi.testclient import TestClient
+
+from server.app import create_app
+from server.context import open_services
+from server.migrate import newest_revision, upgrade
+from server.operations.backup import back_up
+from server.settings import Settings
+from tests.helpers.studies import Participant, add_study
+
+HERE = Path(__file__).resolve().parent
+
+
+def main() -> None:
+    """One finished visit, one begun."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        settings = Settings(
+            data_folder=folder, database_url=f"sqlite:///{folder / 'x.sqlite'}", secret_key="golden"
+        )
+        services = open_services(settings)
+        upgrade(services.database)
+        study = add_study(services, folder / "clips")
+        with TestClient(create_app(settings)) as client:
+            first = Participant(client, study.link_token).agree()
+            first.request("PUT", "/forms/about", {"answers": {"age": 30, "glasses": ["lenses"]}})
+            first.rate_all()
+            second = Participant(client, study.link_token).agree()
+            second.rate(second.state()["trials"][0], comment="an open visit")
+        back_up(services, HERE / f"{newest_revision()}.tar", with_clips=False)
+        services.database.close()
+
+
+if __name__ == "__main__":
+    main()

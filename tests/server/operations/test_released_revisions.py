@@ -1,0 +1,46 @@
+"""Every released revision, with data in it: restored, migrated to the newest, one step down and up again."""
+
+from pathlib import Path
+
+import pytest
+
+from server.context import open_services
+from server.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.operations.restore import restore
+from server.operations.rows import Content, content_of, snapshot, tables_of
+from server.settings import Settings
+from tests.conftest import REPOSITORY
+from tests.helpers.databases import BACKENDS
+
+BACKUPS = sorted((REPOSITORY / "tests" / "golden" / "backups").glob("*.tar"))
+
+
+def test_the_newest_revision_has_its_backup() -> None:
+    assert newest_revision() in {path.stem for path in BACKUPS}
+
+
+@pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
+@pytest.mark.parametrize("backup", BACKUPS, ids=lambda path: path.stem)
+def test_a_released_revision_is_migrated_with_its_rows(
+    backup: Path, empty_database_url: str, tmp_path: Path
+) -> None:
+    settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "data")
+    services = open_services(settings)
+    described = restore(services, backup)
+    assert described.revision == backup.stem
+    assert current_revision(services.database) == newest_revision()
+
+    def contents() -> dict[str, Content]:
+        with snapshot(services.database) as connection:
+            return {table.name: content_of(connection, table) for table in tables_of(connection)}
+
+    migrated = contents()
+    assert migrated["trial_ratings"].rows == described.tables["trial_ratings"].rows == 13
+    downgrade(services.database)
+    upgrade(services.database)
+    if len(BACKUPS) > 1:  # below the first revision there are no tables to keep rows in
+        assert {name: found.rows for name, found in contents().items()} == {
+            name: found.rows for name, found in migrated.items()
+        }
+    assert current_revision(services.database) == newest_revision()
+    services.database.close()
