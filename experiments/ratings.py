@@ -8,6 +8,7 @@ The view carries a trial's levels as one JSON object in `levels`; the CSV has on
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 ColumnType = Literal["text", "integer", "number", "boolean", "time"]
@@ -109,24 +110,30 @@ def csv_header(factors: Sequence[str]) -> list[str]:
     return header
 
 
-def csv_row(row: Mapping[str, Any], factors: Sequence[str]) -> list[Any]:
-    """One view row as CSV cells; booleans are 0 and 1, what is missing is empty."""
-    levels: Mapping[str, str] = json.loads(row["levels"]) if row["levels"] else {}
-    cells: list[Any] = []
-    for name in COLUMN_NAMES:
-        if name == "levels":
-            cells.extend(levels.get(factor, "") for factor in factors)
-        else:
-            cells.append(_csv_value(row[name]))
+_LEVELS = COLUMN_NAMES.index("levels")
+_BOOLEANS = tuple(place for place, column in enumerate(RATING_COLUMNS) if column.type == "boolean")
+
+
+def csv_row(row: Sequence[Any], factors: tuple[str, ...]) -> list[Any]:
+    """One view row (values in the order of `COLUMN_NAMES`) as CSV cells.
+
+    Booleans become 0 and 1; what is missing stays None, which a CSV writer leaves empty.
+    """
+    cells = list(row)
+    for place in _BOOLEANS:
+        if cells[place] is not None:
+            cells[place] = int(cells[place])
+    cells[_LEVELS : _LEVELS + 1] = _level_cells(row[_LEVELS], factors)
     return cells
+
+
+# A study has few cells but many rows: their JSON is parsed once each.
+@lru_cache(maxsize=4096)
+def _level_cells(levels: str | None, factors: tuple[str, ...]) -> tuple[str, ...]:
+    found: Mapping[str, str] = json.loads(levels) if levels else {}
+    return tuple(found.get(factor, "") for factor in factors)
 
 
 def factors_in_header(header: Iterable[str]) -> list[str]:
     """The factor columns of a CSV export: every column the contract does not name, in order."""
     return [name for name in header if name not in COLUMN_NAMES]
-
-
-def _csv_value(value: Any) -> Any:
-    if value is None:
-        return ""
-    return int(value) if isinstance(value, bool) else value

@@ -14,23 +14,25 @@ _ROWS = text(f"SELECT {', '.join(COLUMN_NAMES)} FROM ratings WHERE run = :run OR
 RUNS_AT_ONCE = 200
 
 
-def factor_names(session: Session, study: Study) -> list[str]:
+def factor_names(session: Session, study: Study) -> tuple[str, ...]:
     """Factors of all versions of a study, in declared order."""
     query = select(StudyVersion.definition).where(StudyVersion.study_id == study.id)
     names: dict[str, None] = {}
     for definition in session.scalars(query.order_by(StudyVersion.number)):
         names.update(dict.fromkeys(factor["name"] for factor in definition["factors"]))
-    return list(names)
+    return tuple(names)
 
 
-def rating_rows(session: Session, study: Study) -> Iterator[dict[str, Any]]:
-    """Rows of the view, by start of the run, then trial and play. One run's rows are in memory at a time."""
+def rating_rows(session: Session, study: Study) -> Iterator[Sequence[Any]]:
+    """Rows of the view (values in the order of COLUMN_NAMES) by start of the run, then trial and play.
+
+    One run's rows are in memory at a time.
+    """
     connection, latest = session.connection(), 0
     while runs := _runs_after(session, study, latest):
         latest = runs[-1].id
         for run in runs:
-            for row in connection.execute(_ROWS, {"run": run.public_id}):
-                yield dict(zip(COLUMN_NAMES, row, strict=True))
+            yield from connection.execute(_ROWS, {"run": run.public_id}).all()
 
 
 def write_ratings_csv(session: Session, study: Study, stream: TextIO) -> int:

@@ -62,7 +62,7 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "excluded": int(run.excluded),
         "exclusion_reason": run.exclusion_reason or "",
         "erased": int(run.erased_at is not None),
-        "forms": _json(dict(answers)),
+        "forms": _json(dict(answers.all())),
         "device": _json(run.device),
         "recruiter_parameters": _json(run.recruiter_parameters),
     }

@@ -22,6 +22,6 @@ def test_factors_are_read_back_from_the_header(factors: list[str]) -> None:
 def test_a_row_has_a_cell_for_every_header_column() -> None:
     row = dict.fromkeys(COLUMN_NAMES) | {"levels": '{"speed": "fast"}', "synthetic": True, "response": 5}
     header = csv_header(["speed"])
-    cells = dict(zip(header, csv_row(row, ["speed"]), strict=True))
+    cells = dict(zip(header, csv_row(list(row.values()), ("speed",)), strict=True))
     assert cells["speed"] == "fast"
-    assert (cells["synthetic"], cells["response"], cells["comment"]) == (1, 5, "")
+    assert (cells["synthetic"], cells["response"], cells["comment"]) == (1, 5, None)

@@ -9,7 +9,6 @@ from starlette.testclient import TestClient as StarletteClient
 
 from server.accounts import service
 from server.accounts.identity import Role
-from server.app import create_app
 from server.context import Services
 from server.settings import Settings
 
@@ -32,9 +31,14 @@ class Admin:
         return self.client.request(method, f"/api/admin{path}", json=body, **options)
 
 
-def signed_in(settings: Settings, services: Services, role: Role) -> Admin:
-    """A new account of this role, signed in through a one-time link."""
-    client = TestClient(create_app(settings), base_url=settings.public_url, raise_server_exceptions=False)
+def fresh_browser(client: TestClient, settings: Settings) -> TestClient:
+    """Another browser of the same application: no cookies."""
+    return TestClient(client.app, base_url=settings.public_url, raise_server_exceptions=False)
+
+
+def signed_in(client: TestClient, services: Services, role: Role) -> Admin:
+    """A new account of this role, signed in through a one-time link in a browser of its own."""
+    client = fresh_browser(client, services.settings)
     _, token = service.invite(services.database, role, "", None)
     made = client.post(
         f"/api/admin/invitations/{token}/account", json={"name": f"the {role}", "password": PASSWORD}
@@ -44,18 +48,18 @@ def signed_in(settings: Settings, services: Services, role: Role) -> Admin:
 
 
 @pytest.fixture
-def owner(settings: Settings, services: Services) -> Admin:
+def owner(client: TestClient, services: Services) -> Admin:
     """A signed-in owner."""
-    return signed_in(settings, services, "owner")
+    return signed_in(client, services, "owner")
 
 
 @pytest.fixture
-def experimenter(settings: Settings, services: Services) -> Admin:
+def experimenter(client: TestClient, services: Services) -> Admin:
     """A signed-in experimenter."""
-    return signed_in(settings, services, "experimenter")
+    return signed_in(client, services, "experimenter")
 
 
 @pytest.fixture
-def viewer(settings: Settings, services: Services) -> Admin:
+def viewer(client: TestClient, services: Services) -> Admin:
     """A signed-in viewer."""
-    return signed_in(settings, services, "viewer")
+    return signed_in(client, services, "viewer")

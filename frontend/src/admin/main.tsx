@@ -12,7 +12,7 @@ import { createRoot } from "react-dom/client";
 import { Refused } from "./api";
 import { styleNonce } from "./nonce";
 import { router } from "./router";
-import { theme } from "./theme";
+import { readable, theme } from "./theme";
 
 const queries = new QueryClient({
   defaultOptions: {
@@ -24,7 +24,12 @@ const root = document.getElementById("root");
 if (root !== null) {
   createRoot(root).render(
     <StrictMode>
-      <MantineProvider theme={theme} defaultColorScheme="auto" getStyleNonce={styleNonce}>
+      <MantineProvider
+        theme={theme}
+        cssVariablesResolver={readable}
+        defaultColorScheme="auto"
+        getStyleNonce={styleNonce}
+      >
         <QueryClientProvider client={queries}>
           <Notifications position="top-right" />
           <RouterProvider router={router} />

@@ -2,6 +2,7 @@
 
 import { createRootRoute, createRoute, createRouter, lazyRouteComponent, Outlet } from "@tanstack/react-router";
 import { Shell } from "./shell/Shell";
+import { ErrorAlert } from "./ui/Answer";
 import { NotFound } from "./ui/NotFound";
 
 const root = createRootRoute({ component: Outlet, notFoundComponent: NotFound });
@@ -48,6 +49,17 @@ const figures = createRoute({
   ...page,
   path: "/blinks",
   component: lazyRouteComponent(() => import("./figures/FiguresPage"), "FiguresPage"),
+});
+
+const labelling = createRoute({
+  ...page,
+  path: "/labelling",
+  component: lazyRouteComponent(() => import("./labelling/LabellingPage"), "LabellingPage"),
+});
+const blinkReview = createRoute({
+  ...page,
+  path: "/blink-review",
+  component: lazyRouteComponent(() => import("./labelling/BlinkReviewPage"), "BlinkReviewPage"),
 });
 
 const study = createRoute({
@@ -112,10 +124,25 @@ const tabs = [
 const tree = root.addChildren([
   signIn,
   invitation,
-  inside.addChildren([studies, create, account, people, audit, figures, study.addChildren(tabs)]),
+  inside.addChildren([
+    studies,
+    create,
+    account,
+    people,
+    audit,
+    figures,
+    labelling,
+    blinkReview,
+    study.addChildren(tabs),
+  ]),
 ]);
 
-export const router = createRouter({ routeTree: tree, basepath: "/admin", defaultPreload: "intent" });
+export const router = createRouter({
+  routeTree: tree,
+  basepath: "/admin",
+  defaultPreload: "intent",
+  defaultErrorComponent: ({ error }) => <ErrorAlert error={error} retry={() => window.location.reload()} />,
+});
 
 declare module "@tanstack/react-router" {
   interface Register {

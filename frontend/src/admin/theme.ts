@@ -1,4 +1,4 @@
-import { createTheme, type MantineColorsTuple } from "@mantine/core";
+import { createTheme, type CSSVariablesResolver, type MantineColorsTuple } from "@mantine/core";
 
 // A calm petrol, dark enough for white text at every shade that buttons use.
 const petrol: MantineColorsTuple = [
@@ -7,11 +7,18 @@ const petrol: MantineColorsTuple = [
 
 export const theme = createTheme({
   primaryColor: "petrol",
-  primaryShade: { light: 7, dark: 5 },
+  primaryShade: { light: 7, dark: 6 },
   autoContrast: true,
   luminanceThreshold: 0.35,
   colors: { petrol },
   fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif",
   defaultRadius: "sm",
   respectReducedMotion: true,
+});
+
+/** Dimmed and placeholder text dark enough (or light enough) for WCAG's 4.5 : 1. */
+export const readable: CSSVariablesResolver = () => ({
+  variables: {},
+  light: { "--mantine-color-dimmed": "#545b62", "--mantine-color-placeholder": "#646b72", "--mantine-color-error": "#c2255c" },
+  dark: { "--mantine-color-dimmed": "#a6a7ab", "--mantine-color-placeholder": "#9a9ca1" },
 });

@@ -4,7 +4,6 @@ import random
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
@@ -86,17 +85,8 @@ def dashboard(busy_server: ServerProcess, chromium: Browser) -> Iterator[Dashboa
     page.on("pageerror", lambda error: found.complaints.append(str(error)))
     page.goto(f"{busy_server.address}/admin/invitation#{token}")
     page.get_by_label("Name to sign in with").fill("ada")
-    page.get_by_label("Password", exact=True).fill(PASSWORD)
+    page.locator("input[autocomplete=new-password]").fill(PASSWORD)
     page.get_by_role("button", name="Make the account").click()
     page.get_by_role("heading", name="Studies").wait_for()
     yield found
     context.close()
-
-
-@pytest.fixture(scope="session")
-def axe() -> str:
-    """The accessibility checker's script."""
-    path = REPOSITORY / "frontend" / "node_modules" / "axe-core" / "axe.min.js"
-    if not path.is_file():
-        pytest.skip("axe-core is not installed: run `make setup-test`")
-    return Path(path).read_text(encoding="utf-8")

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.admin.conftest import Dashboard
+from tests.browser.visit import axe_violations
 
 pytestmark = pytest.mark.browser
 PAGES = {
@@ -30,16 +31,6 @@ PAGES = {
 }
 
 
-def accessible(dashboard: Dashboard, axe: str) -> list[str]:
-    # Evaluated by the driver, not by the page: the page's policy allows no foreign script.
-    dashboard.page.evaluate(axe)
-    found = dashboard.page.evaluate(
-        "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'] }).then(r => "
-        "r.violations.map(v => v.id + ': ' + v.nodes.slice(0, 3).map(n => n.html.slice(0, 160)).join(' | ')))"
-    )
-    return list(found)
-
-
 def shoot(dashboard: Dashboard, name: str) -> None:
     folder = os.environ.get("SCREENSHOTS")
     if folder:
@@ -47,19 +38,19 @@ def shoot(dashboard: Dashboard, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_shows_what_it_should_and_is_accessible(dashboard: Dashboard, axe: str, name: str) -> None:
+def test_a_page_shows_what_it_should_and_is_accessible(dashboard: Dashboard, name: str) -> None:
     path, words = PAGES[name]
     dashboard.complaints.clear()
     page = dashboard.open(path)
     page.get_by_text(words).first.wait_for()
     page.wait_for_timeout(300)
     shoot(dashboard, name)
-    assert accessible(dashboard, axe) == []
+    assert axe_violations(dashboard.page) == []
     assert dashboard.complaints == []
 
 
 @pytest.mark.parametrize("name", ["studies", "monitor", "results"])
-def test_dark_and_narrow(dashboard: Dashboard, axe: str, name: str) -> None:
+def test_dark_and_narrow(dashboard: Dashboard, name: str) -> None:
     page = dashboard.page
     page.emulate_media(color_scheme="dark")
     page.set_viewport_size({"width": 390, "height": 844})
@@ -70,7 +61,7 @@ def test_dark_and_narrow(dashboard: Dashboard, axe: str, name: str) -> None:
         shoot(dashboard, f"{name}-dark-narrow")
         width = page.evaluate("document.documentElement.scrollWidth")
         assert width <= 390, f"the page is {width} px wide on a screen of 390"
-        assert accessible(dashboard, axe) == []
+        assert axe_violations(dashboard.page) == []
     finally:
         page.emulate_media(color_scheme="light")
         page.set_viewport_size({"width": 1280, "height": 800})
@@ -120,9 +111,9 @@ def test_signing_out_and_in(dashboard: Dashboard) -> None:
     page.get_by_role("button", name="ada").click()
     page.get_by_role("menuitem", name="Sign out").click()
     page.get_by_label("Name").fill("ada")
-    page.get_by_label("Password", exact=True).fill("wrong")
+    page.locator("input[autocomplete=current-password]").fill("wrong")
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_text("Name or password are wrong.")).to_be_visible()
-    page.get_by_label("Password", exact=True).fill("correct horse battery")
+    page.locator("input[autocomplete=current-password]").fill("correct horse battery")
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_role("heading", name="Studies")).to_be_visible()

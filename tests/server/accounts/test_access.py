@@ -1,9 +1,9 @@
 import pytest
 from fastapi.testclient import TestClient
 
-from server.app import create_app
+from server.context import Services
 from server.settings import Settings
-from tests.helpers.admins import Admin, signed_in
+from tests.helpers.admins import Admin, fresh_browser, signed_in
 from tests.helpers.studies import StudyInDatabase
 
 CHANGES = [
@@ -21,11 +21,11 @@ CHANGES = [
 OWNERS = [("GET", "/accounts"), ("POST", "/invitations"), ("GET", "/audit"), ("PATCH", "/accounts/1")]
 
 
-def by_token(settings: Settings, admin: Admin, *scopes: str) -> TestClient:
+def by_token(client: TestClient, settings: Settings, admin: Admin, *scopes: str) -> TestClient:
     token = admin.send("POST", "/tokens", {"name": "script", "scopes": list(scopes)}).json()["token"]
-    client = TestClient(create_app(settings), base_url=settings.public_url, raise_server_exceptions=False)
-    client.headers["authorization"] = f"Bearer {token}"
-    return client
+    script = fresh_browser(client, settings)
+    script.headers["authorization"] = f"Bearer {token}"
+    return script
 
 
 @pytest.mark.parametrize(("method", "path"), CHANGES)
@@ -47,30 +47,34 @@ def test_nobody_gets_in_without_signing_in(
     assert (answer.status_code, answer.json()["error"]["code"]) == (401, "not_signed_in")
 
 
-def test_a_token_cannot_exceed_its_scopes(settings: Settings, owner: Admin, study: StudyInDatabase) -> None:
-    reads, exports = by_token(settings, owner, "read"), by_token(settings, owner, "export")
+def test_a_token_cannot_exceed_its_scopes(
+    client: TestClient, settings: Settings, owner: Admin, study: StudyInDatabase
+) -> None:
+    reads, exports = by_token(client, settings, owner, "read"), by_token(client, settings, owner, "export")
     assert reads.get("/api/admin/studies").status_code == 200
     assert reads.get("/api/admin/studies/short/data/ratings.csv").status_code == 403
     assert reads.post("/api/admin/studies/short/links", json={"kind": "general"}).status_code == 403
     assert exports.get("/api/admin/studies").status_code == 403
     assert exports.get("/api/admin/studies/short/data/ratings.csv").status_code == 200
-    for client in (reads, exports, by_token(settings, owner, "read", "write", "export")):
-        assert client.get("/api/admin/accounts").status_code == 403
-        assert client.post("/api/admin/tokens", json={"name": "more", "scopes": ["write"]}).status_code == 403
+    for script in (reads, exports, by_token(client, settings, owner, "read", "write", "export")):
+        assert script.get("/api/admin/accounts").status_code == 403
+        assert script.post("/api/admin/tokens", json={"name": "more", "scopes": ["write"]}).status_code == 403
 
 
-def test_a_viewers_token_cannot_write(settings: Settings, viewer: Admin, study: StudyInDatabase) -> None:
-    client = by_token(settings, viewer, "read", "write", "export")
-    assert client.post("/api/admin/studies/short/links", json={"kind": "general"}).status_code == 403
+def test_a_viewers_token_cannot_write(
+    client: TestClient, settings: Settings, viewer: Admin, study: StudyInDatabase
+) -> None:
+    script = by_token(client, settings, viewer, "read", "write", "export")
+    assert script.post("/api/admin/studies/short/links", json={"kind": "general"}).status_code == 403
 
 
-def test_one_owner_must_remain(settings: Settings, owner: Admin) -> None:
+def test_one_owner_must_remain(owner: Admin) -> None:
     me = owner.get("/session").json()["account"]["id"]
     assert owner.send("PATCH", f"/accounts/{me}", {"role": "viewer"}).status_code == 409
 
 
-def test_a_disabled_account_is_out_at_once(settings: Settings, services, owner: Admin) -> None:  # type: ignore[no-untyped-def]
-    other = signed_in(settings, services, "experimenter")
+def test_a_disabled_account_is_out_at_once(client: TestClient, services: Services, owner: Admin) -> None:
+    other = signed_in(client, services, "experimenter")
     other_id = other.get("/session").json()["account"]["id"]
     assert owner.send("PATCH", f"/accounts/{other_id}", {"disabled": True}).status_code == 200
     assert other.get("/studies").status_code == 401

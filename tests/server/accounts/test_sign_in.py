@@ -4,32 +4,29 @@ from fastapi.testclient import TestClient
 
 from server.accounts import service
 from server.accounts.identity import COOKIE
-from server.app import create_app
 from server.context import Services
 from server.models import Account, AdminSession, ApiToken, Invitation
 from server.settings import Settings
-from tests.helpers.admins import PASSWORD, Admin
+from tests.helpers.admins import PASSWORD, Admin, fresh_browser
 
 
-def fresh(settings: Settings) -> TestClient:
-    return TestClient(create_app(settings), base_url=settings.public_url, raise_server_exceptions=False)
-
-
-def test_a_one_time_link_works_once(settings: Settings, services: Services) -> None:
+def test_a_one_time_link_works_once(client: TestClient, settings: Settings, services: Services) -> None:
     _, token = service.invite(services.database, "owner", "first", None)
-    client = fresh(settings)
-    assert client.get("/api/admin/session").json() == {"account": None, "accounts_exist": False}
+    browser = fresh_browser(client, settings)
+    assert browser.get("/api/admin/session").json() == {"account": None, "accounts_exist": False}
     body = {"name": "ada", "password": PASSWORD}
-    assert client.post(f"/api/admin/invitations/{token}/account", json=body).status_code == 201
-    assert client.get("/api/admin/session").json()["account"]["role"] == "owner"
-    again = client.post(f"/api/admin/invitations/{token}/account", json=body | {"name": "eve"})
+    assert browser.post(f"/api/admin/invitations/{token}/account", json=body).status_code == 201
+    assert browser.get("/api/admin/session").json()["account"]["role"] == "owner"
+    again = browser.post(f"/api/admin/invitations/{token}/account", json=body | {"name": "eve"})
     assert (again.status_code, again.json()["error"]["code"]) == (409, "conflict")
 
 
 @pytest.mark.parametrize("password", ["short", "a" * 20, "the owner!"[:9]])
-def test_a_weak_password_is_refused(settings: Settings, services: Services, password: str) -> None:
+def test_a_weak_password_is_refused(
+    client: TestClient, settings: Settings, services: Services, password: str
+) -> None:
     _, token = service.invite(services.database, "owner", "", None)
-    answer = fresh(settings).post(
+    answer = fresh_browser(client, settings).post(
         f"/api/admin/invitations/{token}/account", json={"name": "ada", "password": password}
     )
     assert (answer.status_code, answer.json()["error"]["code"]) == (422, "weak_password")
@@ -49,10 +46,10 @@ def test_secrets_are_stored_hashed(services: Services, owner: Admin) -> None:
 
 
 def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(
-    settings: Settings, services: Services
+    client: TestClient, settings: Settings, services: Services
 ) -> None:
     _, token = service.invite(services.database, "owner", "", None)
-    made = fresh(settings).post(
+    made = fresh_browser(client, settings).post(
         f"/api/admin/invitations/{token}/account", json={"name": "ada", "password": PASSWORD}
     )
     cookie = made.headers["set-cookie"].lower()
@@ -60,48 +57,50 @@ def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(
     assert "samesite=strict" in cookie
 
 
-def test_ten_wrong_passwords_lock_the_account(settings: Settings, owner: Admin) -> None:
-    client = fresh(settings.model_copy(update={"logins_per_minute": 1000}))
+def test_ten_wrong_passwords_lock_the_account(client: TestClient, settings: Settings, owner: Admin) -> None:
+    browser = fresh_browser(client, settings)
     for _ in range(10):
-        wrong = client.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
+        wrong = browser.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
         assert (wrong.status_code, wrong.json()["error"]["code"]) == (401, "wrong_credentials")
-    locked = client.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
+    locked = browser.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
     assert (locked.status_code, locked.json()["error"]["code"]) == (429, "account_locked")
     assert int(locked.headers["retry-after"]) > 0
 
 
-def test_an_unknown_name_and_a_wrong_password_are_told_alike(settings: Settings, owner: Admin) -> None:
-    client = fresh(settings)
-    one = client.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
-    two = client.post("/api/admin/session", json={"name": "nobody", "password": "wrong"})
+def test_an_unknown_name_and_a_wrong_password_are_told_alike(
+    client: TestClient, settings: Settings, owner: Admin
+) -> None:
+    browser = fresh_browser(client, settings)
+    one = browser.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
+    two = browser.post("/api/admin/session", json={"name": "nobody", "password": "wrong"})
     assert one.json() == two.json()
 
 
-def test_second_factor_and_recovery_codes(settings: Settings, owner: Admin) -> None:
+def test_second_factor_and_recovery_codes(client: TestClient, settings: Settings, owner: Admin) -> None:
     setup = owner.send("POST", "/second-factor").json()
     assert setup["qr_svg"].startswith("<?xml")
     code = pyotp.TOTP(setup["secret"]).now()
     recovery = owner.send("PUT", "/second-factor", {"code": code}).json()["codes"]
     credentials = {"name": owner.name, "password": PASSWORD}
-    client = fresh(settings)
-    missing = client.post("/api/admin/session", json=credentials)
+    browser = fresh_browser(client, settings)
+    missing = browser.post("/api/admin/session", json=credentials)
     assert missing.json()["error"]["code"] == "second_factor_required"
-    replayed = client.post("/api/admin/session", json=credentials | {"code": code})
+    replayed = browser.post("/api/admin/session", json=credentials | {"code": code})
     assert replayed.status_code == 401
-    assert client.post("/api/admin/session", json=credentials | {"code": recovery[0]}).status_code == 200
-    assert client.post("/api/admin/session", json=credentials | {"code": recovery[0]}).status_code == 401
+    assert browser.post("/api/admin/session", json=credentials | {"code": recovery[0]}).status_code == 200
+    assert browser.post("/api/admin/session", json=credentials | {"code": recovery[0]}).status_code == 401
 
 
-def test_a_revoked_session_is_over(settings: Settings, owner: Admin) -> None:
-    other = fresh(settings)
+def test_a_revoked_session_is_over(client: TestClient, settings: Settings, owner: Admin) -> None:
+    other = fresh_browser(client, settings)
     other.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
     [session] = [row for row in owner.get("/sessions").json() if not row["current"]]
     assert owner.send("DELETE", f"/sessions/{session['id']}").status_code == 204
     assert other.get("/api/admin/studies").status_code == 401
 
 
-def test_a_new_password_ends_other_sessions(settings: Settings, owner: Admin) -> None:
-    other = fresh(settings)
+def test_a_new_password_ends_other_sessions(client: TestClient, settings: Settings, owner: Admin) -> None:
+    other = fresh_browser(client, settings)
     other.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
     body = {"password": PASSWORD, "new_password": "another long one"}
     assert owner.send("PUT", "/password", body).status_code == 204

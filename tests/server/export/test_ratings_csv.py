@@ -3,7 +3,7 @@ import io
 import json
 from typing import Any
 
-from experiments.ratings import RATING_COLUMNS, csv_header, factors_in_header
+from experiments.ratings import COLUMN_NAMES, RATING_COLUMNS, csv_header, factors_in_header
 from server.context import Services
 from server.export.ratings_csv import rating_rows, write_ratings_csv
 from server.models import Study
@@ -27,7 +27,7 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
     with services.database.read() as session:
         study, stream = session.query(Study).one(), io.StringIO()
         assert write_ratings_csv(session, study, stream) == 5
-        rows = list(rating_rows(session, study))
+        rows = [dict(zip(COLUMN_NAMES, row, strict=True)) for row in rating_rows(session, study)]
     stream.seek(0)
     read = list(csv.DictReader(stream))
     factors = factors_in_header(read[0])

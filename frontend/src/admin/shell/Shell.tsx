@@ -11,6 +11,8 @@ import { AccountMenu } from "./AccountMenu";
 const PAGES = [
   { to: "/", label: "Studies", role: "viewer" },
   { to: "/blinks", label: "Blinks", role: "viewer" },
+  { to: "/labelling", label: "Label video", role: "viewer" },
+  { to: "/blink-review", label: "Review blinks", role: "viewer" },
   { to: "/people", label: "People", role: "owner" },
   { to: "/audit", label: "Audit log", role: "owner" },
   { to: "/account", label: "My account", role: "viewer" },

@@ -9,7 +9,7 @@ import { StatusBadge } from "./StatusBadge";
 import { StatusButtons } from "./StatusButtons";
 
 const TABS = [
-  ["", "Design"],
+  ["design", "Design"],
   ["texts", "Texts"],
   ["clips", "Clips"],
   ["links", "Links"],
@@ -25,7 +25,7 @@ export function StudyLayout() {
   const { pathname } = useLocation();
   const navigate = useNavigate();
   const mayChange = useMay("experimenter");
-  const current = pathname.split("/")[3] ?? "";
+  const current = pathname.split("/")[3] || "design";
   return (
     <Answer of={useQuery(studyQuery(study))}>
       {({ summary }) => (
@@ -47,7 +47,7 @@ export function StudyLayout() {
           <Tabs
             value={current}
             keepMounted={false}
-            onChange={(to) => void navigate({ to: `/studies/${study}${to ? `/${to}` : ""}` })}
+            onChange={(to) => void navigate({ to: `/studies/${study}${to === "design" ? "" : `/${to ?? ""}`}` })}
           >
             <Tabs.List>
               {TABS.filter(([path]) => mayChange || (path !== "links" && path !== "settings")).map(([path, label]) => (

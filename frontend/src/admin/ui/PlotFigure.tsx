@@ -9,6 +9,8 @@ export function PlotFigure({ options, label }: { options: Plot.PlotOptions; labe
   useEffect(() => {
     const figure = Plot.plot({ style: { background: "none", color: "inherit" }, ...options });
     allowStyles(figure);
+    // Plot labels its inner groups, which may carry no label without a role; the figure has one as a whole.
+    for (const group of figure.querySelectorAll("[aria-label]")) group.removeAttribute("aria-label");
     figure.setAttribute("role", "img");
     figure.setAttribute("aria-label", label);
     place.current?.replaceChildren(figure);
