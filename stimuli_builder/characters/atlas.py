@@ -20,6 +20,7 @@ from stimuli_builder.characters.declaration import DECLARATION_FILE, Declaration
 
 SHADE_LIMITS = (0.2, 1.1)
 SHADE_BLUR_MM = 0.4
+DARKEST = np.float32(2e-3)
 SHIPPED = Path(__file__).parent / "data"
 
 
@@ -219,7 +220,9 @@ class LowerLidLayer:
         open_eye = srgb_to_linear(character.level_srgb(0))[self.window]
         sigma = SHADE_BLUR_MM * character.declaration.px_per_mm
         ratio = _blur(image, sigma) / np.maximum(_blur(open_eye, sigma), 1e-3)
-        return np.clip(ratio, *SHADE_LIMITS).astype(np.float32)
+        # Never take more light from a pixel than it has: lashes over the lid would turn into red flecks.
+        left = (image + DARKEST) / (open_eye + DARKEST)
+        return np.minimum(np.clip(ratio, *SHADE_LIMITS), left.min(axis=2, keepdims=True)).astype(np.float32)
 
     def _decode_poses(self) -> NDArray[np.float32]:
         """(vertical, horizontal, h, w, 3) change of each pose against the resting one."""

@@ -9,7 +9,7 @@ from stimuli_builder.characters.photorealistic.framing import Frame
 from stimuli_builder.characters.photorealistic.renderer import Shot
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129, 257)
-MATTE_CLOSURES = tuple(k / 8 for k in range(9))
+MATTE_CLOSURES = tuple(k / 32 for k in range(33))
 VERTICAL_MM, HORIZONTAL_MM = 1.0, 1.2
 LOWER_LID_AFTER_LEVELS = 9
 

@@ -70,6 +70,8 @@ class Renderer:
         if error is not None:
             self._process.kill()
         self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
         self._log_file.close()
         self._folder.cleanup()
 
