@@ -41,7 +41,9 @@ export function calibration(session: Session): PluginClass<Parameters> {
 /** Presses what goes on, page after page, as long as this screen lasts. */
 function pressPrimary(display: HTMLElement): void {
   const timer = setInterval(() => {
-    const primary = display.querySelector<HTMLButtonElement>(".calibration .primary");
+    // Nobody sits there whose blind spot could be found, so the distance is typed in.
+    const typed = display.querySelector(".blind-field") && display.querySelector<HTMLButtonElement>(".actions .plain");
+    const primary = typed || display.querySelector<HTMLButtonElement>(".calibration .primary");
     if (primary) primary.click();
     else clearInterval(timer);
   }, 200);

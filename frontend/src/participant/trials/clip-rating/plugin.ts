@@ -136,11 +136,12 @@ export function placeIn(session: Session, trial: AssignedTrial): { number: numbe
 
 /** Presses start, then a middle key, then whatever goes on. */
 function actTrial(display: HTMLElement): void {
+  const own = display.firstElementChild;
   const timer = setInterval(() => {
+    if (!own?.isConnected) return clearInterval(timer);
     const keys = [...display.querySelectorAll<HTMLButtonElement>(".key")];
     const press = keys[Math.floor(keys.length / 2)] ?? display.querySelector<HTMLButtonElement>(".primary");
     press?.click();
-    if (!display.querySelector(".trial, .page")) clearInterval(timer);
   }, 250);
 }
 
