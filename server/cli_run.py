@@ -25,6 +25,8 @@ from server.settings import Settings
 from server.studies.links import general_link, link_url
 
 GRACE_S = 20
+KEEP_ALIVE_S = 75
+"""Longer than a trial lasts, so that a rater keeps one connection, and than proxies keep theirs idle."""
 
 
 def register(parent: typer.Typer) -> None:
@@ -65,6 +67,7 @@ def run(
             server_header=False,
             log_config=logging_configuration(settings),
             timeout_graceful_shutdown=GRACE_S,
+            timeout_keep_alive=KEEP_ALIVE_S,
         )
 
 

@@ -23,7 +23,7 @@ from server.settings import Settings
 from tests.helpers.studies import SHORT, add_study
 
 ROOT = Path(__file__).resolve().parent.parent
-START_S = 60.0
+START_S = 180.0
 # Enough trials for minutes of rating: 2 characters x 2 speeds x 30 exemplars.
 STUDY = SHORT.replace("per_cell = 2", "per_cell = 30")
 
