@@ -1,0 +1,277 @@
+/** The work of the labelling page: a video, its labels with undo, and the start shape of each new frame. */
+
+import { useCallback, useEffect, useRef, useState } from "react";
+import { candidateFrames, farthestPictures, FRAMES_WANTED } from "../../labelling/choose-frames";
+import type { Grey } from "../../labelling/grey";
+import { begun, changed, type History, redone, undone } from "../../labelling/history";
+import { checkShape, defaultMarkers, type LabelFile, LabelProblem, labelsText, parseLabels } from "../../labelling/label-file";
+import { type Point, type Shape, templateShape, withEyeMoved, withEyeStretched, withPoint } from "../../labelling/points";
+import { FRAMES_BEFORE_PROPOSALS, proposeShape } from "../../labelling/propose";
+import { greyOfCanvas, type OpenedVideo, openVideo } from "../../labelling/video";
+import { downloadText } from "../ui/download";
+import type { MoveKind } from "./Stage";
+
+export interface LabelledFrame {
+  readonly shape: Shape;
+  readonly accepted: boolean;
+}
+
+type Frames = ReadonlyMap<number, LabelledFrame>;
+type Markers = Pick<LabelFile, "midUpper" | "midLower" | "rest">;
+
+export interface Start {
+  readonly number: number;
+  readonly shape: Shape;
+  readonly from: "template" | "nearest" | "proposal";
+}
+
+interface Looked {
+  readonly candidates: readonly number[];
+  readonly pictures: readonly Grey[];
+}
+
+const NOTHING: Frames = new Map();
+const MOST_SOURCES = 24;
+
+function acceptedOf(frames: Frames): [number, Shape][] {
+  return [...frames].filter(([, { accepted }]) => accepted).map(([number, { shape }]) => [number, shape]);
+}
+
+function message(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** About 20 frames: those labelled, and ones as unlike them as there are. */
+function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
+  const taken = labelled.map((number) =>
+    candidates.reduce(
+      (best, candidate, place) =>
+        Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best,
+      0,
+    ),
+  );
+  const places = farthestPictures(pictures, FRAMES_WANTED, taken).filter((place) => !taken.includes(place));
+  const added = places.map((place) => candidates[place] ?? 0);
+  return [...new Set([...labelled, ...added])].sort((a, b) => a - b);
+}
+
+export function useLabelling() {
+  const [video, setVideo] = useState<OpenedVideo | null>(null);
+  const [busy, setBusy] = useState<string | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  const [eyes, setEyes] = useState<1 | 2>(2);
+  const [markers, setMarkers] = useState<Markers>({ ...defaultMarkers(2), rest: {} });
+  const [history, setHistory] = useState<History<Frames>>(begun(NOTHING));
+  const [saved, setSaved] = useState<Frames>(NOTHING);
+  const [looked, setLooked] = useState<Looked | null>(null);
+  const [chosen, setChosen] = useState<readonly number[]>([]);
+  const [current, setCurrent] = useState(0);
+  const [picture, setPicture] = useState<{ number: number; canvas: HTMLCanvasElement } | null>(null);
+  const [start, setStart] = useState<Start | null>(null);
+  const [selected, setSelected] = useState<number | null>(null);
+  const greys = useRef(new Map<number, Grey>());
+  const frames = history.now;
+
+  const begin = useCallback((next: Frames, count: 1 | 2, kept: Markers) => {
+    setEyes(count);
+    setMarkers(kept);
+    setHistory(begun(next));
+    setSaved(next);
+    setStart(null);
+    setSelected(null);
+  }, []);
+
+  const open = async (file: File): Promise<void> => {
+    setProblem(null);
+    setBusy("Opening the video");
+    try {
+      const next = await openVideo(file);
+      const candidates = candidateFrames(next.frameCount);
+      const pictures = await next.thumbnails(candidates, (count) =>
+        setBusy(`Looking for frames unlike one another: ${count} of ${candidates.length}`),
+      );
+      const found = { candidates, pictures };
+      const numbers = chooseFrames(found, []);
+      video?.close();
+      greys.current.clear();
+      setPicture(null);
+      setVideo(next);
+      setLooked(found);
+      setChosen(numbers);
+      setCurrent(numbers[0] ?? 0);
+      begin(NOTHING, eyes, { ...defaultMarkers(eyes), rest: {} });
+    } catch (error) {
+      setProblem(message(error));
+    } finally {
+      setBusy(null);
+    }
+  };
+
+  const openLabels = async (file: File): Promise<void> => {
+    if (video === null || looked === null) return;
+    setProblem(null);
+    try {
+      const labels = parseLabels(file.name, await file.text());
+      requireSameVideo(file.name, labels, video);
+      const numbers = chooseFrames(looked, [...labels.frames.keys()]);
+      const { midUpper, midLower, rest } = labels;
+      begin(new Map([...labels.frames].map(([number, shape]) => [number, { shape, accepted: true }])), labels.eyes, {
+        midUpper,
+        midLower,
+        rest,
+      });
+      setChosen(numbers);
+      setCurrent([...labels.frames.keys()][0] ?? numbers[0] ?? 0);
+    } catch (error) {
+      setProblem(message(error));
+    }
+  };
+
+  useEffect(() => {
+    if (video === null) return;
+    let wanted = true;
+    video
+      .frame(current)
+      .then((canvas) => wanted && setPicture({ number: current, canvas }))
+      .catch((error: unknown) => wanted && setProblem(message(error)));
+    return () => {
+      wanted = false;
+    };
+  }, [video, current]);
+
+  const labelled = frames.has(current);
+  useEffect(() => {
+    if (video === null || picture === null || picture.number !== current || labelled) return;
+    let wanted = true;
+    startShape(video, picture, acceptedOf(frames), eyes, greys.current)
+      .then((found) => wanted && setStart(found))
+      .catch((error: unknown) => wanted && setProblem(message(error)));
+    return () => {
+      wanted = false;
+    };
+    // The frames count as they are when a new frame is opened: a start shape does not change under the hand.
+  }, [video, picture, current, labelled, eyes]);
+
+  const shown = frames.get(current)?.shape ?? (start?.number === current ? start.shape : null);
+  const put = (frame: LabelledFrame, step: string | null = null): void =>
+    setHistory((before) => changed(before, new Map(before.now).set(current, frame), step));
+
+  const move = (index: number, to: Point, kind: MoveKind, step: string | null): void => {
+    if (shown === null || video === null) return;
+    const moved = { point: withPoint, eye: withEyeMoved, stretch: withEyeStretched }[kind](shown, index, to, video.size);
+    const wrong = problemOf(current, moved, video);
+    put({ shape: moved, accepted: (frames.get(current)?.accepted ?? false) && wrong === null }, step);
+    setProblem(wrong);
+  };
+
+  const accept = (): boolean => {
+    if (shown === null || video === null) return false;
+    const wrong = problemOf(current, shown, video);
+    setProblem(wrong);
+    if (wrong === null) put({ shape: shown, accepted: true });
+    return wrong === null;
+  };
+
+  const goTo = (number: number): void => {
+    if (video === null) return;
+    const place = Math.max(0, Math.min(video.frameCount - 1, number));
+    setChosen((before) => (before.includes(place) ? before : [...before, place].sort((a, b) => a - b)));
+    setCurrent(place);
+    setProblem(null);
+  };
+
+  const step = (by: 1 | -1): void => {
+    const next = chosen[chosen.indexOf(current) + by];
+    if (next !== undefined) goTo(next);
+  };
+
+  const save = (): void => {
+    if (video === null) return;
+    const kept = new Map(acceptedOf(frames));
+    const file = { video: video.name, size: video.size, eyes, ...markers, frames: kept };
+    downloadText(`${video.name.replace(/\.[^.]+$/, "")}.labels.json`, labelsText(file), "application/json");
+    setSaved(frames);
+  };
+
+  return {
+    video,
+    busy,
+    problem,
+    eyes,
+    frames,
+    chosen,
+    current,
+    picture: picture?.number === current ? picture.canvas : null,
+    shape: shown,
+    startedFrom: labelled || start?.number !== current ? null : start.from,
+    selected,
+    acceptedCount: acceptedOf(frames).length,
+    unsaved: frames !== saved,
+    canUndo: history.past.length > 0,
+    canRedo: history.future.length > 0,
+    open,
+    openLabels,
+    select: setSelected,
+    move,
+    accept,
+    goTo,
+    step,
+    save,
+    undo: () => {
+      setProblem(null);
+      setHistory(undone);
+    },
+    redo: () => {
+      setProblem(null);
+      setHistory(redone);
+    },
+    remove: () => {
+      const rest = new Map(frames);
+      if (rest.delete(current)) setHistory((before) => changed(before, rest));
+    },
+    setEyes: (count: 1 | 2) => begin(NOTHING, count, { ...defaultMarkers(count), rest: {} }),
+  };
+}
+
+function requireSameVideo(name: string, labels: LabelFile, video: OpenedVideo): void {
+  const [[width, height], [wide, high]] = [labels.size, video.size];
+  if (width !== wide || height !== high) {
+    throw new LabelProblem(
+      `${name}: labels were made on ${width} x ${height} pixels, the video has ${wide} x ${high}; ` +
+        "use the video they were made on",
+    );
+  }
+  const beyond = [...labels.frames.keys()].find((number) => number >= video.frameCount);
+  if (beyond === undefined) return;
+  throw new LabelProblem(`${name}: frame ${beyond} is labelled, the video ends at frame ${video.frameCount - 1}`);
+}
+
+function problemOf(number: number, shape: Shape, video: OpenedVideo): string | null {
+  try {
+    checkShape(`frame ${number}`, shape, video.size);
+    return null;
+  } catch (error) {
+    if (error instanceof LabelProblem) return error.message;
+    throw error;
+  }
+}
+
+async function startShape(
+  video: OpenedVideo,
+  { number, canvas }: { number: number; canvas: HTMLCanvasElement },
+  accepted: readonly [number, Shape][],
+  eyes: 1 | 2,
+  greys: Map<number, Grey>,
+): Promise<Start> {
+  const nearest = [...accepted].sort(([a], [b]) => Math.abs(a - number) - Math.abs(b - number));
+  const first = nearest[0];
+  if (first === undefined) return { number, shape: templateShape(eyes, video.size), from: "template" };
+  if (nearest.length < FRAMES_BEFORE_PROPOSALS) return { number, shape: first[1], from: "nearest" };
+  const sources = [];
+  for (const [source, shape] of nearest.slice(0, MOST_SOURCES)) {
+    const picture = greys.get(source) ?? greyOfCanvas(await video.frame(source));
+    greys.set(source, picture);
+    sources.push({ picture, shape });
+  }
+  return { number, shape: proposeShape(greyOfCanvas(canvas), sources), from: "proposal" };
+}

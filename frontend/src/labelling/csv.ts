@@ -1,0 +1,58 @@
+/** CSV tables as the programs write them: a header, commas, quotes where a field needs them. */
+
+/** What is wrong with a table, in one line. */
+export class TableProblem extends Error {
+  override name = "TableProblem";
+}
+
+export interface Table {
+  readonly name: string;
+  readonly header: readonly string[];
+  readonly rows: readonly (readonly string[])[];
+}
+
+function fieldsOf(line: string): string[] {
+  if (!line.includes('"')) return line.split(",");
+  const fields: string[] = [];
+  for (const [whole, quoted, plain] of `,${line}`.matchAll(/,\s*(?:"((?:[^"]|"")*)"\s*|([^,]*))/g)) {
+    if (whole !== "") fields.push(quoted === undefined ? (plain ?? "") : quoted.replaceAll('""', '"'));
+  }
+  return fields;
+}
+
+/** Read a table; blanks round names and values are dropped. */
+export function parseTable(name: string, text: string): Table {
+  const lines = text.replace(/^\uFEFF/, "").split(/\r?\n/).filter((line) => line.trim() !== "");
+  const [first, ...rest] = lines;
+  if (first === undefined || rest.length === 0) {
+    throw new TableProblem(`${name}: expected a CSV table with a header line and rows`);
+  }
+  return {
+    name,
+    header: fieldsOf(first).map((field) => field.trim()),
+    rows: rest.map((line) => fieldsOf(line).map((field) => field.trim())),
+  };
+}
+
+/** Place of a column; a TableProblem that lists the columns where it is not there. */
+export function columnPlace(table: Table, column: string): number {
+  const place = table.header.indexOf(column);
+  if (place >= 0) return place;
+  throw new TableProblem(`${table.name}: expected a column '${column}', found ${table.header.join(", ")}`);
+}
+
+/** A whole number from 0 in a row (counted from 0); a TableProblem that names the row otherwise. */
+export function wholeAt(table: Table, row: number, place: number): number {
+  const text = table.rows[row]?.[place] ?? "";
+  const value = Number(text);
+  if (text !== "" && Number.isInteger(value) && value >= 0) return value;
+  throw new TableProblem(
+    `${table.name} row ${row + 2}: ${table.header[place] ?? "value"} must be a whole number, got '${text}'`,
+  );
+}
+
+/** A field as CSV writes it. */
+export function csvField(value: string | number): string {
+  const text = String(value).replaceAll(/[\r\n]+/g, " ");
+  return /[",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}

@@ -1,0 +1,154 @@
+/** The start shape of a new frame, found from frames labelled before by correlating patches of the pictures. */
+
+import { correlation, type Grey, sample } from "./grey";
+import { at, eyeCount, eyeOf, eyeWidth, type Point, type Shape } from "./points";
+
+export const FRAMES_BEFORE_PROPOSALS = 5;
+const EYE_COLUMNS = 32;
+const EYE_ROWS = 20;
+const EYE_REACH = 8;
+const POINT_SIDE = 11;
+const POINT_REACH = 5;
+/** A point's patch below this correlation says nothing; the point stays where the eye's patch put it. */
+const POINT_LEAST = 0.6;
+
+export interface Labelled {
+  readonly picture: Grey;
+  readonly shape: Shape;
+}
+
+interface Patch {
+  readonly columns: number;
+  readonly rows: number;
+  readonly step: number;
+}
+
+interface Match {
+  readonly dx: number;
+  readonly dy: number;
+  readonly likeness: number;
+}
+
+function cut(picture: Grey, [x, y]: Point, { columns, rows, step }: Patch): Float64Array {
+  const values = new Float64Array(columns * rows);
+  for (let place = 0; place < values.length; place += 1) {
+    const [column, row] = [place % columns, Math.floor(place / columns)];
+    values[place] = sample(picture, x + (column - (columns - 1) / 2) * step, y + (row - (rows - 1) / 2) * step);
+  }
+  return values;
+}
+
+/** Directions of a search: both axes of the picture, or one line. */
+type Directions = readonly [Point] | readonly [Point, Point];
+
+const PLANE: Directions = [
+  [1, 0],
+  [0, 1],
+];
+
+/** The place within `reach` steps of `from` that looks most like `wanted`. */
+function search(
+  picture: Grey,
+  wanted: Float64Array,
+  from: Point,
+  patch: Patch,
+  reach: number,
+  step: number,
+  [first, second]: Directions,
+): Match {
+  // Where nothing looks more like it, as in an even surface, it stays.
+  let best: Match = { dx: 0, dy: 0, likeness: correlation(wanted, cut(picture, from, patch)) };
+  const across = second === undefined ? 0 : reach;
+  for (let row = -across; row <= across; row += 1) {
+    for (let column = -reach; column <= reach; column += 1) {
+      const dx = step * (column * first[0] + row * (second?.[0] ?? 0));
+      const dy = step * (column * first[1] + row * (second?.[1] ?? 0));
+      const likeness = correlation(wanted, cut(picture, [from[0] + dx, from[1] + dy], patch));
+      if (likeness > best.likeness) best = { dx, dy, likeness };
+    }
+  }
+  return best;
+}
+
+/** Coarse to fine: steps of the patch, then half as much down to a fifth of a pixel. */
+function searchFinely(
+  picture: Grey,
+  wanted: Float64Array,
+  from: Point,
+  patch: Patch,
+  reach: number,
+  directions: Directions = PLANE,
+): Match {
+  let best = search(picture, wanted, from, patch, reach, patch.step, directions);
+  for (let step = patch.step / 2; step > 0.2; step /= 2) {
+    const next = search(picture, wanted, [from[0] + best.dx, from[1] + best.dy], patch, 1, step, directions);
+    best = { dx: best.dx + next.dx, dy: best.dy + next.dy, likeness: next.likeness };
+  }
+  return best;
+}
+
+function centreOf(eye: Shape): Point {
+  const [sumX, sumY] = eye.reduce(([x, y], point): Point => [x + point[0], y + point[1]], [0, 0] as Point);
+  return [sumX / eye.length, sumY / eye.length];
+}
+
+/**
+ * Propose the shape of a frame from labelled ones.
+ *
+ * Each eye by itself: the labelled eye whose picture is found again best, within a third of an eye's width, is laid
+ * where it was found; then each point follows its own small patch, held by its neighbours on the lid.
+ * Throws RangeError without a labelled frame.
+ */
+export function proposeShape(picture: Grey, labelled: readonly Labelled[]): Shape {
+  const first = labelled[0];
+  if (first === undefined) throw new RangeError("expected at least one labelled frame, got none");
+  const eyes = Array.from({ length: eyeCount(first.shape) }, (_, eye) => proposeEye(picture, labelled, eye));
+  return eyes.flat().map(([x, y]) => [
+    Math.min(picture.width - 0.5, Math.max(-0.5, x)),
+    Math.min(picture.height - 0.5, Math.max(-0.5, y)),
+  ]);
+}
+
+function proposeEye(picture: Grey, labelled: readonly Labelled[], number: number): Shape {
+  const found = labelled.map((source) => {
+    const eye = eyeOf(source.shape, number);
+    const patch = { columns: EYE_COLUMNS, rows: EYE_ROWS, step: (1.4 * eyeWidth(eye)) / EYE_COLUMNS };
+    const centre = centreOf(eye);
+    return { source, eye, match: searchFinely(picture, cut(source.picture, centre, patch), centre, patch, EYE_REACH) };
+  });
+  const best = found.reduce((a, b) => (b.match.likeness > a.match.likeness ? b : a));
+  const laid = best.eye.map(([x, y]): Point => [x + best.match.dx, y + best.match.dy]);
+  return refined(picture, best.source.picture, best.eye, laid);
+}
+
+/**
+ * The corners follow their patches; the lids' points keep their place along the eye and follow theirs across it only.
+ * Along a lid one patch looks like the next, and points would slide.
+ */
+function refined(picture: Grey, before: Grey, labelled: Shape, laid: Shape): Shape {
+  const width = eyeWidth(labelled);
+  const patch = { columns: POINT_SIDE, rows: POINT_SIDE, step: Math.max(1, 0.018 * width) };
+  const follow = (place: number, from: Point, directions: Directions): Point => {
+    const match = searchFinely(picture, cut(before, at(labelled, place), patch), from, patch, POINT_REACH, directions);
+    return match.likeness >= POINT_LEAST ? [match.dx, match.dy] : [0, 0];
+  };
+  const [first, last] = [at(laid, 0), at(laid, 5)];
+  const along: Point = [(last[0] - first[0]) / width, (last[1] - first[1]) / width];
+  const [start, end] = [follow(0, first, PLANE), follow(5, last, PLANE)];
+  const carried = laid.map(([x, y]): Point => {
+    const share = ((x - first[0]) * along[0] + (y - first[1]) * along[1]) / width;
+    return [x + start[0] * (1 - share) + end[0] * share, y + start[1] * (1 - share) + end[1] * share];
+  });
+  const across: Point = [-along[1], along[0]];
+  const moves = carried.map((point, place) => (place % 5 === 0 ? [0, 0] as const : follow(place, point, [across])));
+  return carried.map(([x, y], place): Point => {
+    if (place % 5 === 0) return [x, y];
+    const [least, most] = place < 5 ? [1, 4] : [6, 8];
+    const around = [-1, 0, 1].map((side) => at(moves, Math.min(most, Math.max(least, place + side))));
+    return [x + middle(around.map(([dx]) => dx)), y + middle(around.map(([, dy]) => dy))];
+  });
+}
+
+function middle(values: readonly number[]): number {
+  return [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? 0;
+}
