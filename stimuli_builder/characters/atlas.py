@@ -222,7 +222,8 @@ class LowerLidLayer:
         ratio = _blur(image, sigma) / np.maximum(_blur(open_eye, sigma), 1e-3)
         # Never take more light from a pixel than it has: lashes over the lid would turn into red flecks.
         left = (image + DARKEST) / (open_eye + DARKEST)
-        return np.minimum(np.clip(ratio, *SHADE_LIMITS), left.min(axis=2, keepdims=True)).astype(np.float32)
+        bounded = np.minimum(np.clip(ratio, *SHADE_LIMITS), left.min(axis=2, keepdims=True))
+        return np.asarray(bounded, dtype=np.float32)
 
     def _decode_poses(self) -> NDArray[np.float32]:
         """(vertical, horizontal, h, w, 3) change of each pose against the resting one."""

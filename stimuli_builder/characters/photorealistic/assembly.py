@@ -12,7 +12,7 @@ from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
 from stimuli_builder.characters.photorealistic import anatomy, framing, plan
 from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
-from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose
+from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose, build_skin
 from stimuli_builder.characters.photorealistic.framing import Box, Frame, bounding_box
 from stimuli_builder.characters.photorealistic.inbetween import Inbetweener, Rendered
 from stimuli_builder.characters.photorealistic.parameters import Face
@@ -107,9 +107,10 @@ class Assembly:
             poses.append(LowerLidPose(vertical_mm=v, horizontal_mm=h, **picture.model_dump()))
         for closure in plan.MATTE_CLOSURES:
             matte = np.zeros((self.frame.height_px, self.frame.width_px), np.float32)
+            skin = build_skin(LidPose(closure))
             for side, box in zip((-1, 1), self.frame.lower_lid_boxes().values(), strict=True):
                 x, y, width, height = box
-                covered = upper_lid_matte(self.face, closure, self.frame, side, box)
+                covered = upper_lid_matte(self.face, skin, self.frame, side, box)
                 matte[y : y + height, x : x + width] = covered
             image = to_8_bit(_cut(matte, crop))
             picture = write_picture(folder, f"matte_{round(closure * 256):03d}.webp", image)

@@ -116,11 +116,11 @@ def visible_opening_mm(face: Face, closure: float, frame: Frame, side: int) -> f
     return float(eye.sum(0).max() / frame.px_per_mm)
 
 
-def upper_lid_matte(face: Face, closure: float, frame: Frame, side: int, box: Box) -> NDArray[np.float32]:
+def upper_lid_matte(face: Face, skin: SkinMesh, frame: Frame, side: int, box: Box) -> NDArray[np.float32]:
     """(h, w) share of each pixel of a box covered by upper lid or upper lashes: splats at triple size."""
     fine = Frame(frame.width_px * 3, frame.height_px * 3)
     x, y, width, height = box
-    seen = surface(face, build_skin(LidPose(closure)), side)
+    seen = surface(face, skin, side)
     kind = view(seen, fine, (3 * x, 3 * y, 3 * width, 3 * height)).kind
     lash = cv2.dilate((kind == UPPER_LASH).astype(np.uint8), np.ones((1, 2), np.uint8))
     covered = np.maximum(lash, kind == UPPER_LID).astype(np.float32)
