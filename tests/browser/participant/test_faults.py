@@ -121,14 +121,15 @@ def compare(told: dict[str, Any], rows: list[dict[str, Any]]) -> None:
 
 def opened_at_last(visit: Visit, link: str) -> Visit:
     """Where the page itself or its scripts are lost on the way, a person loads it again."""
-    for _ in range(20):
+    for _ in range(120):
         try:
             visit.page.goto(f"{visit.address}/run/{link}")
             visit.page.wait_for_selector("h1:not(:has-text('too old')), .trial", timeout=15_000)
         except Error:
+            time.sleep(1)
             continue
         return visit
-    raise AssertionError("expected the page within 20 loads")
+    raise AssertionError("expected the page within 120 loads")
 
 
 def test_a_browser_goes_through_the_same(server: ServerProcess, tmp_path: Path, page: Page) -> None:
