@@ -25,6 +25,8 @@ from server.settings import Settings
 from server.studies.links import general_link, link_url
 
 GRACE_S = 20
+WORKER_START_S = 60
+"""A worker silent for so long is replaced; on a busy machine starting alone takes more than the usual 5 s."""
 KEEP_ALIVE_S = 75
 """Longer than a trial lasts, so that a rater keeps one connection, and than proxies keep theirs idle."""
 
@@ -68,6 +70,7 @@ def run(
             log_config=logging_configuration(settings),
             timeout_graceful_shutdown=GRACE_S,
             timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_worker_healthcheck=WORKER_START_S,
         )
 
 
