@@ -141,7 +141,12 @@ export const router = createRouter({
   routeTree: tree,
   basepath: "/admin",
   defaultPreload: "intent",
-  defaultErrorComponent: ({ error }) => <ErrorAlert error={error} retry={() => window.location.reload()} />,
+  defaultErrorComponent: ({ error }) => (
+    <ErrorAlert
+      error={error instanceof Error ? error : new Error(String(error))}
+      retry={() => window.location.reload()}
+    />
+  ),
 });
 
 declare module "@tanstack/react-router" {
