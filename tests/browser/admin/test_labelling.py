@@ -12,6 +12,7 @@ from stimuli_builder.blinks.labelling import preset
 from stimuli_builder.blinks.run import BlinksJob, run_blinks
 from stimuli_builder.tracking.labels import load_labels
 from tests.browser.admin.conftest import Dashboard
+from tests.browser.admin.test_walk import shoot
 from tests.browser.visit import axe_violations
 from tests.helpers.tiny_clips import BARCODE_BITS, BARCODE_CELL_PX, encoded_video
 
@@ -97,6 +98,7 @@ def test_points_are_labelled_undone_and_saved_as_stimuli_reads_them(
         page.locator(".stage").wait_for()
     expect(page.get_by_text("Proposed from the labelled frames")).to_be_visible()
     assert shown_frame(page) == 5
+    shoot(dashboard, "labelling")
 
     labels = load_labels(saved(page, "Save labels", tmp_path / "l.json"), SIZE, FRAMES)
     assert sorted(labels.frames) == [0, 1, 2, 3, 4]
@@ -144,6 +146,7 @@ def test_blinks_are_reviewed_and_the_review_is_read_by_stimuli(dashboard: Dashbo
     page.keyboard.press("Control+z")
     end = int(labelled["end_frame"][0]) + 10
     expect(page.get_by_text(f"{end} (moved)")).to_be_visible()
+    shoot(dashboard, "blink-review")
     assert axe_violations(page) == []
 
     review = saved(page, "Save review", tmp_path / "review.csv")
