@@ -22,7 +22,7 @@ check: setup-test ## lint and type-check everything, import rules, lock files
 	@$(BIN)/ruff format --check -q .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
-	@cd frontend && npm run --silent typecheck
+	@cd frontend && npm run --silent typecheck && npm run --silent api -- --check
 	@$(BIN)/python tools/check_lock_files.py
 
 setup:
@@ -39,8 +39,14 @@ lock: ## resolve the Python dependencies again, with hashes
 	@$(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 --all-extras --group dev pyproject.toml -o requirements-dev.lock
 	@$(BIN)/python tools/check_lock_files.py
 
-bench: setup-test ## speed, memory and accuracy, as figures and ratios
+bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' --benchmark-only --benchmark-columns=min,median,rounds -s
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_tracking.py
+	@test ! -d build/bake || PYTHONPATH=. $(BIN)/python tests/bench/photorealistic_quality.py build/bake/*/
+
+screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
+	@$(BIN)/python tools/screenshots.py
+	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python tools/load.py $(LOAD)

@@ -14,10 +14,13 @@ from typing import Any
 
 from sqlalchemy import text
 
+from experiments.load import parse_experiment
+from experiments.manifest import read_manifest
 from server.cli_common import migrated_services
 from server.settings import Settings
-from server.studies.links import LinkKind
-from tests.helpers.studies import StudyInDatabase, add_study
+from server.studies.importing import add_version, create_study, store_clips
+from server.studies.links import LinkKind, create_link
+from tests.helpers.studies import StudyInDatabase, add_study, link_token
 
 START_LIMIT_S = 240.0
 
@@ -47,6 +50,18 @@ class ServerProcess:
         """Take in a declaration with tiny clips, live; its `link_token` leads to /run/."""
         with migrated_services(self.settings) as services:
             return add_study(services, folder, declaration, frames=frames)
+
+    def add_built_study(self, folder: Path, declaration: str) -> StudyInDatabase:
+        """Take in a declaration with the clips that `stimuli build` made for it, live."""
+        experiment, manifest = parse_experiment(declaration), read_manifest(folder)
+        with migrated_services(self.settings) as services:
+            store_clips(services.clips, manifest, folder)
+            with services.database.write() as session:
+                study = create_study(session, experiment.name, experiment, None)
+                add_version(session, study, declaration, experiment, manifest, None)
+                study.status = "live"
+                link = create_link(session, services.settings.key, study, "general")
+                return StudyInDatabase(services, experiment.name, experiment, link_token(services, link))
 
     def link(self, study: StudyInDatabase, kind: LinkKind) -> str:
         """The token of a new link, made while the server runs."""

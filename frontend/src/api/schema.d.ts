@@ -3249,6 +3249,13 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description The clip is to be fetched from the object store */
+            307: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description The request's content is not acceptable */
             422: {
                 headers: {
