@@ -36,7 +36,7 @@ def run(
         str | None,
         typer.Option(
             help="Database URL; without it and without --csv: DATABASE_URL, or palpebra.sqlite in the data "
-            "folder (PALPEBRA_DATA, default ./data).",
+            "folder (PALPEBRA_DATA_FOLDER, default ./data).",
             show_default=False,
         ),
     ] = None,

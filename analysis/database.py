@@ -34,13 +34,10 @@ RUN_FLAGS = ("synthetic", "excluded")
 
 
 def default_url() -> str:
-    """DATABASE_URL, or the SQLite file in the data folder.
-
-    The folder is PALPEBRA_DATA_FOLDER (as for the server) or PALPEBRA_DATA, else `data`.
-    """
+    """DATABASE_URL, or the SQLite file in the server's data folder (PALPEBRA_DATA_FOLDER, else `data`)."""
     if environ.get("DATABASE_URL"):
         return environ["DATABASE_URL"]
-    folder = environ.get("PALPEBRA_DATA_FOLDER") or environ.get("PALPEBRA_DATA") or "data"
+    folder = environ.get("PALPEBRA_DATA_FOLDER") or "data"
     return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
 
 

@@ -48,8 +48,7 @@ def test_run_writes_the_report_with_its_sensitivity_analyses(export, tmp_path) -
 
 def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
     monkeypatch.delenv("DATABASE_URL", raising=False)
-    monkeypatch.delenv("PALPEBRA_DATA_FOLDER", raising=False)
-    monkeypatch.setenv("PALPEBRA_DATA", str(tmp_path))
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
     empty = call("run", "exp3", "--no-report")
     assert empty.exit_code == 1
     assert "nothing to analyse: there is no database" in empty.stderr
