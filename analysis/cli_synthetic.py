@@ -48,7 +48,7 @@ def power(
     alpha: Annotated[float, typer.Option(help="Level of the tests.")] = 0.05,
     statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = StatisticChoice.MULTIVARIATE,
     wanted: Annotated[float, typer.Option(help="Power to look for.")] = 0.8,
-    seed: Annotated[int, typer.Option(help="Same seed, same numbers.")] = 1,
+    seed: Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)] = 1,
     mean: MeanOption = None,
     effect: EffectOption = None,
     plot: Annotated[
@@ -85,7 +85,7 @@ def power(
 
 def synthesise_command(
     experiment: Annotated[str, typer.Argument(help="exp1, exp2 or exp3.")],
-    seed: Annotated[int, typer.Option(help="Same seed, same file.")] = 1,
+    seed: Annotated[int, typer.Option(help="Same seed, same file.", min=0)] = 1,
     out: Annotated[
         Path, typer.Option(help="CSV file to write, with the columns of the server's export.")
     ] = Path("ratings.csv"),

@@ -51,7 +51,7 @@ def fit(
         ),
     ] = "auto",
     plot: Annotated[Path | None, typer.Option(help="Figure of the model (PNG, SVG, PDF).")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the new blinks in the figure.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the new blinks in the figure.", min=0)] = 1,
 ) -> None:
     """Fit the model to recorded profiles and tell how much of their variance it keeps."""
     from stimuli_builder.blinks.model_run import fit_model

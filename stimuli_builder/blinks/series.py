@@ -145,7 +145,9 @@ def make_series(
     `allow_gaps` left at None means: in a track yes (its frames without a fit say why), in a plain series no.
     """
     if table[column].dtype.kind not in "fiu":
-        raise InputError(f"{path.name}: column '{column}' must hold numbers, got {table[column].iloc[0]!r}")
+        words = table[column][pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()]
+        got = f", got {words.iloc[0]!r} in row {words.index[0] + 1}" if words.size else ""
+        raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
     values = table[column].to_numpy(dtype=np.float64)
     values = np.where(np.isfinite(values), values, np.nan)
     if values.size < scaled_frames(300, fps):

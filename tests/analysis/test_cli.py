@@ -67,6 +67,12 @@ def test_run_of_an_empty_export_exits_1(tmp_path) -> None:
     assert "has a header but no ratings yet" in result.stderr
 
 
+def test_a_seed_below_zero_is_a_usage_error() -> None:
+    result = call("synthesise", "exp3", "--seed", "-1", "--out", "ratings.csv")
+    assert result.exit_code == 2
+    assert "--seed" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

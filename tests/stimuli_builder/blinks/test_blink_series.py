@@ -85,6 +85,13 @@ GOOD = [0.3] * 400
         ("frame,EAR_l", [range(400), GOOD], ["EAR_x"], 240, r"no column 'EAR_x'; did you mean 'EAR_l'\?"),
         ("frame,a,b", [range(400), GOOD, GOOD], [], 240, "say with --column"),
         ("frame,a", [range(400), ["x"] * 400], ["a"], 240, "must hold numbers"),
+        (
+            "frame,a",
+            [range(400), [*GOOD[:6], "abc", *GOOD[7:]]],
+            ["a"],
+            240,
+            "must hold numbers, got 'abc' in row 7",
+        ),
         ("frame,a", [range(400), GOOD], ["a"], None, "give the recording's rate"),
         ("frame,a", [range(400), GOOD], ["a"], -5, "between 10 and 10000"),
         ("frame,a", [range(400), GOOD], ["a"], float("nan"), "between 10 and 10000"),
