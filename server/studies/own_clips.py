@@ -11,7 +11,7 @@ import tomlkit
 
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.load import definition_sha256, parse_experiment
+from experiments.load import definition_sha256
 from experiments.manifest import Clip, Manifest, file_sha256
 from experiments.ratings import COLUMN_NAMES
 from server.studies.probe import NotAFilm, probe
@@ -185,8 +185,3 @@ def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifes
         seed=experiment.exemplars.seed,
         clips=tuple(clips),
     )
-
-
-def parse_for_study(text: str) -> Experiment:
-    """Parse a definition that came from a page."""
-    return parse_experiment(text, "definition")

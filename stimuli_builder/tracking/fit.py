@@ -132,7 +132,3 @@ class Fitter:
             self._squares,
         )
         return Fit(c, pose, self._vertices.copy(), np.sqrt(self._squares), int(iterations))
-
-    def error_picture(self) -> NDArray[np.float32]:
-        """Model minus picture over the base pixels (N,) at the last evaluation."""
-        return self._pixels[1].copy()

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stimuli_builder.characters.colour import encode_srgb, srgb_to_linear
+from stimuli_builder.characters.colour import encode_srgb
 
 SHOULDER_STARTS, CONTRAST = 0.55, 0.2
 
@@ -26,9 +26,3 @@ def psnr_db(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
     """Peak signal-to-noise ratio of two 8-bit pictures in dB; infinite where they are equal."""
     error = np.mean((a.astype(np.float64) - b.astype(np.float64)) ** 2)
     return float("inf") if error == 0 else float(10 * np.log10(255**2 / error))
-
-
-def mix_in_linear_light(a: NDArray[np.uint8], b: NDArray[np.uint8], share: float) -> NDArray[np.float32]:
-    """Linear light between two 8-bit pictures: what the clip builder shows between levels."""
-    weight = np.float32(share)
-    return (1 - weight) * srgb_to_linear(a) + weight * srgb_to_linear(b)
