@@ -4,6 +4,8 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Where this is set, every start compiles every module anew: seconds for each process that a test starts.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help run test check setup setup-test lock format types bench load audit screenshots docs api clean
 

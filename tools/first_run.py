@@ -5,6 +5,7 @@ Every step is skipped where nothing has changed, so that a later run starts in s
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -22,15 +23,36 @@ def call(*command: str) -> None:
         sys.exit(done.returncode)
 
 
+def sources() -> str:
+    """One hash over everything that decides what the studies are: programs, characters, declarations."""
+    sha = hashlib.sha256(os.environ.get("DATABASE_URL", "").encode())
+    folders = (ROOT / "stimuli_builder", ROOT / "experiments", ROOT / "server" / "studies")
+    for path in sorted(path for folder in folders for path in folder.rglob("*") if path.is_file()):
+        if "__pycache__" not in path.parts:
+            sha.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
+    return sha.hexdigest()
+
+
+def prepare(study: str) -> None:
+    """Build a study's clips and take it into the server; nothing where that was done with these sources."""
+    folder = DATA / "stimuli" / study
+    stamp, wanted = folder / ".first_run", sources()
+    has_database = bool(os.environ.get("DATABASE_URL")) or (DATA / "palpebra.sqlite").is_file()
+    if has_database and stamp.is_file() and stamp.read_text() == wanted:
+        return
+    call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
+    call("server", "study", "add", study, "--clips", str(folder), "--open")
+    stamp.write_text(wanted)
+
+
 def main() -> None:
     DATA.mkdir(parents=True, exist_ok=True)
+    port = os.environ.get("PORT", "8000")
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
-    for study in STUDIES:
-        call("stimuli", "build", study, "--out", str(DATA / "stimuli" / study), "--quiet-when-current")
+    os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")
     call("server", "database", "upgrade")
     for study in STUDIES:
-        call("server", "study", "add", study, "--clips", str(DATA / "stimuli" / study), "--open")
-    port = os.environ.get("PORT", "8000")
+        prepare(study)
     os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
 
 
