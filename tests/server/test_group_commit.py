@@ -1,4 +1,7 @@
 import asyncio
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from sqlalchemy import Connection, text
@@ -8,6 +11,12 @@ from server.group_commit import GroupCommit
 
 pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 INSERT = text("INSERT INTO clips VALUES (:name, 1, 30, 1, 1, 1, '2026-11-21 00:00:00')")
+
+
+def run_apart(main: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
+    """Run `main` in a thread of its own: the browser tests leave an event loop running in this one."""
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        return pool.submit(lambda: asyncio.run(main())).result()
 
 
 @pytest.fixture
@@ -35,7 +44,7 @@ def test_each_gets_its_own_result_after_the_commit(writers, services) -> None:
 
         return await asyncio.gather(*(one(number) for number in range(50)))
 
-    assert set(asyncio.run(main())) == stored(services)
+    assert set(run_apart(main)) == stored(services)
 
 
 def test_a_refusal_reaches_the_one_and_spares_the_others(writers, services) -> None:
@@ -46,7 +55,7 @@ def test_a_refusal_reaches_the_one_and_spares_the_others(writers, services) -> N
         work = [insert("a"), refuse, insert("b")]
         return await asyncio.gather(*(writers.run("k", do) for do in work), return_exceptions=True)
 
-    results = asyncio.run(main())
+    results = run_apart(main)
     assert [type(result) for result in results] == [int, Conflict, int]
     assert stored(services) == {"a", "b"}
 
@@ -60,7 +69,7 @@ def test_what_breaks_the_transaction_is_undone_alone(writers, services) -> None:
         work = [insert("a"), fail, insert("a"), insert("b")]
         return await asyncio.gather(*(writers.run("k", do) for do in work), return_exceptions=True)
 
-    results = asyncio.run(main())
+    results = run_apart(main)
     assert results[0] == results[3] == 1
     assert isinstance(results[1], RuntimeError)
     assert "UNIQUE" in str(results[2])
@@ -74,5 +83,5 @@ def test_closing_finishes_what_waits(writers, services) -> None:
         await asyncio.to_thread(writers.close)
         await asyncio.gather(*tasks)
 
-    asyncio.run(main())
+    run_apart(main)
     assert len(stored(services)) == 20
