@@ -33,10 +33,10 @@ def sources() -> str:
     return sha.hexdigest()
 
 
-def prepare(study: str) -> None:
-    """Build a study's clips and take it into the server; nothing where that was done with these sources."""
+def prepare(study: str, wanted: str) -> None:
+    """Build a study's clips and take it into the server; nothing where the stamp says `wanted`."""
     folder = DATA / "stimuli" / study
-    stamp, wanted = folder / ".first_run", sources()
+    stamp = folder / ".first_run"
     has_database = bool(os.environ.get("DATABASE_URL")) or (DATA / "palpebra.sqlite").is_file()
     if has_database and stamp.is_file() and stamp.read_text() == wanted:
         return
@@ -51,8 +51,9 @@ def main() -> None:
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")
     call("server", "database", "upgrade")
+    wanted = sources()
     for study in STUDIES:
-        prepare(study)
+        prepare(study, wanted)
     os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
 
 
