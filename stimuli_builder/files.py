@@ -1,11 +1,12 @@
 """Output that is whole or absent: written under a temporary name beside the target, then renamed."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
+from experiments.command_line import NO_ROOM
 from experiments.errors import InputError
 
 
@@ -21,6 +22,17 @@ def temporary_beside(path: Path, suffix: str = "") -> Path:
     return folder / f".{path.name}.{os.getpid()}.part{suffix}"
 
 
+def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] = ()) -> None:
+    """Refuse outputs that cannot be written, or would take the place of an input or of one another."""
+    taken = [path.resolve() for path in inputs if path is not None]
+    for path in outputs:
+        if path is not None:
+            temporary_beside(path)
+            if path.resolve() in taken:
+                raise InputError(f"{path}: already in use in this call; give every output a name of its own")
+            taken.append(path.resolve())
+
+
 def remove_quietly(path: Path) -> None:
     """Remove `path` if it is there."""
     with suppress(OSError):
@@ -29,11 +41,21 @@ def remove_quietly(path: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary path; rename it to `path` if the block ends well, remove it if not."""
+    """Give a temporary path; rename it to `path` if the block ends well, remove it if not.
+
+    Raises
+    ------
+    InputError
+        The file cannot stand there, or the disk is full.
+    """
     temporary = temporary_beside(path, suffix=path.suffix)
     try:
         yield temporary
         temporary.replace(path)
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        raise InputError(f"{path} cannot be written ({error.strerror}); make room and try again") from error
     finally:
         remove_quietly(temporary)
 

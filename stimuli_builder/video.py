@@ -1,26 +1,22 @@
-"""Video frames in and out through PyAV: grey pictures upright, read on a thread of their own."""
+"""Video frames through PyAV: upright pictures, grey or RGB, read on a thread of their own."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from queue import Full, Queue
 from threading import Event, Thread
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import av
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.files import remove_quietly, temporary_beside
+from stimuli_builder.video_clock import read_clock, reason
 
 Picture = NDArray[np.uint8]
 
-VARIABLE_STEP = 0.25
-VARIABLE_SHARE = 0.005
 BATCH_FRAMES = 8
 WAITING_BATCHES = 6
 LUMA_FIRST = ("yuv4", "yuvj4", "nv12", "nv21", "gray8", "yuva4")
@@ -61,17 +57,13 @@ def opened(path: Path) -> Iterator[tuple[Any, Any]]:
     try:
         container = av.open(str(path))
     except (av.error.FFmpegError, ValueError) as error:
-        raise InputError(f"{path}: not a video that can be read ({_reason(error)})") from error
+        raise InputError(f"{path}: not a video that can be read ({reason(error)})") from error
     with container:
         if not container.streams.video:
             raise InputError(f"{path}: expected a video stream, the file has none")
         stream = container.streams.video[0]
         stream.thread_type = "AUTO"
         yield container, stream
-
-
-def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error).split("\n")[0]
 
 
 def scan_video(path: Path) -> VideoInfo:
@@ -83,32 +75,9 @@ def scan_video(path: Path) -> VideoInfo:
         The file is missing, unreadable, truncated or holds no frame.
     """
     with opened(path) as (container, stream):
-        declared = int(stream.frames or 0)
-        stamps, base = _packet_stamps(path, container, stream)
-    if declared and len(stamps) < declared:
-        raise InputError(
-            f"{path}: truncated, it declares {declared} frames and holds {len(stamps)}; copy the file again"
-        )
-    times = (stamps - stamps[0]) * float(base)
-    steps = np.diff(times)
-    step = float(np.median(steps)) if len(steps) else float(1 / (stream.average_rate or 25))
-    uneven = np.abs(steps - step) > VARIABLE_STEP * step
-    variable = bool(uneven.mean() > VARIABLE_SHARE) if len(steps) else False
-    fps = (len(times) - 1) / float(times[-1]) if len(times) > 1 else 1 / step
-    return VideoInfo(path, _displayed_size(path), fps, times, stamps, variable)
-
-
-def _packet_stamps(path: Path, container: Any, stream: Any) -> tuple[NDArray[np.int64], Fraction]:
-    try:
-        found = [packet.pts for packet in container.demux(stream) if packet.size and not packet.is_discard]
-    except av.error.FFmpegError as error:
-        raise InputError(f"{path}: truncated or damaged ({_reason(error)}); copy the file again") from error
-    if not found:
-        raise InputError(f"{path}: holds no video frame")
-    if any(stamp is None for stamp in found):
-        rate = stream.average_rate or Fraction(25)
-        return np.arange(len(found), dtype=np.int64), Fraction(1) / rate
-    return np.sort(np.asarray(found, np.int64)), stream.time_base
+        clock = read_clock(path, container, stream)
+    size_px = _displayed_size(path)
+    return VideoInfo(path, size_px, clock.fps, clock.times_s, clock.stamps, clock.variable)
 
 
 def _displayed_size(path: Path) -> tuple[int, int]:
@@ -126,19 +95,27 @@ def grey(frame: Any) -> Picture:
         frame = frame.reformat(format="gray")
     plane = frame.planes[0]
     rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
-    picture = rows[: frame.height, : frame.width]
+    return _upright(frame, rows[: frame.height, : frame.width])
+
+
+def rgb(frame: Any) -> Picture:
+    """Colours of a decoded frame, uint8 (height, width, 3), upright as players show it."""
+    return _upright(frame, frame.to_ndarray(format="rgb24"))
+
+
+def _upright(frame: Any, picture: Picture) -> Picture:
     turns = round(frame.rotation / 90) % 4
     return np.ascontiguousarray(np.rot90(picture, turns) if turns else picture)
 
 
-def _decode(path: Path) -> Iterator[tuple[int | None, Picture]]:
+def _decode(path: Path, read: Callable[[Any], Picture] = grey) -> Iterator[tuple[int | None, Picture]]:
     with opened(path) as (container, stream):
         try:
             for frame in container.decode(stream):
-                yield frame.pts, grey(frame)
+                yield frame.pts, read(frame)
         except av.error.FFmpegError as error:
             raise InputError(
-                f"{path}: truncated or damaged ({_reason(error)}); copy the file again"
+                f"{path}: truncated or damaged ({reason(error)}); copy the file again"
             ) from error
 
 
@@ -164,21 +141,27 @@ def _seek(info: VideoInfo, container: Any, stream: Any, number: int) -> Picture:
             if frame.pts is not None and frame.pts >= stamp:
                 return grey(frame)
     except av.error.FFmpegError as error:
-        raise InputError(f"{info.path}: frame {number} cannot be decoded ({_reason(error)})") from error
+        raise InputError(f"{info.path}: frame {number} cannot be decoded ({reason(error)})") from error
     raise InputError(f"{info.path}: frame {number} cannot be decoded; the file is damaged")
 
 
-def frames(path: Path, prepare: Callable[[Picture], Picture] | None = None) -> Iterator[Picture]:
+def frames(
+    path: Path,
+    prepare: Callable[[Picture], Picture] | None = None,
+    read: Callable[[Any], Picture] = grey,
+) -> Iterator[Picture]:
     """Every frame in order, decoded (and prepared) ahead on a thread; constant memory.
 
     Parameters
     ----------
     prepare : callable, optional
         Applied to each picture on the decoding thread, for instance to reduce its size.
+    read : callable
+        What to take from a decoded frame: `grey` or `rgb`.
     """
     waiting: Queue[list[Picture] | BaseException | None] = Queue(WAITING_BATCHES)
     stop = Event()
-    thread = Thread(target=_produce, args=(path, prepare, waiting, stop), daemon=True, name="decoder")
+    thread = Thread(target=_produce, args=(path, prepare, read, waiting, stop), daemon=True, name="decoder")
     thread.start()
     try:
         while (batch := waiting.get()) is not None:
@@ -193,12 +176,13 @@ def frames(path: Path, prepare: Callable[[Picture], Picture] | None = None) -> I
 def _produce(
     path: Path,
     prepare: Callable[[Picture], Picture] | None,
+    read: Callable[[Any], Picture],
     waiting: "Queue[list[Picture] | BaseException | None]",
     stop: Event,
 ) -> None:
     batch: list[Picture] = []
     try:
-        for _, picture in _decode(path):
+        for _, picture in _decode(path, read):
             batch.append(prepare(picture) if prepare else picture)
             if len(batch) == BATCH_FRAMES:
                 _put(waiting, batch, stop)
@@ -222,58 +206,3 @@ def _put(
         except Full:
             continue
         return
-
-
-class VideoWriter:
-    """Writes H.264 into a temporary name and renames it when the block ends without an error.
-
-    Pictures are uint8: (height, width) grey or (height, width, 3) RGB; sides are even.
-    """
-
-    def __init__(
-        self, path: Path, fps: float, size_px: tuple[int, int], *, crf: int = 18, preset: str = "veryfast"
-    ):
-        self.path = path
-        self._temporary = temporary_beside(path, suffix=path.suffix or ".mp4")
-        rate = Fraction(fps).limit_denominator(100_000)
-        try:
-            self._container = av.open(str(self._temporary), "w")
-            self._stream: Any = self._container.add_stream("libx264", rate=rate)
-        except (av.error.FFmpegError, ValueError, OSError) as error:
-            remove_quietly(self._temporary)
-            raise InputError(
-                f"{path}: cannot be written as video ({_reason(error)}); use a name in .mp4"
-            ) from error
-        self._stream.width, self._stream.height = size_px
-        self._stream.pix_fmt = "yuv420p"
-        self._stream.options = {"crf": str(crf), "preset": preset, "x264-params": "log-level=error"}
-        self._stream.codec_context.gop_size = max(1, round(fps))
-
-    def write(self, picture: Picture) -> None:
-        """Append one grey or RGB picture."""
-        form = "gray" if picture.ndim == 2 else "rgb24"
-        self._encode(av.VideoFrame.from_ndarray(picture, format=form))
-
-    def write_planes(self, planes: Picture) -> None:
-        """Append one picture given as yuv420p planes stacked, uint8 (height * 3 / 2, width)."""
-        self._encode(av.VideoFrame.from_ndarray(planes, format="yuv420p"))
-
-    def _encode(self, frame: Any) -> None:
-        for packet in self._stream.encode(frame):
-            self._container.mux(packet)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            if kind is None:
-                for packet in self._stream.encode(None):
-                    self._container.mux(packet)
-            self._container.close()
-            if kind is None:
-                self._temporary.replace(self.path)
-        finally:
-            remove_quietly(self._temporary)

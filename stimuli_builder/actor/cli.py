@@ -42,13 +42,13 @@ def actor(
       stimuli actor --seconds 120 --out actor.mp4 --labels labels.json --label-noise 1
     """
     from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
-    from stimuli_builder.files import temporary_beside
+    from stimuli_builder.files import check_targets
     from stimuli_builder.progress import frame_progress
+    from stimuli_builder.video_writer import check_video_name
 
     options = ActorOptions(seconds, fps, seed, noise)
-    for target in (out, truth, labels):
-        if target is not None:
-            temporary_beside(target)
+    check_targets([out, truth, labels])
+    check_video_name(out)
     person = Actor(options)
     with frame_progress() as progress:
         task = progress.add_task("drawing", total=options.frame_count)

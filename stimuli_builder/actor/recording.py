@@ -23,7 +23,8 @@ from stimuli_builder.actor.face import (
 from stimuli_builder.actor.physiology import Course, course, plan_blinks
 from stimuli_builder.actor.renderer import draw_eye
 from stimuli_builder.files import whole_text
-from stimuli_builder.video import Picture, VideoWriter
+from stimuli_builder.video import Picture
+from stimuli_builder.video_writer import VideoWriter
 
 Values = NDArray[np.float64]
 

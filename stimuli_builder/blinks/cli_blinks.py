@@ -8,7 +8,7 @@ import typer
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from stimuli_builder.blinks.labelling import LabelOptions
+    from stimuli_builder.blinks.label_options import LabelOptions
 
 EXAMPLES = """
 Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.
@@ -45,8 +45,14 @@ def blinks(
     ] = None,
     preset: Annotated[
         str,
-        typer.Option(help="Values of the rule: 'relative' to the opening, or 'paper' (0.1 px a frame)."),
-    ] = "relative",
+        typer.Option(
+            help="Values of the rule: rest as part of the peak 'velocity', as part of the opening "
+            "('relative'), or 0.1 px a frame ('paper')."
+        ),
+    ] = "velocity",
+    gradient_peak: Annotated[
+        float | None, typer.Option(help="Gradient at rest, as part of the phase's greatest.")
+    ] = None,
     gradient: Annotated[
         float | None, typer.Option(help="Gradient at rest, as part of the opening per frame at 300 fps.")
     ] = None,
@@ -95,7 +101,7 @@ def blinks(
             columns=tuple(column or ()),
             fps=fps,
             profiles=profiles or out.with_name(f"{out.stem}.profiles.csv"),
-            options=_options(preset, gradient, gradient_px, opening_px, minimum_depth),
+            options=_options(preset, gradient_peak, gradient, gradient_px, opening_px, minimum_depth),
             closed=closed,
             complete_from=complete_from,
             allow_gaps=allow_gaps,
@@ -112,22 +118,22 @@ def blinks(
 
 def _options(
     name: str,
-    gradient: float | None,
-    gradient_px: float | None,
+    peak: float | None,
+    opening: float | None,
+    px: float | None,
     opening_px: float | None,
     minimum_depth: float | None,
 ) -> "LabelOptions":
     from dataclasses import replace
 
-    from stimuli_builder.blinks.labelling import preset
+    from stimuli_builder.blinks.label_options import preset
 
-    if gradient is not None and gradient_px is not None:
-        raise InputError("give --gradient or --gradient-px, not both")
+    given = [limit for limit in (peak, opening, px) if limit is not None]
+    if len(given) > 1:
+        raise InputError("give one of --gradient-peak, --gradient and --gradient-px")
     options = preset(name)
-    if gradient is not None:
-        options = replace(options, gradient_opening=gradient, gradient_px=None)
-    if gradient_px is not None:
-        options = replace(options, gradient_opening=None, gradient_px=gradient_px)
+    if given:
+        options = replace(options, gradient_peak=peak, gradient_opening=opening, gradient_px=px)
     if opening_px is not None:
         options = replace(options, opening_px=opening_px)
     return options if minimum_depth is None else replace(options, minimum_depth=minimum_depth)

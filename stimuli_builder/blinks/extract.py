@@ -7,7 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.labelling import LabelledBlink, LabelOptions, RefusedMinimum, find_blinks
+from stimuli_builder.blinks.label_options import LabelOptions
+from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum, find_blinks
 from stimuli_builder.blinks.measure import (
     MeasuredBlink,
     closure_at_300,
@@ -23,6 +24,9 @@ PLAUSIBLE_MS = (120, 600)
 """Median durations that are believed: 330 ms is usual."""
 PLAUSIBLE_SPEED = (9, 50)
 """Peak closing velocity over amplitude, per second: 18-29 is usual at any amplitude (main sequence)."""
+USUAL_CLOSING_MS = (65, 140)
+USUAL_SPEED = (15, 28)
+"""A rate off by a factor of two puts both outside, on opposite sides; a person seldom has both there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,17 +80,26 @@ def require_blinks(eye: EyeBlinks, options: LabelOptions, *, any_duration: bool 
             f"no blink in column '{column}': its deepest dip is {deepest:.0%} of the opening, a blink needs "
             f"{options.minimum_depth:.0%} (--minimum-depth){lost}; is the column right, and --fps?"
         )
+    if not any_duration:
+        _require_plausible_rate(eye)
+
+
+def _require_plausible_rate(eye: EyeBlinks) -> None:
     duration_ms = float(np.median([blink.duration_ms for blink in eye.blinks]))
+    closing_ms = float(np.median([blink.down_ms for blink in eye.blinks]))
     speed = float(np.median([blink.peak_closing_velocity / blink.amplitude for blink in eye.blinks]))
-    usual = (
+    possible = (
         PLAUSIBLE_MS[0] <= duration_ms <= PLAUSIBLE_MS[1]
         and PLAUSIBLE_SPEED[0] <= speed <= PLAUSIBLE_SPEED[1]
     )
-    if not usual and not any_duration:
+    slow = closing_ms > USUAL_CLOSING_MS[1] and speed < USUAL_SPEED[0]
+    fast = closing_ms < USUAL_CLOSING_MS[0] and speed > USUAL_SPEED[1]
+    if not possible or slow or fast:
         raise InputError(
-            f"at {eye.series.fps:g} fps the blinks of '{column}' last {duration_ms:.0f} ms and close at "
-            f"{speed:.1f} amplitudes a second (medians), where {PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]} and "
-            f"{PLAUSIBLE_SPEED[0]}-{PLAUSIBLE_SPEED[1]} are usual: is --fps right? --any-duration takes them"
+            f"at {eye.series.fps:g} fps the blinks of '{eye.series.column}' last {duration_ms:.0f} ms, "
+            f"close in {closing_ms:.0f} ms and at {speed:.1f} amplitudes a second (medians), where "
+            f"{PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]}, {USUAL_CLOSING_MS[0]}-{USUAL_CLOSING_MS[1]} and "
+            f"{USUAL_SPEED[0]}-{USUAL_SPEED[1]} are usual: is --fps right? --any-duration takes them"
         )
 
 

@@ -1,75 +1,18 @@
 """Find the blinks of a distance series: onset, minimum and end by the paper's two criteria (3.3.1)."""
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import percentile_filter
 from scipy.signal import find_peaks
 
-from experiments.errors import InputError, did_you_mean
+from stimuli_builder.blinks.bottom import turning_frame
+from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS, LabelOptions
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.series import box_filter, runs, scaled_frames
+from stimuli_builder.blinks.series import PAPER_FPS, box_filter, runs, scaled_frames
 
-
-@dataclass(frozen=True)
-class LabelOptions:
-    """Values of the labelling rule; all frame counts are the paper's, at 300 fps, and scale with the rate.
-
-    Parameters
-    ----------
-    filter_frames : float
-        Width of the zero-phase filter.
-    gradient_frames : float
-        Window over which the gradient is averaged.
-    gradient_opening : float or None
-        Largest averaged gradient at onset and end, as part of the eye's opening per 300 fps frame.
-    gradient_px : float or None
-        The same in pixels per 300 fps frame (the paper's 0.1); takes the place of `gradient_opening`.
-    opening_px : float
-        Opening of the eye in pixels that `gradient_px` supposes where the series is not in pixels.
-    baseline_frames : float
-        The baseline is the mean over so many frames on either side of the minimum.
-    search_frames : float
-        How far from the minimum the onset and the end are looked for.
-    minimum_depth : float
-        Least depth of a blink as part of the eye's opening; smaller dips are twitches and noise.
-    """
-
-    filter_frames: float = 10
-    gradient_frames: float = 10
-    gradient_opening: float | None = 0.001
-    gradient_px: float | None = None
-    opening_px: float = 60.0
-    baseline_frames: float = 100
-    search_frames: float = 300
-    minimum_depth: float = 0.23
-
-    def __post_init__(self) -> None:
-        if (self.gradient_opening is None) == (self.gradient_px is None):
-            raise InputError("give the gradient limit either relative to the opening or in pixels, not both")
-        for name, value in vars(self).items():
-            if value is not None and not value > 0:
-                raise InputError(f"{name.replace('_', '-')} must be greater than 0, got {value:g}")
-        if self.minimum_depth >= 1:
-            raise InputError(f"minimum-depth is a part of the opening, below 1, got {self.minimum_depth:g}")
-
-
-DEFAULT_OPTIONS = LabelOptions()
-PRESETS = MappingProxyType(
-    {
-        "relative": DEFAULT_OPTIONS,
-        "paper": LabelOptions(gradient_opening=None, gradient_px=0.1),
-    }
-)
-
-
-def preset(name: str) -> LabelOptions:
-    """Return the named set of values: "relative" (the default) or "paper" (0.1 px per frame)."""
-    if name not in PRESETS:
-        raise InputError(f"unknown preset '{name}'{did_you_mean(name, PRESETS)}")
-    return PRESETS[name]
+Frames = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -140,15 +83,15 @@ class _Piece:
     def __init__(self, distance: Array, fps: float, options: LabelOptions, *, is_px: bool) -> None:
         self.smooth = box_filter(distance, scaled_frames(options.filter_frames, fps))
         self.opening = _local_opening(self.smooth, round(scaled_frames(options.search_frames, fps)))
-        steps = np.abs(box_filter(np.gradient(self.smooth), scaled_frames(options.gradient_frames, fps)))
-        self.quiet = steps < _gradient_limit(self.opening, options, is_px=is_px) * (300 / fps)
+        gradient = box_filter(np.gradient(self.smooth), scaled_frames(options.gradient_frames, fps))
+        self.steps = np.abs(gradient) * (fps / PAPER_FPS)
+        self.options, self.is_px = options, is_px
         self.half_window = round(scaled_frames(options.gradient_frames, fps) / 2)
         self.baseline_reach = round(scaled_frames(options.baseline_frames, fps))
         self.search_reach = round(scaled_frames(options.search_frames, fps))
-        self.minimum_depth = options.minimum_depth
 
     def label(self, offset: int) -> tuple[list[LabelledBlink], list[RefusedMinimum]]:
-        minima = self._minima()
+        minima, tolerance = self._minima(), self.options.minimum_tolerance
         blinks: list[LabelledBlink] = []
         refused: list[RefusedMinimum] = []
         for index, minimum in enumerate(minima):
@@ -164,7 +107,7 @@ class _Piece:
             blinks.append(
                 LabelledBlink(
                     onset=onset + offset,
-                    minimum=minimum + offset,
+                    minimum=turning_frame(self.smooth, onset, minimum, end, tolerance) + offset,
                     end=end + offset,
                     depth=float(1 - self.smooth[minimum] / self.opening[minimum]),
                     baseline=baseline,
@@ -176,7 +119,8 @@ class _Piece:
     def _minima(self) -> list[int]:
         """Minima at least `minimum_depth` of the local opening deep, and no mere ripple of a deeper one."""
         relative = self.smooth / self.opening
-        found, _ = find_peaks(-relative, height=self.minimum_depth - 1, prominence=self.minimum_depth / 2)
+        depth = self.options.minimum_depth
+        found, _ = find_peaks(-relative, height=depth - 1, prominence=depth / 2)
         return [int(minimum) for minimum in found]
 
     def _baseline(self, minimum: int) -> float:
@@ -196,7 +140,8 @@ class _Piece:
         limit = minimum + step * self.search_reach
         frames = np.arange(minimum + step, min(max(limit, 0), self.smooth.size - 1) + step, step)
         windows = np.clip(frames + step * self.half_window, 0, self.smooth.size - 1)
-        met = frames[self.quiet[windows] & (self.smooth[frames] > baseline)]
+        quiet = self.steps[windows] < self._gradient_limit(frames, windows, neighbour)
+        met = frames[quiet & (self.smooth[frames] > baseline)]
         reached = int(met[0]) if met.size else None
         if neighbour is None or abs(neighbour - minimum) > self.search_reach:
             return reached, False
@@ -204,6 +149,18 @@ class _Piece:
             return reached, False
         between = np.arange(minimum + step, neighbour, step)
         return int(between[np.argmax(self.smooth[between])]), True
+
+    def _gradient_limit(self, frames: Frames, windows: Frames, neighbour: int | None) -> Array | float:
+        """Gradient at rest, per 300 fps frame; `frames` lead away from the minimum, `windows` are theirs."""
+        options = self.options
+        if options.gradient_peak is not None:
+            between = frames.size if neighbour is None else abs(neighbour - int(frames[0]))
+            phase = frames[: max(1, min(between, self.baseline_reach))]
+            return options.gradient_peak * float(self.steps[phase].max())
+        if options.gradient_opening is not None:
+            return options.gradient_opening * self.opening[windows]
+        limit_px = float(options.gradient_px or 0.0)
+        return limit_px if self.is_px else limit_px / options.opening_px * self.opening[windows]
 
 
 def _local_opening(smooth: Array, reach: int) -> Array:
@@ -215,10 +172,3 @@ def _local_opening(smooth: Array, reach: int) -> Array:
     coarse = percentile_filter(smooth[::stride], 90, size=2 * (reach // stride) + 1, mode="nearest")
     opening = np.interp(np.arange(smooth.size), np.arange(coarse.size) * stride, coarse)
     return np.maximum(opening, 1e-9)
-
-
-def _gradient_limit(opening: Array, options: LabelOptions, *, is_px: bool) -> Array | NDArray[np.float64]:
-    if options.gradient_opening is not None:
-        return options.gradient_opening * opening
-    limit_px = float(options.gradient_px or 0.0)
-    return np.full(opening.size, limit_px) if is_px else limit_px / options.opening_px * opening

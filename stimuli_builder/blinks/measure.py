@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.labelling import LabelledBlink, LabelOptions
+from stimuli_builder.blinks.label_options import LabelOptions
+from stimuli_builder.blinks.labelling import LabelledBlink
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array
 from stimuli_builder.blinks.series import BlinkSeries, box_filter, scaled_frames
 

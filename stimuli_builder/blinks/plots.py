@@ -86,7 +86,7 @@ def _series_row(
     top = float(np.nanmax(eye.smooth))
     axes.set_ylim(-0.03 * top, 1.12 * top)
     for blink in eye.blinks:
-        if not start_s <= blink.minimum_s < stop_s:
+        if blink.end_s <= start_s or blink.onset_s >= stop_s:
             continue
         out = (eye.series.column, blink.number) in rejected
         axes.axvspan(blink.onset_s, blink.end_s, color=GREY if out else colour, alpha=0.13, lw=0)

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from experiments.errors import InputError
 from stimuli_builder.blinks.extract import EyeBlinks, all_profiles, blinks_of, eye_of, require_blinks
-from stimuli_builder.blinks.labelling import LabelOptions
+from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.profile import BlinkProfile
 from stimuli_builder.blinks.profile_table import write_profile_table
 from stimuli_builder.blinks.review import (
@@ -27,7 +27,7 @@ from stimuli_builder.blinks.review import (
 )
 from stimuli_builder.blinks.series import read_series
 from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_summary
-from stimuli_builder.files import temporary_beside
+from stimuli_builder.files import check_targets
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,7 @@ def _check(job: BlinksJob) -> None:
         if figure is not None:
             check_figure_name(figure)
     outputs = [job.out, job.profiles, job.summary, job.plot, job.plot_aligned, job.review]
-    named = [path for path in outputs if path is not None]
-    for path in named:
-        temporary_beside(path)
-    seen = [path.resolve() for path in [job.series, *named]]
-    if len(set(seen)) < len(seen):
-        raise InputError(
-            "the series, the blinks table and every other file of the call need names of their own"
-        )
+    check_targets(outputs, [job.series])
 
 
 def _reviewed(

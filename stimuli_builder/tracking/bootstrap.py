@@ -2,6 +2,7 @@
 
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.shapes import Points, default_markers, moved, similarity_between
-from stimuli_builder.video import Picture, VideoInfo, read_frames
+from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
 # Numbers of the face mesh's 468 points: outer canthus, upper lid, inner canthus, lower lid, of both eyes.
 LEFT = (33, 161, 159, 158, 173, 133, 154, 145, 163)
@@ -29,10 +30,11 @@ def propose_labels(info: VideoInfo, out: Path, weights: Path | None, count: int)
         MediaPipe is not installed, no weights are given, or too few frames show a face.
     """
     detect = _detector(weights)
-    step = max(1, min(info.frame_count, FARTHEST_LABEL) // LOOKED_AT)
+    last = min(info.frame_count, FARTHEST_LABEL)
+    step = max(1, last // LOOKED_AT)
     found: dict[int, Points] = {}
-    for number in range(0, min(info.frame_count, FARTHEST_LABEL), step):
-        points = detect(read_frames(info, [number])[number])
+    for number, picture in enumerate(islice(frames(info.path, read=rgb), last)):
+        points = detect(picture) if number % step == 0 else None
         if points is not None and _inside(points, info.size_px):
             found[number] = points
     if len(found) < count:
@@ -53,19 +55,19 @@ def _inside(points: Points, size_px: tuple[int, int]) -> bool:
 
 def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
     """Frames whose shapes, freed of position, size and turn, lie farthest from one another; ascending."""
-    frames = sorted(shapes)
-    first = shapes[frames[0]]
-    rows = np.array([moved(shapes[f], similarity_between(shapes[f], first)).ravel() for f in frames])
+    numbers = sorted(shapes)
+    first = shapes[numbers[0]]
+    rows = np.array([moved(shapes[n], similarity_between(shapes[n], first)).ravel() for n in numbers])
     chosen = [int(((rows - np.median(rows, axis=0)) ** 2).sum(1).argmin())]
-    distance: NDArray[np.float64] = np.full(len(frames), np.inf)
-    while len(chosen) < min(count, len(frames)):
+    distance: NDArray[np.float64] = np.full(len(numbers), np.inf)
+    while len(chosen) < min(count, len(numbers)):
         distance = np.minimum(distance, ((rows - rows[chosen[-1]]) ** 2).sum(1))
         chosen.append(int(distance.argmax()))
-    return sorted(frames[place] for place in chosen)
+    return sorted(numbers[place] for place in chosen)
 
 
 def _detector(weights: Path | None) -> Any:
-    """A function from a grey picture to 18 points, or None where it sees no face."""
+    """A function from an RGB picture to 18 points, or None where it sees no face."""
     if find_spec("mediapipe") is None:
         raise InputError(
             "label --bootstrap needs the optional package MediaPipe: pip install 'mediapipe>=1.2'"
@@ -79,11 +81,15 @@ def _detector(weights: Path | None) -> Any:
     tasks = import_module("mediapipe.tasks.python")
     vision = import_module("mediapipe.tasks.python.vision")
     options = vision.FaceLandmarkerOptions(base_options=tasks.BaseOptions(model_asset_path=str(weights)))
-    landmarker = vision.FaceLandmarker.create_from_options(options)
+    try:
+        landmarker = vision.FaceLandmarker.create_from_options(options)
+    except (RuntimeError, ValueError) as error:
+        raise InputError(
+            f"{weights}: not a face_landmarker.task that MediaPipe takes ({str(error).splitlines()[0]})"
+        ) from error
 
     def detect(picture: Picture) -> Points | None:
-        colour = np.ascontiguousarray(np.repeat(picture[:, :, None], 3, axis=2))
-        image = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=colour)
+        image = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=picture)
         faces = landmarker.detect(image).face_landmarks
         return _points(faces[0], picture.shape) if faces else None
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from stimuli_builder.tracking.learn import Lesson
     from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
     from stimuli_builder.video import VideoInfo
@@ -89,16 +91,13 @@ def track(
       stimuli track take2.mp4 --model actor1.npz --out track2.csv --plot track2.png
     """
     from experiments.errors import InputError
-    from stimuli_builder.files import temporary_beside
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.tracking.learn import open_video
     from stimuli_builder.tracking.track import track_video
 
     if (labels is None) == (model is None):
         raise InputError("expected either --labels or --model; give one of them")
-    for target in (out, preview, plot):
-        if target is not None:
-            temporary_beside(target)
+    _check_outputs([video, labels, model], out, preview, plot)
     info = open_video(video, accept_variable_rate)
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
     trained = _model(info, labels, model, options, one_eye, refine, folds)
@@ -142,11 +141,13 @@ def train(
       stimuli train eye.mp4 --labels eye.labels.json --one-eye --folds 8
     """
     from experiments.errors import InputError
+    from stimuli_builder.files import check_targets
     from stimuli_builder.tracking.learn import learn, open_video
     from stimuli_builder.tracking.model import save_model
 
     if labels is None:
         raise InputError("expected --labels with the label file of this video")
+    check_targets([out], [video, labels])
     info = open_video(video, accept_variable_rate)
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
     lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine)
@@ -191,6 +192,22 @@ def _model(
     if one_eye and trained.eyes == 2:
         raise InputError(f"{model}: a model of two eyes, --one-eye expects one; leave --one-eye out")
     return trained
+
+
+def _check_outputs(
+    inputs: "Sequence[Path | None]", out: Path, preview: Path | None, plot: Path | None
+) -> None:
+    from stimuli_builder.files import check_targets
+
+    check_targets([out, preview, plot], inputs)
+    if preview is not None:
+        from stimuli_builder.video_writer import check_video_name
+
+        check_video_name(preview)
+    if plot is not None:
+        from stimuli_builder.blinks.plots import check_figure_name
+
+        check_figure_name(plot)
 
 
 def _pictures(

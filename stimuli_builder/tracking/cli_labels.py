@@ -58,11 +58,13 @@ def label(
       stimuli label face.mp4 --bootstrap --weights face_landmarker.task --out face.labels.json
     """
     from experiments.errors import InputError
+    from stimuli_builder.files import check_targets
     from stimuli_builder.tracking.bootstrap import propose_labels
     from stimuli_builder.tracking.learn import open_video
 
     if not bootstrap:
         raise InputError("expected --bootstrap; to label by hand use the labelling page of the admin site")
+    check_targets([out], [video, weights])
     info = open_video(video, accept_variable_rate)
     labels = propose_labels(info, out, weights, frames)
     print(f"{out}: {len(labels.frames)} frames proposed; review each one before training")

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from stimuli_builder.blinks.extract import blinks_of
-from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS
+from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS
 from stimuli_builder.blinks.plots import save_figure, series_figure
 from stimuli_builder.blinks.series import read_series
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, with_border
 from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
-from stimuli_builder.video import Picture, VideoInfo, VideoWriter, frames
+from stimuli_builder.video import Picture, VideoInfo, frames, rgb
+from stimuli_builder.video_writer import VideoWriter
 
 PANEL_PX = 96
 SECONDS = 2.0
@@ -33,13 +34,13 @@ def write_preview(
     history: deque[NDArray[np.float64]] = deque(maxlen=span)
     top = 1.0
     with VideoWriter(out, info.fps, (width, height + PANEL_PX)) as writer:
-        for picture, row in zip(frames(info.path), track_rows(track), strict=True):
+        for picture, row in zip(frames(info.path, read=rgb), track_rows(track), strict=True):
             points = numbers(row, names, str(track)).reshape(-1, 2)
             history.append(numbers(row, gaps, str(track)))
             if np.isfinite(history[-1]).all():
                 top = max(top, float(history[-1].max()))
             canvas = np.zeros((height + PANEL_PX, width, 3), np.uint8)
-            canvas[:height] = picture[:height, :width, None]
+            canvas[:height] = picture[:height, :width]
             _draw_mesh(canvas, points, model.mesh.triangles)
             _draw_trace(canvas[height:], history, span, top)
             _write_text(canvas, f"{row['frame']}  {float(row['time_s']):.3f} s  {_status(row)}")

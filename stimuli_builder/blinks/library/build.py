@@ -9,7 +9,7 @@ import pandas as pd
 from experiments.errors import InputError
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.extract import all_profiles, blinks_of
-from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS, LabelOptions
+from stimuli_builder.blinks.label_options import LabelOptions, preset
 from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, Recording
 from stimuli_builder.blinks.profile import BlinkProfile
 from stimuli_builder.blinks.profile_table import write_profile_table
@@ -34,8 +34,12 @@ PROFILE_COLUMNS = (
 )
 
 
+LIBRARY_OPTIONS = preset("relative")
+"""The shipped profiles keep the values they were first measured with: the clips of Exp 1-3 rest on them."""
+
+
 def recorded_profiles(
-    recording: Recording, data: Path | None, options: LabelOptions = DEFAULT_OPTIONS
+    recording: Recording, data: Path | None, options: LabelOptions = LIBRARY_OPTIONS
 ) -> list[BlinkProfile]:
     """Label one recording and return its profiles."""
     folders = ([] if data is None else [data]) + [LIBRARY_FOLDER]

@@ -4,7 +4,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from stimuli_builder.blinks.labelling import PRESETS
+from stimuli_builder.blinks.label_options import PRESETS
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile_table import TABLE_COLUMNS, read_profile_table
 from stimuli_builder.blinks.tables import BLINK_COLUMNS
@@ -88,7 +88,9 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
     ("arguments", "message"),
     [
         (["--column", "gap_x"], "did you mean"),
-        (["--column", "gap_l", "--fps", "30"], "is --fps right"),
+        (["--column", "gap_l", "--fps", "30"], "is the column right, and --fps"),
+        (["--column", "gap_l", "--fps", "150"], "is --fps right"),
+        (["--column", "gap_l", "--fps", "600"], "is --fps right"),
         (["--column", "gap_l", "--fps", "300", "--minimum-depth", "0.999999"], "no blink in column"),
         (["--column", "gap_l", "--fps", "300", "--preset", "papr"], "did you mean 'paper'"),
         (["--column", "gap_l", "--fps", "300", "--reject", "1=x"], "--review"),
@@ -102,11 +104,11 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
         ),
         (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "no figure format 'gif'"),
         (["--column", "gap_l", "--fps", "300", "--summary", "none/s.json"], "does not exist"),
-        (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "names of their own"),
+        (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "a name of its own"),
         (["--column", "gap_l", "--fps", "300", "--closed", "40"], "not below the opening"),
         (["--column", "gap_l", "--fps", "300", "--closed", "-1"], "0 or more"),
         (["--column", "gap_l", "--fps", "300", "--complete-from", "2"], "up to 1"),
-        (["--column", "gap_l", "--fps", "300", "--gradient", "0.1", "--gradient-px", "1"], "not both"),
+        (["--column", "gap_l", "--fps", "300", "--gradient", "0.1", "--gradient-px", "1"], "give one of"),
     ],
 )
 def test_bad_input_gets_one_line_and_leaves_nothing(

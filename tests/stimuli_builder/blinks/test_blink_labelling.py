@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from stimuli_builder.actor.physiology import course, plan_blinks
-from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS, LabelOptions, find_blinks, label_blinks, preset
+from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS, LabelOptions, preset
+from stimuli_builder.blinks.labelling import find_blinks, label_blinks
 from stimuli_builder.blinks.series import read_series
 
 REAL = [
@@ -20,7 +21,7 @@ REAL = [
 
 
 @pytest.mark.parametrize(("file", "column", "count"), REAL)
-@pytest.mark.parametrize("name", ["relative", "paper"])
+@pytest.mark.parametrize("name", ["velocity", "relative", "paper"])
 def test_the_blinks_of_the_real_series_are_counted(shared_data, file, column, count, name):
     (series,) = read_series(shared_data / "blink_series" / file, [column], 240)
     blinks, refused = find_blinks(series.distance, series.fps, preset(name), is_px=series.is_px)
@@ -33,15 +34,17 @@ def test_the_blinks_of_the_real_series_are_counted(shared_data, file, column, co
 )
 def test_minima_agree_with_the_published_blink_table(shared_data, column, sheet):
     # Golden: JeFaPaTo's own table of this recording (SOURCES.md of the data); its extraction of the first
-    # minute differs by a few frames from the series, and it may miss a blink of one eye.
+    # minute differs by a few frames from the series, it may miss a blink of one eye, and one eye rests shut
+    # for 20 frames, any of which may be the lowest.
     folder = shared_data / "blink_series"
     published = pd.read_excel(folder / "blinking_full_blinking.xlsx", sheet_name=sheet)["apex_frame"]
     (series,) = read_series(folder / "blinking_short.csv", [column], 240)
     minima = np.array([blink.minimum for blink in label_blinks(series.distance, 240, is_px=False)])
     first_minute = published[published < series.distance.size].to_numpy()
     assert first_minute.size >= 5
-    for apex in first_minute:
-        assert np.abs(minima - apex).min() <= 6
+    misses = [int(np.abs(minima - apex).min()) for apex in first_minute]
+    assert max(misses) <= 8
+    assert np.median(misses) <= 3
 
 
 @pytest.mark.parametrize("fps", [120.0, 240.0, 300.0, 500.0])
@@ -58,7 +61,7 @@ def test_known_blinks_are_labelled_at_any_rate(make_known, fps):
 def test_blinks_of_the_synthetic_actor_meet_the_targets():
     # Targets of the tracking design at 300 fps: precision and recall 0.98 for depths from 25%, error of
     # onset, apex and end 5, 2 and 15 frames. The actor's onset is 5% of the amplitude, its end 95% recovery.
-    # Measured medians are 5.1, 0.8 and 11 frames (decision 0110): the onset misses its target by a tenth.
+    # Measured means are 3.1, 0.8 and 5 frames (decision 0210).
     fps, seconds, seed = 300, 600, 5
     plan = plan_blinks(seconds, np.random.default_rng([seed, 4]))
     closure = course(np.arange(fps * seconds) / fps, plan, seed).closure[:, 0]
@@ -79,7 +82,36 @@ def test_blinks_of_the_synthetic_actor_meet_the_targets():
             for b, truth in matched
         ]
     )
-    assert (np.median(np.abs(errors), axis=0) <= (6, 2, 15)).all()
+    assert (np.abs(errors).mean(axis=0) <= (4, 1.5, 8)).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_ends_are_found_on_blinks_of_another_form_and_any_depth(make_known, noise):
+    # The limit was chosen on the actor's blinks; raised cosines are not its form. 5% of the amplitude.
+    known = make_known(noise=noise, depths=tuple(np.linspace(0.3, 1, 12)))
+    inside = np.arccos(1 - 2 * 0.05) / np.pi
+    onsets = [m - (m - first) * (1 - inside) for m, first in zip(known.minima, known.onsets, strict=True)]
+    ends = [m + (last - m) * (1 - inside) for m, last in zip(known.minima, known.ends, strict=True)]
+    blinks = label_blinks(known.distance, known.fps)
+    found = np.array([(blink.onset, blink.minimum, blink.end) for blink in blinks])
+    errors = np.abs(found - np.column_stack([onsets, known.minima, ends]))
+    assert (errors.mean(axis=0) <= (5, 2, 8)).all()
+
+
+def test_noise_on_a_resting_lid_does_not_move_the_minimum(make_known):
+    # Shut for 31 frames: noise decides which of them is lowest, not where the flanks point.
+    known = make_known(depths=(1.0,))
+    turn = known.minima[0]
+    found: dict[float, list[int]] = {0.0: [], DEFAULT_OPTIONS.minimum_tolerance: []}
+    for seed in range(12):
+        shut = 0.1 * np.random.default_rng(seed).random(31)
+        distance = np.concatenate([known.distance[15:turn], shut, known.distance[turn + 1 : -15]])
+        for tolerance, minima in found.items():
+            (blink,) = label_blinks(distance, 300, replace(DEFAULT_OPTIONS, minimum_tolerance=tolerance))
+            minima.append(blink.minimum - turn)
+    lowest, told = found.values()
+    assert np.ptp(told) <= 2 < 8 < np.ptp(lowest)
+    assert max(np.abs(told)) <= 15
 
 
 @settings(deadline=None, max_examples=15)
@@ -146,7 +178,14 @@ def test_the_paper_preset_is_its_gradient_in_pixels(make_known):
 
 @pytest.mark.parametrize(
     "change",
-    [{"filter_frames": 0}, {"minimum_depth": 1.5}, {"minimum_depth": float("nan")}, {"gradient_px": 0.1}],
+    [
+        {"filter_frames": 0},
+        {"minimum_depth": 1.5},
+        {"minimum_depth": float("nan")},
+        {"minimum_tolerance": -0.1},
+        {"gradient_px": 0.1},
+        {"gradient_peak": None},
+    ],
 )
 def test_options_that_make_no_sense_are_refused(change):
     with pytest.raises(InputError):

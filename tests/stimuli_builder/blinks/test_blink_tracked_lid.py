@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from stimuli_builder.blinks.extract import blinks_of, eye_profiles
-from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS
+from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS
 from stimuli_builder.blinks.lower_lid import lower_lid
 from stimuli_builder.blinks.series import read_series
 from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM, tracked_lower_lid

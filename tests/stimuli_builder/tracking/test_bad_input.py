@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from stimuli_builder.tracking.labels import load_labels
-from stimuli_builder.video import VideoWriter
+from stimuli_builder.video import scan_video
+from stimuli_builder.video_writer import VideoWriter
 
 
 def write_frames(path, pictures, stamps=None, fps=100, options=None):
@@ -88,6 +89,14 @@ def test_a_file_cut_off_after_its_index(refused, recording, tmp_path):
     assert "truncated" in refused(cut)
 
 
+def test_a_file_that_counts_no_frames_cut_off(refused, recording, tmp_path):
+    whole, cut = tmp_path / "whole.mkv", tmp_path / "cut.mkv"
+    write_frames(whole, recording.pictures[:120])
+    assert scan_video(whole).frame_count == 120
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size * 6 // 10])
+    assert "truncated, it declares 1.2 s and ends after" in refused(cut)
+
+
 def test_a_video_without_a_face(refused, recording, tmp_path, stimuli):
     model = tmp_path / "model.npz"
     assert (
@@ -140,29 +149,41 @@ def test_labels_or_model_not_both_nor_neither(stimuli, recording, tmp_path):
     assert "give one of them" in stimuli("track", recording.video, "--out", out)[2]
 
 
+@pytest.mark.parametrize(
+    ("name", "option", "message"),
+    [
+        ("preview.txt", "--preview", "use a name in .mp4"),
+        ("plot.gif", "--plot", "no figure format 'gif'"),
+        ("track.csv", "--preview", "a name of its own"),
+    ],
+)
+def test_a_second_output_that_cannot_be_written_is_refused_first(refused, tmp_path, name, option, message):
+    assert message in refused(None, None, option, tmp_path / "out" / name)
+
+
+def test_no_output_takes_the_place_of_an_input(stimuli, recording, tmp_path):
+    video, labels = tmp_path / "a.mp4", tmp_path / "l.json"
+    video.write_bytes(recording.video.read_bytes())
+    labels.write_bytes(recording.labels.read_bytes())
+    (tmp_path / "x").mkdir()
+    calls = [
+        ("track", video, "--labels", labels, "--out", video),
+        ("track", video, "--labels", labels, "--out", labels),
+        ("train", video, "--labels", labels, "--out", tmp_path / "x" / ".." / "l.json"),
+        ("label", video, "--bootstrap", "--out", video),
+        ("actor", "--seconds", 0.1, "--out", video, "--truth", video),
+    ]
+    for call in calls:
+        code, _, error = stimuli(*call)
+        assert (code, error.count("\n")) == (2, 1)
+        assert "a name of its own" in error
+    assert video.read_bytes() == recording.video.read_bytes()
+    assert labels.read_bytes() == recording.labels.read_bytes()
+
+
 def test_outputs_that_cannot_be_written_are_refused_first(stimuli, recording, tmp_path):
     code, _, error = stimuli(
         "track", recording.video, "--labels", recording.labels, "--out", tmp_path / "no" / "track.csv"
     )
     assert code == 2
     assert "does not exist; make it first" in error
-
-
-def test_label_bootstrap_without_its_extra_or_weights(stimuli, recording, tmp_path):
-    from importlib.util import find_spec
-
-    out = tmp_path / "labels.json"
-    code, _, error = stimuli("label", recording.video, "--bootstrap", "--out", out)
-    assert code == 2
-    assert ("pip install 'mediapipe>=1.2'" if find_spec("mediapipe") is None else "--weights") in error
-    assert "expected --bootstrap" in stimuli("label", recording.video, "--out", out)[2]
-    assert not out.exists()
-
-
-def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_path):
-    other = tmp_path / "other.csv"
-    other.write_text("\n".join(recording.truth.read_text().splitlines()[:50]) + "\n")
-    code, _, error = stimuli("accuracy", other, recording.truth)
-    assert code == 2
-    assert "compare a track with its own truth" in error
-    assert "not a track" in stimuli("accuracy", recording.labels, recording.truth)[2]

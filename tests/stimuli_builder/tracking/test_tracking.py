@@ -11,7 +11,7 @@ from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import load_model, save_model
 from stimuli_builder.tracking.table import COLUMN_MEANINGS, track_columns
 from stimuli_builder.tracking.track import Tracker, track_video
-from stimuli_builder.video import frames, scan_video
+from stimuli_builder.video import frames, rgb, scan_video
 
 
 @pytest.fixture(scope="module")
@@ -163,6 +163,9 @@ def test_command_writes_track_preview_and_plot(recording, stimuli, tmp_path):
     assert "with decoding" in said
     assert sum(1 for _ in frames(preview)) == 200
     assert scan_video(preview).size_px == (512, 480)
+    drawn, film = (next(iter(frames(path, read=rgb)))[:60].astype(int) for path in (preview, recording.video))
+    assert np.ptp(film.mean((0, 1))) > 20
+    assert np.abs(drawn - film).mean() < 6
     assert plot.read_bytes()[:4] == b"\x89PNG"
     code, said, _ = stimuli("accuracy", out, recording.truth)
     assert code == 0
