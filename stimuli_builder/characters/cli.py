@@ -61,7 +61,7 @@ def bake_photorealistic(
 
       stimuli bake photorealistic --levels 9 --samples 16 --frame-samples 32      # a draft in minutes
 
-      stimuli bake photorealistic --preset southern --levels 129 --out my/face    # hours on two cores
+      stimuli bake photorealistic --preset southern --levels 129 --out my/face    # an hour or two
     """
     closures_of(levels)
     closures_of(rendered or levels)

@@ -10,6 +10,7 @@ from experiments.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from stimuli_builder.characters.atlas import Character
+    from stimuli_builder.characters.declaration import LowerLid
 
 CARTOON = "cartoon"
 SHIPPED_FOLDER = Path(__file__).resolve().parent.parent / "characters" / "data"
@@ -24,8 +25,8 @@ class Geometry:
     px_per_mm: float
     inter_ocular_mm: float
     opening_mm: float
-    lower_range_mm: tuple[float, float] | None
-    """Greatest lift and greatest slide of the lower lid; None without a lower-lid layer."""
+    lower_range_mm: tuple[tuple[float, float], tuple[float, float]] | None
+    """Least and greatest lift, and slide, of the lower lid; None without a lower-lid layer."""
 
     def scaled(self, width_px: int, height_px: int) -> tuple[tuple[int, int], int]:
         """Size of the whole frame when `width_px` wide, and the rows to cut above to get `height_px`.
@@ -111,8 +112,13 @@ def _folder_geometry(folder: Path) -> Geometry:
         found.px_per_mm,
         found.inter_ocular_mm,
         found.opening_mm,
-        (found.lower_lid.vertical_mm[-1], found.lower_lid.horizontal_mm[-1]) if found.lower_lid else None,
+        None if found.lower_lid is None else _ends(found.lower_lid),
     )
+
+
+def _ends(lid: "LowerLid") -> tuple[tuple[float, float], tuple[float, float]]:
+    vertical, horizontal = lid.vertical_mm, lid.horizontal_mm
+    return (vertical[0], vertical[-1]), (horizontal[0], horizontal[-1])
 
 
 def fingerprint(name: str, beside: Path | None = None) -> str:

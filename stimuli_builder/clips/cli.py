@@ -46,8 +46,8 @@ Examples:
 VERIFY_HELP = """
 Check a folder of clips against its manifest: presence, hashes, frame counts, timing and eyelid opening.
 
-The opening is measured in the decoded pixels of every frame and compared with the closure curve. Clips whose
-lower lid moves, whose eyes move apart, or whose character has changed since, are checked for the rest alone.
+The opening of each eye is measured in the decoded pixels of every frame and compared with its closure curve.
+Clips whose character has changed since, or is not here, are checked for the rest alone.
 
 Examples:
 
@@ -58,10 +58,12 @@ Examples:
 def register(app: typer.Typer) -> None:
     """Add the commands of the clip builder to `app`."""
     from stimuli_builder.clips.cli_clip import CLIP_HELP, clip_command
+    from stimuli_builder.clips.cli_strips import STRIPS_HELP, strips_command
 
     app.command("plan", help=PLAN_HELP)(plan_command)
     app.command("build", help=BUILD_HELP)(build_command)
     app.command("clip", help=CLIP_HELP)(clip_command)
+    app.command("strips", help=STRIPS_HELP)(strips_command)
     app.command("verify", help=VERIFY_HELP)(verify_command)
 
 

@@ -12,11 +12,14 @@ from stimuli_builder.clips.motion_blur import samples_per_frame
 from stimuli_builder.clips.seeds import generator
 
 Array = NDArray[np.float64]
+Reach = tuple[tuple[float, float], tuple[float, float]]
 
 LEAD_IN_S = (0.35, 0.80)
 LEAD_OUT_S = (0.35, 0.60)
 """Shortest and longest open-eye time before and after a blink; drawn for every clip by its seed."""
 DECIMALS = 6
+HELD_MM = 0.3
+"""The tolerance of the picture itself (`stimuli verify`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,32 +143,43 @@ def clip_curve(
     )
 
 
-def within_reach(curve: ClipCurve, range_mm: tuple[float, float] | None) -> tuple[ClipCurve, dict[str, str]]:
-    """Scale lower-lid signals whose peak lies beyond what the character can show.
+def within_reach(curve: ClipCurve, reach: Reach | None) -> tuple[ClipCurve, dict[str, str]]:
+    """Check that a character was baked for the lower lid's motion; signals are never scaled.
 
-    A signal scaled as a whole keeps its form; one cut off at its peak would move at once and then stand.
+    Where a signal passes a limit by at most HELD_MM (a tracked lid wavers about its resting place), it is
+    held there.
 
     Parameters
     ----------
-    range_mm : (float, float) or None
-        Greatest lift and greatest slide of the character's lower lid.
+    reach : ((low, high), (low, high)) in mm, or None
+        What the character can show of lift and of slide towards the nose.
 
     Returns
     -------
-    The curve, and for the manifest the factors that are not 1.
+    The curve, and for the manifest by how much signals were held back, in mm.
+
+    Raises
+    ------
+    InputError
+        A signal goes further than that beyond what was baked.
     """
-    vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
-    if range_mm is None or vertical is None or horizontal is None:
+    if reach is None or curve.lower_vertical_mm is None or curve.lower_horizontal_mm is None:
         return curve, {}
-    factors = [
-        min(1.0, limit / peak) if (peak := float(signal.max())) > 0 else 1.0
-        for signal, limit in zip((vertical, horizontal), range_mm, strict=True)
-    ]
-    scaled = replace(
-        curve,
-        lower_vertical_mm=np.round(vertical * factors[0], DECIMALS),
-        lower_horizontal_mm=np.round(horizontal * factors[1], DECIMALS),
-    )
-    names = ("lower_vertical_scale", "lower_horizontal_scale")
-    said = {name: f"{factor:.4f}" for name, factor in zip(names, factors, strict=True) if factor < 1}
-    return scaled, said
+    vertical = _held(curve, curve.lower_vertical_mm, reach[0], "up")
+    horizontal = _held(curve, curve.lower_horizontal_mm, reach[1], "towards the nose")
+    said = {"lower_vertical_held_mm": vertical[1], "lower_horizontal_held_mm": horizontal[1]}
+    shown = replace(curve, lower_vertical_mm=vertical[0], lower_horizontal_mm=horizontal[0])
+    return shown, {name: f"{beyond:.4f}" for name, beyond in said.items() if beyond > 10.0**-DECIMALS}
+
+
+def _held(curve: ClipCurve, signal: Array, limits: tuple[float, float], way: str) -> tuple[Array, float]:
+    """The signal within the limits, and how far it went beyond them."""
+    held = np.clip(signal, *limits)
+    beyond = float(np.abs(signal - held).max())
+    if beyond > HELD_MM:
+        raise InputError(
+            f"profile {curve.profile_id} moves the lower lid {signal.min():.2f} to {signal.max():.2f} mm "
+            f"{way}, its character is baked for {limits[0]:g} to {limits[1]:g} mm; bake it further "
+            "(docs/characters.md) or leave this signal out with lower_lid"
+        )
+    return held, beyond

@@ -25,7 +25,7 @@ class PlannedClip:
     job: ClipJob
     repeated: bool
     geometry: Geometry
-    lower_scale: dict[str, str]
+    lower_held: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
     shown = exemplar(settings, exemplar_family(key), spec.exemplar, seed, options.beside)
     timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
     curve = clip_curve(shown.profile, timing, settings.lower_lid)
-    curve, scale = within_reach(curve, place.lower_range_mm)
+    curve, held = within_reach(curve, place.lower_range_mm)
     job = ClipJob(look_of(settings, options), curve)
-    return PlannedClip(spec, settings, job, shown.repeated, place, scale)
+    return PlannedClip(spec, settings, job, shown.repeated, place, held)
 
 
 def exemplar_family(key: str) -> str:

@@ -23,7 +23,6 @@ class FramePainter:
 
     def __init__(self, character: LevelSet) -> None:
         self.character = character
-        self._flat = character.levels.reshape(len(character.levels), -1)
         width, height = character.size_px
         self._base = np.empty((height * 3 // 2, width), np.uint8)
         to_yuv(character.base.astype(np.float32), GAMMA, *_split(self._base, width, height))
@@ -39,7 +38,7 @@ class FramePainter:
         memory: dict[bytes, Planes] = {}
         for number, row in enumerate(rows):
             used = np.flatnonzero(row)
-            key = _same_picture(curve, used, row[used])
+            key = same_picture(curve, used, row[used])
             if key not in memory:
                 memory[key] = self._paint(curve, used, row[used])
             planes = memory[key].copy()
@@ -49,11 +48,11 @@ class FramePainter:
 
     def light(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Light:
         """(h, w, 3) linear light (of 65535) of the window: weighted mean over samples of the curve."""
-        light = self._eye_light(curve, curve.closure, samples, weights)
+        light = eye_light(self.character, curve, curve.closure, samples, weights)
         if curve.closure_other is None:
             return light
         # The participant sees the character's left eye at the right; `closure` is the left eye's.
-        other = self._eye_light(curve, curve.closure_other, samples, weights)
+        other = eye_light(self.character, curve, curve.closure_other, samples, weights)
         left_eye = self._seam()[None, :, None]
         return np.asarray(left_eye * light + (1 - left_eye) * other, np.float32)
 
@@ -79,30 +78,6 @@ class FramePainter:
         blue[half_rows, half_columns.start], red[half_rows, half_columns.start] = first_column
         return planes
 
-    def _eye_light(
-        self,
-        curve: ClipCurve,
-        closure: NDArray[np.float64],
-        samples: NDArray[np.int64],
-        weights: NDArray[np.float64],
-    ) -> Light:
-        character = self.character
-        level_weights = weights @ character.level_weights(closure[samples])
-        chosen = np.flatnonzero(level_weights > 1e-7)
-        light = np.empty(self._flat.shape[1], np.float32)
-        blend(self._flat, chosen, level_weights[chosen].astype(np.float32), light)
-        picture: Light = light.reshape(character.levels.shape[1:])
-        vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
-        if character.lower is not None and vertical is not None and horizontal is not None:
-            character.lower.add(
-                picture,
-                weights,
-                closure[samples],
-                vertical[samples],
-                horizontal[samples],
-            )
-        return np.asarray(picture, np.float32)
-
     def _seam(self) -> Light:
         window = self.character.window
         from_middle = np.arange(window.x, window.x + window.width) + 0.5 - self.character.size_px[0] / 2
@@ -110,7 +85,27 @@ class FramePainter:
         return np.asarray(np.clip(share, 0.0, 1.0), np.float32)
 
 
-def _same_picture(curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> bytes:
+def eye_light(
+    character: LevelSet,
+    curve: ClipCurve,
+    closure: NDArray[np.float64],
+    samples: NDArray[np.int64],
+    weights: NDArray[np.float64],
+) -> Light:
+    """(h, w, 3) linear light (of 65535) of the window where both eyes follow one signal of the curve."""
+    level_weights = weights @ character.level_weights(closure[samples])
+    chosen = np.flatnonzero(level_weights > 1e-7)
+    flat = character.levels.reshape(len(character.levels), -1)
+    light = np.empty(flat.shape[1], np.float32)
+    blend(flat, chosen, level_weights[chosen].astype(np.float32), light)
+    picture: Light = light.reshape(character.levels.shape[1:])
+    vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
+    if character.lower is not None and vertical is not None and horizontal is not None:
+        character.lower.add(picture, weights, closure[samples], vertical[samples], horizontal[samples])
+    return picture
+
+
+def same_picture(curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> bytes:
     """Equal for frames that look alike: resting frames are painted once."""
     motion = curve.motion(samples)
     if np.all(motion == motion[:, :1]):

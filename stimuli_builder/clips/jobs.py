@@ -10,7 +10,7 @@ import numpy as np
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.curves import ClipCurve
 
-RENDER_VERSION = 1
+RENDER_VERSION = 2
 """Raise this when the same inputs come to give other pictures; every clip is then built again."""
 
 

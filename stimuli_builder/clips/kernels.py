@@ -39,8 +39,8 @@ def blend(
 
 @compiled
 def add_products(
-    changes: NDArray[np.float32],
-    factors: NDArray[np.float32],
+    changes: NDArray[np.number],
+    factors: NDArray[np.number],
     shares: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
@@ -56,7 +56,7 @@ def add_products(
             for y in range(out.shape[0]):
                 line, change, factor = out[y].ravel(), changes[p, y].ravel(), factors[m, y].ravel()
                 for x in range(line.shape[0]):
-                    line[x] += share * change[x] * factor[x]
+                    line[x] += share * np.float32(change[x]) * np.float32(factor[x])
 
 
 @compiled

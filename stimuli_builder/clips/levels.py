@@ -1,6 +1,6 @@
 """A character at one picture size, ready to be blended: its levels as 16-bit linear light."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -75,6 +75,11 @@ class LevelSet:
         weights[rows, upper - 1] = 1.0 - share
         weights[rows, upper] += share
         return weights
+
+    def thinned(self, step: int) -> "LevelSet":
+        """Every `step`th pixel of the window both ways, to measure by; `window` and `base` stay."""
+        lower = None if self.lower is None else self.lower.thinned(step)
+        return replace(self, levels=np.ascontiguousarray(self.levels[:, ::step, ::step]), lower=lower)
 
     def picture(self, closure: float) -> NDArray[np.uint8]:
         """(height, width, 3) sRGB code values of the still frame at a closure."""

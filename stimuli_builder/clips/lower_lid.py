@@ -1,7 +1,7 @@
 """The lower lid's layer at one picture size, added to blended frames for many samples at once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from stimuli_builder.characters.atlas import Character
 from stimuli_builder.clips.kernels import FULL_SCALE, add_products
 
+CHANGE_STEP, FACTOR_STEP = 2.0, 2.0**-15
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
@@ -23,16 +24,16 @@ class LowerLid:
     Attributes
     ----------
     vertical_mm, horizontal_mm, closures : ascending grids of poses and mattes.
-    changes : float32 array (vertical x horizontal, h, w, 3), of 65535.
-    factors : float32 array (mattes, h, w, 3).
+    changes : int16 array (vertical x horizontal, h, w, 3), in CHANGE_STEP of 65535.
+    factors : uint16 array (mattes, h, w, 3), in FACTOR_STEP. Floats would take 200 MB more at most.
     rows, columns : place in the character's window.
     """
 
     vertical_mm: Array
     horizontal_mm: Array
     closures: Array
-    changes: Picture
-    factors: Picture
+    changes: NDArray[np.int16]
+    factors: NDArray[np.uint16]
     rows: slice
     columns: slice
 
@@ -48,10 +49,17 @@ class LowerLid:
             whole[layer.window] = part
             return to_window(whole)
 
-        changes = np.stack([placed(change) for row in layer.changes for change in row])
-        rows, columns = _where_any(changes)
-        factors = np.stack([placed(layer.factor_at(i))[rows, columns] for i in range(len(closures))])
-        changes = np.ascontiguousarray(changes[:, rows, columns]) * np.float32(FULL_SCALE)
+        # Cut as they come: whole windows of all poses at once would take 1 GB at the largest size.
+        rows, columns = _where_any(placed(np.ones_like(layer.changes[0, 0])))
+        place = (rows.stop - rows.start, columns.stop - columns.start, 3)
+        changes = np.empty((len(vertical) * len(horizontal), *place), np.int16)
+        for index, change in enumerate(change for row in layer.changes for change in row):
+            part = placed(change)[rows, columns] * np.float32(FULL_SCALE / CHANGE_STEP)
+            changes[index] = np.clip(np.rint(part), -32767, 32767)
+        factors = np.empty((len(closures), *place), np.uint16)
+        for index in range(len(closures)):
+            part = placed(layer.factor_at(index))[rows, columns] / np.float32(FACTOR_STEP)
+            factors[index] = np.clip(np.rint(part), 0, FULL_SCALE)
         return cls(vertical, horizontal, closures, changes, factors, rows, columns)
 
     def limited(self, vertical_mm: Array, horizontal_mm: Array) -> tuple[Array, Array]:
@@ -60,6 +68,16 @@ class LowerLid:
             np.clip(vertical_mm, self.vertical_mm[0], self.vertical_mm[-1]),
             np.clip(horizontal_mm, self.horizontal_mm[0], self.horizontal_mm[-1]),
         )
+
+    def thinned(self, step: int) -> "LowerLid":
+        """Every `step`th pixel both ways, counted from the window's first."""
+        first = [-part.start % step for part in (self.rows, self.columns)]
+        inside = slice(first[0], None, step), slice(first[1], None, step)
+        changes = np.ascontiguousarray(self.changes[:, *inside])
+        starts = (self.rows.start + first[0]) // step, (self.columns.start + first[1]) // step
+        rows, columns = (slice(a, a + n) for a, n in zip(starts, changes.shape[1:3], strict=True))
+        factors = np.ascontiguousarray(self.factors[:, *inside])
+        return replace(self, changes=changes, factors=factors, rows=rows, columns=columns)
 
     def add(
         self, light: Picture, weights: Array, closure: Array, vertical_mm: Array, horizontal_mm: Array
@@ -70,7 +88,8 @@ class LowerLid:
         along = _hat(self.horizontal_mm, horizontal)
         covered = _hat(self.closures, np.clip(closure, self.closures[0], self.closures[-1]))
         shares = np.einsum("s,sv,sh,sm->vhm", weights, across, along, covered)
-        table = shares.reshape(-1, shares.shape[2]).astype(np.float32)
+        steps = CHANGE_STEP * FACTOR_STEP
+        table = (steps * shares.reshape(-1, shares.shape[2])).astype(np.float32)
         part = np.zeros((*self.changes.shape[1:3], 3), np.float32)
         add_products(self.changes, self.factors, table, part)
         light[self.rows, self.columns] += part
@@ -89,9 +108,8 @@ def _hat(grid: Array, values: Array) -> Array:
     return hat
 
 
-def _where_any(changes: Picture) -> tuple[slice, slice]:
-    seen = np.any(changes != 0.0, axis=(0, 3))
-    if not seen.any():
-        return slice(0, 1), slice(0, 1)
+def _where_any(picture: Picture) -> tuple[slice, slice]:
+    """Rows and columns that hold all of a (h, w, 3) picture that is not 0."""
+    seen = np.any(picture != 0.0, axis=2)
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from experiments.definition import Experiment
 from experiments.manifest import Clip, Manifest
+from stimuli_builder.clips.curves import Array
 from stimuli_builder.clips.design_clips import Options, PlannedClip
 from stimuli_builder.clips.motion_blur import samples_per_frame
 from stimuli_builder.clips.state import RENDER_KEY, BuildState
@@ -87,8 +88,10 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
         profile_repeated=clip.repeated,
         duration_frames=curve.duration_frames,
         onset_frame=int(curve.onset_sample / samples_per_frame(settings.fps)),
-        closure=tuple(curve.closure.tolist()),
-        closure_other=() if curve.closure_other is None else tuple(curve.closure_other.tolist()),
+        closure=_samples(curve.closure),
+        closure_other=_samples(curve.closure_other),
+        lower_vertical_mm=_samples(curve.lower_vertical_mm),
+        lower_horizontal_mm=_samples(curve.lower_horizontal_mm),
         inputs={
             RENDER_KEY: job.input_hash,
             "character": Path(settings.character).name,
@@ -98,8 +101,12 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
             "motion_blur": str(settings.motion_blur).lower(),
             "lower_lid": settings.lower_lid,
             "eyes": settings.eyes,
-            **clip.lower_scale,
+            **clip.lower_held,
             "encoder": job.look.encoder,
         },
         seed=seed,
     )
+
+
+def _samples(signal: Array | None) -> tuple[float, ...]:
+    return () if signal is None else tuple(signal.tolist())

@@ -75,16 +75,24 @@ def page_text(manifest: Manifest) -> str:
     environment = Environment(loader=PackageLoader("stimuli_builder.clips", "templates"), autoescape=True)
     # Inside a script element only "</" could end it early.
     encoded = partial(json.dumps, ensure_ascii=True, separators=(",", ":"))
-    data = encoded([_clip_data(clip) for clip in manifest.clips]).replace("</", "<\\/")
+    signals = [value for c in manifest.clips for value in (*c.lower_vertical_mm, *c.lower_horizontal_mm)]
+    lower_mm = int(np.ceil(max(signals, default=0.0)))
+    data = encoded([_clip_data(clip, lower_mm or 1) for clip in manifest.clips]).replace("</", "<\\/")
     factors = {
         name: sorted({clip.levels[name] for clip in manifest.clips}) for name in manifest.clips[0].levels
     }
     template = environment.get_template("preview.html.j2")
-    return template.render(manifest=manifest, factors=factors, data=data)
+    apart = any(clip.closure_other for clip in manifest.clips)
+    return template.render(manifest=manifest, factors=factors, data=data, apart=apart, lower_mm=lower_mm)
 
 
-def _clip_data(clip: Clip) -> dict[str, Any]:
+def _clip_data(clip: Clip, lower_mm: float) -> dict[str, Any]:
+    """What the page needs of a clip; signals in 0-1, the lower lid's as shares of `lower_mm`."""
     step = max(1, round(samples_per_frame(clip.fps) / 5))
+
+    def thinned(values: tuple[float, ...], full: float = 1.0) -> list[float]:
+        return [round(value / full, 3) for value in values[::step]]
+
     return {
         "file": clip.file,
         "levels": clip.levels,
@@ -95,6 +103,8 @@ def _clip_data(clip: Clip) -> dict[str, Any]:
         "frames": clip.frames,
         "fps": clip.fps,
         "duration": clip.duration_frames,
-        "curve": [round(value, 3) for value in clip.closure[::step]],
-        "other": [round(value, 3) for value in clip.closure_other[::step]],
+        "curve": thinned(clip.closure),
+        "other": thinned(clip.closure_other),
+        "up": thinned(clip.lower_vertical_mm, lower_mm),
+        "nasal": thinned(clip.lower_horizontal_mm, lower_mm),
     }

@@ -1,6 +1,7 @@
 """Blinks from files of closure samples at 300 fps: a table of profiles, or one blink alone."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -32,6 +33,8 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
         raise InputError(f"{path.name}: no column 'closure'{did_you_mean('closure', unknown)}")
     signals = {name: _numbers(path, table, name) for name in COLUMNS if name in table.columns}
     closure = signals["closure"]
+    if len(closure) < 3:
+        raise InputError(f"{path.name}: expected at least 3 samples of closure, found {len(closure)}")
     for name, values in signals.items():
         if name.startswith("closure"):
             _require_closure(path, name, values)
@@ -59,14 +62,25 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
 
 
 def _table(path: Path) -> pd.DataFrame:
+    """The cells as they are written, without blank lines at the end."""
     if not path.is_file():
         raise InputError(f"{path}: expected a CSV file of closure samples, found none; check the path")
     try:
-        table = pd.read_csv(path)
+        table = _cells(path)
         if all(_is_number(str(name)) for name in table.columns):
-            table = pd.read_csv(path, header=None, names=["closure"])
+            table = _cells(path, header=None, names=["closure"])
     except (ValueError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path.name}: not a CSV file that can be read ({error})") from error
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path.name}: not a CSV file that can be read ({reason})") from error
+    if not isinstance(table.index, pd.RangeIndex):
+        raise InputError(f"{path.name}: expected as many values in a line as there are columns, got more")
+    filled = np.flatnonzero((table != "").any(axis=1))
+    return table.iloc[: filled[-1] + 1 if len(filled) else 0]
+
+
+def _cells(path: Path, **more: Any) -> pd.DataFrame:
+    """Text of every cell: messages quote it, and a blank line among samples is a sample that is missing."""
+    table: pd.DataFrame = pd.read_csv(path, dtype=str, keep_default_na=False, skip_blank_lines=False, **more)
     return table
 
 
@@ -83,7 +97,7 @@ def _numbers(path: Path, table: pd.DataFrame, name: str) -> Array:
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
         found = table[name].iloc[int(wrong[0])]
-        raise InputError(f"{path.name}: {name} must be a number, sample {wrong[0] + 1} is {found!r}")
+        raise InputError(f"{path.name}: {name} must be a number, sample {wrong[0] + 1} is '{found}'")
     return values
 
 

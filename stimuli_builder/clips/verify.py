@@ -78,20 +78,21 @@ def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], floa
         pictures, problems = _decoded(path, clip)
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
-    if problems or not _measurable(clip) or (meter := meters.of(clip)) is None:
+    if problems or not clip.closure or (meter := meters.of(clip)) is None:
         return problems, None
-    off = np.abs(meter.measured_mm(pictures) - meter.promised_mm(clip))
+    try:
+        promised = meter.promised_mm(clip)
+    except InputError as error:
+        return [str(error)], None
+    if len(promised) != len(pictures):
+        return [f"its curve is {len(promised)} frames long, the clip {len(pictures)}"], None
+    off = np.abs(meter.measured_mm(pictures) - promised).max(axis=1)
     worst = float(off.max())
     if worst > TOLERANCE_MM:
         problems.append(
-            f"frame {int(off.argmax())}: the eye is open {worst:.2f} mm more or less than the curve says"
+            f"frame {int(off.argmax())}: an eye is open {worst:.2f} mm more or less than the curve says"
         )
     return problems, worst
-
-
-def _measurable(clip: Clip) -> bool:
-    """Whether the upper lid's curve alone decides how far both eyes are open."""
-    return bool(clip.closure) and not clip.closure_other and clip.inputs.get("lower_lid") == "none"
 
 
 def _decoded(path: Path, clip: Clip) -> tuple[NDArray[np.uint8], list[str]]:

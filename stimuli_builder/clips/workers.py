@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.connection import wait
+from threading import Thread
 from typing import Any
 
 from experiments.errors import InputError
@@ -62,7 +64,7 @@ def _on_pool(jobs: Sequence[ClipJob], order: list[int], workers: int) -> Iterato
 def _one_pool(jobs: Sequence[ClipJob], left: list[int], workers: int) -> Iterator[tuple[int, bytes]]:
     # A fresh interpreter: forking a process that already runs threads can lock up.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_parent)
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_follow_parent)
     try:
         futures: dict[Future[bytes], int] = {pool.submit(render, jobs[index]): index for index in left}
         for future in as_completed(list(futures)):
@@ -71,8 +73,17 @@ def _one_pool(jobs: Sequence[ClipJob], left: list[int], workers: int) -> Iterato
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _leave_interrupts_to_parent() -> None:
+def _follow_parent() -> None:
+    """Interrupts are the parent's to handle; a worker whose parent was killed ends too, with its memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        Thread(target=_end_after, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_after(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
 
 
 def _on_dask(jobs: Sequence[ClipJob], order: list[int], address: str) -> Iterator[tuple[int, bytes]]:
@@ -90,7 +101,7 @@ def _dask_client(address: str) -> Iterator[tuple[Any, Any]]:
     try:
         import distributed
     except ImportError as error:
-        raise InputError("--dask needs the extra 'dask': pip install 'palpebra[dask]'") from error
+        raise InputError("--dask needs the extra 'dask': pip install -e '.[dask]'") from error
     try:
         client = distributed.Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.video import VideoWriter, frames, read_frames, scan_video
+from stimuli_builder.video import frames, read_frames, rgb, scan_video
+from stimuli_builder.video_clock import clock_of
+from stimuli_builder.video_writer import VideoWriter
 
 
 def ramp(number, width=64, height=48):
@@ -55,6 +57,25 @@ def test_any_format_is_read_in_order_as_grey(tmp_path, name, codec, pix_fmt, fps
     assert levels[-1] - levels[0] > 55
 
 
+@pytest.mark.parametrize("fps", [77.9, 240.0, 300.0, 400.0])
+def test_a_constant_rate_in_whole_milliseconds_is_constant(fps):
+    # Matroska and WebM count milliseconds: 300 frames/s are stamped 3, 3 and 4 ms apart.
+    exact = np.arange(900) * 1000 / fps
+    for stamps in (np.round(exact), np.floor(exact)):
+        clock = clock_of(stamps.astype(np.int64) + 7, 0.001, 1 / fps)
+        assert not clock.variable
+        assert clock.fps == pytest.approx(fps, rel=1e-3)
+        assert clock.times_s == pytest.approx(exact / 1000, abs=0.0011)
+        assert np.ptp(np.diff(clock.times_s)) < 1e-9
+
+
+def test_dropped_frames_make_a_rate_variable():
+    for tick_s in (1 / 30, 1 / 60, 1 / 15360):
+        ticks = round(1 / 30 / tick_s)
+        kept = np.flatnonzero(np.arange(400) % 4 != 3) * ticks
+        assert clock_of(kept, tick_s, 1 / 30).variable
+
+
 def test_frames_are_found_by_number(tmp_path):
     path = write(tmp_path / "a.mp4", count=40)
     everything = list(frames(path))
@@ -84,7 +105,9 @@ def test_a_rotated_phone_video_is_read_upright(tmp_path, degrees):
     path.write_bytes(bytes(data))
     info = scan_video(path)
     assert info.size_px == ((64, 48) if degrees == 180 else (48, 64))
-    picture = next(iter(frames(path)))
+    picture, colours = next(iter(frames(path))), next(iter(frames(path, read=rgb)))
+    assert colours.shape == (*picture.shape, 3)
+    assert np.abs(colours.mean(2) - picture).max() < 40
     corner = {90: (5, -5), 180: (-5, -5), 270: (-5, 5)}[degrees]
     assert picture[corner] > 180
     assert picture.shape == info.size_px[::-1]

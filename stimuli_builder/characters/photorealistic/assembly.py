@@ -22,7 +22,6 @@ from stimuli_builder.characters.photorealistic.visibility import upper_lid_matte
 from stimuli_builder.characters.writing import write_declaration, write_picture
 
 Code = NDArray[np.float32]
-LOWER_LID_STEPS = 4
 
 
 class Assembly:
@@ -99,7 +98,7 @@ class Assembly:
         return all(shot.file.exists() for shot in shots)
 
     def _write_lower_lid(self, folder: Path) -> LowerLid:
-        """Poses on a grid between the rendered corners, and mattes."""
+        """The grid of poses, and mattes."""
         crop, poses, mattes = self.lower_lid_crop, [], []
         for pose, image in self.lower_lid_poses():
             v, h = pose.vertical_mm, pose.horizontal_mm
@@ -118,29 +117,23 @@ class Assembly:
         return LowerLid(crop=crop, poses=tuple(poses), mattes=tuple(mattes))
 
     def lower_lid_poses(self) -> Iterator[tuple[LidPose, NDArray[np.uint8]]]:
-        """Poses of the open eye, LOWER_LID_STEPS + 1 each way: corners rendered, the others moved between."""
-        crop, steps = self.lower_lid_crop, np.arange(LOWER_LID_STEPS + 1) / LOWER_LID_STEPS
-        corners = {LidPose(0.0): srgb_to_linear(to_8_bit(_cut(self.still, crop)))}
-        for pose in plan.lower_lid_poses():
-            shot = plan.pose_shot(self.work, self.frame, self.quality, pose)
-            corners[pose] = srgb_to_linear(to_8_bit(_cut(self.lay(self.still, shot), crop)))
-        inbetweener = self._inbetweener(self.frame.lower_lid_boxes(), crop)
+        """Poses of the open eye: the rendered ones, and one between every two neighbouring lifts."""
+        inbetweener = self._inbetweener(self.frame.lower_lid_boxes(), self.lower_lid_crop)
+        for h in plan.HORIZONTAL_MM:
+            for low, high in pairwise(plan.VERTICAL_MM):
+                poses = LidPose(0.0, low, h), LidPose(0.0, high, h)
+                middle = LidPose(0.0, (low + high) / 2, h)
+                yield poses[0], self._lower_lid(poses[0])
+                ends = [Rendered(pose, srgb_to_linear(self._lower_lid(pose))) for pose in poses]
+                yield middle, linear_to_srgb(inbetweener.mix(middle, ends[0], ends[1], 0.5))
+            yield poses[1], self._lower_lid(poses[1])
 
-        def between(pose: LidPose, share: float, low: Rendered, high: Rendered) -> Rendered:
-            if share in (0.0, 1.0):
-                return high if share else low
-            return Rendered(pose, inbetweener.mix(pose, low, high, share))
-
-        for along in steps:
-            h = float(plan.HORIZONTAL_MM * along)
-            edges = []
-            for v in (0.0, plan.VERTICAL_MM):
-                rest, nasal = LidPose(0.0, v), LidPose(0.0, v, plan.HORIZONTAL_MM)
-                low, high = Rendered(rest, corners[rest]), Rendered(nasal, corners[nasal])
-                edges.append(between(LidPose(0.0, v, h), float(along), low, high))
-            for up in steps:
-                pose = LidPose(0.0, float(plan.VERTICAL_MM * up), h)
-                yield pose, linear_to_srgb(between(pose, float(up), edges[0], edges[1]).light)
+    def _lower_lid(self, pose: LidPose) -> NDArray[np.uint8]:
+        """8-bit picture of the lower lid's crop in a rendered pose."""
+        if pose == LidPose(0.0):
+            return to_8_bit(_cut(self.still, self.lower_lid_crop))
+        shot = plan.pose_shot(self.work, self.frame, self.quality, pose)
+        return to_8_bit(_cut(self.lay(self.still, shot), self.lower_lid_crop))
 
     def _inbetweener(self, boxes: dict[str, Box], crop: Box) -> Inbetweener:
         still = srgb_to_linear(to_8_bit(_cut(self.still, crop)))

@@ -72,6 +72,7 @@ class _Columns:
     fissure: Array
     edge_reach: Array
     motion: Array
+    slide: Array
     reach: Array
 
     def height(self, closure: float) -> Array:
@@ -97,6 +98,7 @@ def _columns() -> _Columns:
         fissure=fissure,
         edge_reach=np.where(inside, np.clip(fissure / 2.0, 0, 1), 0.0),
         motion=np.where(inside, np.sin(np.pi * along) ** 0.8, 0.0),
+        slide=np.where(inside, np.sin(np.pi * along), 0.0),
         reach=step(-18.0, -11.0, local) * step(23.0, 10.0, local),
     )
 
@@ -189,11 +191,13 @@ def _upper_sheet(closure: float) -> _Grid:
 
 
 def _lower_sheet(pose: LidPose) -> _Grid:
+    """The lower lid slides along its own outline, so that the fissure keeps its shape, and lifts."""
     columns = _columns()
     rows = _rows(columns.line.max() - BOTTOM_MM)[:, None]
-    nasal = -pose.horizontal_mm * columns.side * columns.motion
+    nasal = -pose.horizontal_mm * columns.side * columns.slide
     x = columns.x + nasal * np.exp(-((rows / 4.5) ** 2))
-    y = columns.line - rows + pose.vertical_mm * columns.motion * np.exp(-((rows / 4.0) ** 2))
+    line = anatomy.closure_line(np.abs(x) - anatomy.EYE_X_MM)
+    y = line - rows + pose.vertical_mm * columns.motion * np.exp(-((rows / 4.0) ** 2))
     z = anatomy.closed_skin(x, y)
     z += columns.reach * (0.30 * bell(rows - 1.9, 1.2) - 0.22 * bell(rows - 5.0, 1.0))
     z += 0.30 * pose.vertical_mm * columns.motion * bell(rows - 2.5, 1.8)
@@ -205,9 +209,10 @@ def _lid_margin(sheet: _Grid, upper: bool, rise_mm: float) -> list[_Grid]:
     x, y, z = (axis[0] for axis in sheet)
     local = np.abs(x) - anatomy.EYE_X_MM
     thickness = np.maximum(z - anatomy.globe_surface(local, y, 0.06), 0.05)
-    radius = np.minimum(EDGE_RADIUS_MM, thickness * 0.4) * _columns().edge_reach
+    reach = np.interp(x, _columns().x, _columns().edge_reach)
+    radius = np.minimum(EDGE_RADIUS_MM, thickness * 0.4) * reach
     sense, rounded = (-1.0, 0.5) if upper else (1.0, 0.4)
-    rise = -0.25 * np.ones_like(x) if upper else rise_mm * _columns().edge_reach
+    rise = -0.25 * np.ones_like(x) if upper else rise_mm * reach
     rows: list[_Grid] = []
     for share in np.arange(1, MARGIN_ROWS + 1) / MARGIN_ROWS:
         turn = min(share / rounded, 1.0) * np.pi / 2

@@ -10,7 +10,10 @@ from stimuli_builder.characters.photorealistic.renderer import Shot
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129, 257)
 MATTE_CLOSURES = tuple(k / 32 for k in range(33))
-VERTICAL_MM, HORIZONTAL_MM = 1.0, 1.2
+# What a blink does to the lower lid reaches 1 mm upwards and 5 mm towards the nose (blinks/lower_lid.py).
+# A slide of more than a lash's spacing cannot be followed by optical flow, so every position is rendered.
+VERTICAL_MM = (0.0, 0.5, 1.0)
+HORIZONTAL_MM = tuple(k / 2 for k in range(11))
 LOWER_LID_AFTER_LEVELS = 9
 
 
@@ -47,12 +50,9 @@ def pose_shot(work: Path, frame: Frame, quality: Quality, pose: LidPose) -> Shot
 
 
 def lower_lid_poses() -> list[LidPose]:
-    """The displaced corners of the lower lid's range; the resting one is the open level itself."""
-    return [
-        LidPose(0.0, VERTICAL_MM, 0.0),
-        LidPose(0.0, 0.0, HORIZONTAL_MM),
-        LidPose(0.0, VERTICAL_MM, HORIZONTAL_MM),
-    ]
+    """The rendered positions of the lower lid; the resting one is the open level itself."""
+    grid = [LidPose(0.0, v, h) for h in HORIZONTAL_MM for v in VERTICAL_MM]
+    return [pose for pose in grid if pose != LidPose(0.0)]
 
 
 @dataclass(frozen=True)

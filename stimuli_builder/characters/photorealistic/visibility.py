@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.photorealistic.curves import Array
-from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose, SkinMesh, build_skin
+from stimuli_builder.characters.photorealistic.eyelid_skin import SkinMesh
 from stimuli_builder.characters.photorealistic.framing import Box, Frame
 from stimuli_builder.characters.photorealistic.hair import Strand, lashes
 from stimuli_builder.characters.photorealistic.parameters import Face
@@ -104,16 +104,6 @@ def _close_holes(point: NDArray[np.int64]) -> NDArray[np.int64]:
     empty = point < 0
     filled = np.where(empty & (left >= 0) & (right >= 0), left, point)
     return np.asarray(np.where(empty & (filled < 0) & (above >= 0) & (below >= 0), above, filled))
-
-
-def visible_opening_mm(face: Face, closure: float, frame: Frame, side: int) -> float:
-    """Tallest run of eyeball pixels over all columns, in mm on the screen, lashes left out."""
-    seen = surface(face, build_skin(LidPose(closure)), side)
-    skin = seen.kind < UPPER_LASH
-    skin_only = Surface(seen.points[skin], seen.kind[skin])
-    box = frame.eye_boxes()["left" if side < 0 else "right"]
-    eye = view(skin_only, frame, box).kind == EYE
-    return float(eye.sum(0).max() / frame.px_per_mm)
 
 
 def upper_lid_matte(face: Face, skin: SkinMesh, frame: Frame, side: int, box: Box) -> NDArray[np.float32]:

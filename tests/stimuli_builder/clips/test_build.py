@@ -151,26 +151,73 @@ def test_no_dask_scheduler_ends_in_one_line(small: Small, tmp_path: Path) -> Non
 
 FULL_DISK = """
 import resource, signal, sys
-from pathlib import Path
 from stimuli_builder.cli import main
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-sys.argv = ["stimuli", "build", sys.argv[1], "--out", sys.argv[2], "--workers", "1"]
+resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, 8_000))
+sys.argv[0] = "stimuli"
 main()
 """
 
 
-def test_a_full_disk_ends_in_one_line_and_leaves_no_half_clip(small: Small, tmp_path: Path) -> None:
-    # A limit on file size stands in for the end of the disk: the write fails after its first part.
-    out = tmp_path / "clips"
-    command = [sys.executable, "-c", FULL_DISK, str(small.toml), str(out)]
+def on_a_full_disk(*arguments: object) -> str:
+    """Run a command where a limit on file size stands in for the end of the disk; returns its one line."""
+    command = [sys.executable, "-c", FULL_DISK, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr.startswith("error: ")
-    assert len(done.stderr.strip().splitlines()) == 1
+    (line,) = done.stderr.strip().splitlines()
+    return line
+
+
+def test_a_full_disk_ends_in_one_line_and_leaves_no_half_clip(small: Small, tmp_path: Path) -> None:
+    out = tmp_path / "clips"
+    assert on_a_full_disk("build", small.toml, "--out", out, "--workers", 1).startswith("error: ")
     assert not (out / MANIFEST_NAME).exists()
     assert not list(out.glob(".*part*"))
     assert all(file_sha256(clip) == clip.stem for clip in out.glob("*.mp4"))
+
+
+def test_a_full_disk_leaves_no_single_clip_and_no_preview(copied: Path, small: Small, tmp_path: Path) -> None:
+    file = tmp_path / "one.mp4"
+    line = on_a_full_disk("clip", "--profile", "AL", "--out", file, "--size", "480x180")
+    assert "cannot be written" in line
+    line = on_a_full_disk("build", small.toml, "--out", copied, "--preview")
+    assert line.startswith(f"error: {copied / 'preview.png'} cannot be written")
+    assert {path.suffix for path in (*tmp_path.iterdir(), *copied.iterdir())} == {"", ".json", ".mp4"}
+    assert not file.exists()
+
+
+KILLED = """
+import os, signal, sys
+from multiprocessing import active_children
+from pathlib import Path
+from experiments.load import load_experiment
+from stimuli_builder.clips.build import Machines, build
+from stimuli_builder.clips.design_clips import Options
+
+def stop(done, wanted):
+    if done == 1:
+        print(*(child.pid for child in active_children()), flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+toml, out = sys.argv[1:]
+if __name__ == "__main__":
+    build(load_experiment(toml), Path(out), Options(beside=Path(toml).parent), Machines(2), stop)
+"""
+
+
+@pytest.mark.slow
+def test_workers_end_with_a_build_that_was_killed(small: Small, built: Path, tmp_path: Path) -> None:
+    out, script = tmp_path / "clips", tmp_path / "killed.py"
+    script.write_text(KILLED)
+    command = [sys.executable, str(script), str(small.toml), str(out)]
+    # Workers write to their own end of stdout, which stays open until the last one is gone.
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        workers = [int(pid) for pid in (process.communicate(timeout=60)[0]).split()]
+    assert process.returncode == -signal.SIGKILL
+    assert len(workers) == 2
+    assert not (out / MANIFEST_NAME).exists()
+    assert small.build(out).built == 7
+    assert contents(out) == contents(built)
 
 
 def test_a_folder_that_cannot_be_written_is_named(

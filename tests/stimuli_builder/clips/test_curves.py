@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
+from experiments.load import load_experiment
 from stimuli_builder.blinks.textbook import textbook_profile
 from stimuli_builder.clips.curves import (
     LEAD_IN_S,
@@ -16,6 +17,7 @@ from stimuli_builder.clips.curves import (
     clip_curve,
     within_reach,
 )
+from stimuli_builder.clips.design_clips import Options, planned_clips
 from stimuli_builder.clips.motion_blur import frame_weights
 
 BLINK = textbook_profile("AL", 9, start_level=0.05, end_level=0.1)
@@ -73,13 +75,55 @@ def test_closure_outside_its_range_is_refused(wrong: float) -> None:
         ClipCurve(np.array([0.0, wrong, 0.0]), 0, "bad")
 
 
-def test_a_lower_lid_beyond_the_characters_reach_is_scaled_as_a_whole() -> None:
-    curve = clip_curve(amplitude_of(BLINK, "full"), Timing(10, 10, 0, 30), "both")
-    assert curve.lower_horizontal_mm is not None
-    scaled, said = within_reach(curve, (5.0, 0.7))
-    assert scaled.lower_horizontal_mm is not None
-    assert scaled.lower_horizontal_mm.max() == pytest.approx(0.7, abs=1e-5)
-    factor = 0.7 / curve.lower_horizontal_mm.max()
-    np.testing.assert_allclose(scaled.lower_horizontal_mm, curve.lower_horizontal_mm * factor, atol=2e-6)
-    assert said == {"lower_horizontal_scale": f"{factor:.4f}"}
-    assert within_reach(curve, None)[1] == {}
+def moved(vertical: list[float], horizontal: list[float]) -> ClipCurve:
+    return ClipCurve(
+        np.zeros(3),
+        0,
+        "mine",
+        lower_vertical_mm=np.array(vertical),
+        lower_horizontal_mm=np.array(horizontal),
+    )
+
+
+REACH = ((0.0, 1.0), (0.0, 5.0))
+
+
+def test_a_lower_lid_within_reach_is_shown_as_it_is() -> None:
+    curve = moved([0.0, 1.0, 0.2], [0.0, 5.0, 1.0])
+    shown, said = within_reach(curve, REACH)
+    np.testing.assert_array_equal(shown.lower_vertical_mm, curve.lower_vertical_mm)
+    np.testing.assert_array_equal(shown.lower_horizontal_mm, curve.lower_horizontal_mm)
+    assert said == {}
+    assert within_reach(curve, None) == (curve, {})
+
+
+def test_a_lower_lid_that_wavers_about_rest_is_held_there_and_the_manifest_told() -> None:
+    shown, said = within_reach(moved([0.0, 1.05, -0.2], [0.0, 2.0, 0.0]), REACH)
+    np.testing.assert_array_equal(shown.lower_vertical_mm, [0.0, 1.0, 0.0])
+    assert said == {"lower_vertical_held_mm": "0.2000"}
+
+
+@pytest.mark.parametrize(
+    ("vertical", "horizontal", "message"),
+    [
+        ([0.0, 0.5, 0.0], [0.0, 6.2, 0.0], r"0\.00 to 6\.20 mm towards the nose.*baked for 0 to 5 mm"),
+        ([0.0, -0.4, 0.0], [0.0, 2.0, 0.0], r"-0\.40 to 0\.00 mm up.*baked for 0 to 1 mm"),
+    ],
+)
+def test_a_lower_lid_beyond_the_characters_reach_is_refused(
+    vertical: list[float], horizontal: list[float], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        within_reach(moved(vertical, horizontal), REACH)
+
+
+def test_every_lower_lid_of_experiment_3_moves_as_far_as_its_blink() -> None:
+    planned = planned_clips(load_experiment("exp3"), Options())
+    assert [clip.lower_held for clip in planned] == [{}] * len(planned)
+    slides = [
+        float(clip.job.curve.lower_horizontal_mm.max())
+        for clip in planned
+        if clip.job.curve.lower_horizontal_mm is not None and clip.job.curve.lower_horizontal_mm.any()
+    ]
+    assert 1.3 < min(slides) < 1.8
+    assert 4.0 < max(slides) <= 5.0

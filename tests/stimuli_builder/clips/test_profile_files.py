@@ -26,6 +26,12 @@ def test_numbers_alone_are_closure(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_closure_file(file)[0].closure, [0, 0.5, 1, 0.4, 0])
 
 
+def test_blank_lines_at_the_end_are_no_samples(tmp_path: Path) -> None:
+    file = tmp_path / "blink.csv"
+    file.write_text("closure\n0\n0.5\n1\n0.4\n0\n\n\n")
+    np.testing.assert_array_equal(read_closure_file(file)[0].closure, [0, 0.5, 1, 0.4, 0])
+
+
 def test_a_table_of_profiles_gives_them_all(tmp_path: Path) -> None:
     file = tmp_path / "table.csv"
     write_profile_table(file, load_library()[:3])
@@ -35,8 +41,12 @@ def test_a_table_of_profiles_gives_them_all(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("closure\n0\nnan\n1\n0\n", "closure must be a number, sample 2 is"),
-        ("closure\n0\n\nx\n0\n", "closure must be a number"),
+        ("closure\n0\nnan\n1\n0\n", "closure must be a number, sample 2 is 'nan'"),
+        ("closure\n0\nx\n1\n0\n", "closure must be a number, sample 2 is 'x'"),
+        ("closure\n0\n0.5\n\n1\n0\n", "closure must be a number, sample 3 is ''"),
+        ("closure\n0\n1\n", "at least 3 samples of closure, found 2"),
+        ("closure\n0\n1,2\n1,2,3\n0\n", "not a CSV file that can be read"),
+        ("closure\n0,1\n1,1\n0,1\n", "as many values in a line"),
         ("closure\n0\n1.3\n0\n", "between 0 .open. and 1 .closed., sample 2 is 1.3"),
         ("closure\n0\n-0.2\n0\n", "sample 2 is -0.2"),
         ("closur\n0\n1\n0\n", "no column 'closure'; did you mean 'closur'"),

@@ -10,7 +10,7 @@ from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, file_sha256
 from stimuli_builder.clips.verify import verify
 
-from .conftest import Small
+from .conftest import CURVE, Small, make_small
 
 
 @pytest.fixture
@@ -65,6 +65,72 @@ def test_a_blink_one_frame_late_is_found_in_the_pixels(small: Small, copied: Pat
     rewrite(copied, {"closure": [closure[0]] * 10 + closure[:-10]})
     (finding,) = verify(copied, small.folder).findings
     assert "mm more or less than the curve says" in finding.problem
+
+
+LIDS = """
+[[factors]]
+name = "eyes"
+label = "Eyes"
+[[factors.levels]]
+name = "apart"
+label = "Left and right as recorded"
+render = { character = "cartoon", profile = "real", eyes = "separate" }
+[[factors.levels]]
+name = "lower"
+label = "Lower lid moves"
+render = { character = "tiny", profile = "lid.csv", lower_lid = "both" }
+"""
+
+
+@pytest.fixture(scope="module")
+def lids(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Small, Path]:
+    """A clip of eyes that move apart and one of a lower lid that moves, in this order."""
+    head, rest = small_text.split("[[factors]]", 1)
+    tail = (
+        rest[rest.index("[exemplars]") :].replace("per_cell = 2", "per_cell = 1").replace('["profile"]', "[]")
+    )
+    folder = tmp_path_factory.mktemp("lids")
+    (folder / "study").mkdir()
+    samples = [f"{w},{0.9 * w},{0.8 * w}" for w in CURVE]
+    table = "closure,lower_up_mm,lower_nasal_mm\n" + "\n".join(samples) + "\n"
+    (folder / "study" / "lid.csv").write_text(table)
+    study = make_small(folder / "study", head + LIDS + tail)
+    study.build(folder / "clips")
+    return study, folder / "clips"
+
+
+@pytest.fixture
+def lids_copied(lids: tuple[Small, Path], tmp_path: Path) -> Path:
+    return Path(shutil.copytree(lids[1], tmp_path / "clips"))
+
+
+def test_eyes_apart_and_a_moving_lower_lid_are_measured(lids: tuple[Small, Path]) -> None:
+    study, folder = lids
+    verdict = verify(folder, study.folder)
+    assert verdict.findings == ()
+    assert (verdict.clips, verdict.opening_checked) == (2, 2)
+    assert verdict.worst_opening_mm < 0.3
+
+
+@pytest.mark.parametrize(
+    ("number", "change", "problem"),
+    [
+        (0, {"closure_other": []}, "an eye is open"),
+        (1, {"lower_vertical_mm": [], "lower_horizontal_mm": []}, "an eye is open"),
+        (1, {"closure": [0.0] * 100}, "needs 100 finite samples"),
+        (0, {"closure": [0.0] * 20, "closure_other": []}, "its curve is 2 frames long"),
+        (0, {"closure": [2.0] * 200, "closure_other": []}, "closure must lie between 0 and 1"),
+    ],
+)
+def test_curves_that_are_not_those_shown_are_found(
+    lids: tuple[Small, Path], lids_copied: Path, number: int, change: dict[str, object], problem: str
+) -> None:
+    file = lids_copied / MANIFEST_NAME
+    manifest = json.loads(file.read_text())
+    manifest["clips"][number] |= change
+    file.write_text(json.dumps(manifest))
+    (finding,) = verify(lids_copied, lids[0].folder).findings
+    assert problem in finding.problem
 
 
 def test_a_file_that_is_no_video_is_found(small: Small, copied: Path) -> None:

@@ -15,7 +15,7 @@ from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose
 from stimuli_builder.characters.photorealistic.framing import Frame, bounding_box, parse_size
 from stimuli_builder.characters.photorealistic.inbetween import Inbetweener, Rendered, flow_mix
 from stimuli_builder.characters.photorealistic.parameters import PRESETS_FILE, load_preset, load_presets
-from stimuli_builder.characters.photorealistic.plan import Quality, closures_of, stages
+from stimuli_builder.characters.photorealistic.plan import HORIZONTAL_MM, Quality, closures_of, stages
 from stimuli_builder.characters.photorealistic.renderer import Renderer, Shot
 
 SMALL = Frame(240, 200)
@@ -62,11 +62,12 @@ def test_finished_shots_become_an_atlas_without_rendering(tmp_path: Path) -> Non
     pretend_rendered(wanted)
     calls: list[tuple[int, int]] = []
     bake(wanted, lambda done, total, _: calls.append((done, total)))
-    assert calls == [(7, 7)]
+    assert calls == [(36, 36)]
     character = load_character(wanted.out)
     character.check_files()
     assert list(character.closures) == [0.0, 0.5, 1.0]
-    assert character.has_lower_lid
+    assert character.lower_lid_layer.vertical_mm.tolist() == [0, 0.25, 0.5, 0.75, 1]
+    assert character.lower_lid_layer.horizontal_mm.tolist() == list(HORIZONTAL_MM)
     np.testing.assert_array_equal(character.base_linear()[character.crop], character.levels_linear()[0])
     assert character.declaration.provenance["samples"] == 1
     rim = character.levels_linear()[:, 0]

@@ -7,16 +7,26 @@ from stimuli_builder.characters.photorealistic import anatomy
 from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose, build_skin
 from stimuli_builder.characters.photorealistic.framing import Frame
 from stimuli_builder.characters.photorealistic.hair import brow, lashes
-from stimuli_builder.characters.photorealistic.parameters import load_preset
-from stimuli_builder.characters.photorealistic.visibility import visible_opening_mm
+from stimuli_builder.characters.photorealistic.parameters import Face, load_preset
+from stimuli_builder.characters.photorealistic.visibility import EYE, UPPER_LASH, Surface, surface, view
 
 FRAME = Frame(960, 360)
+
+
+def visible_opening_mm(face: Face, closure: float, side: int) -> float:
+    """Tallest run of eyeball pixels over all columns, in mm on the screen, lashes left out."""
+    seen = surface(face, build_skin(LidPose(closure)), side)
+    skin = seen.kind < UPPER_LASH
+    skin_only = Surface(seen.points[skin], seen.kind[skin])
+    box = FRAME.eye_boxes()["left" if side < 0 else "right"]
+    eye = view(skin_only, FRAME, box).kind == EYE
+    return float(eye.sum(0).max() / FRAME.px_per_mm)
 
 
 @pytest.mark.parametrize("closure", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("side", [-1, 1])
 def test_visible_fissure_is_11_mm_times_what_is_left(closure: float, side: int) -> None:
-    opening = visible_opening_mm(load_preset("northern"), closure, FRAME, side)
+    opening = visible_opening_mm(load_preset("northern"), closure, side)
     assert opening == pytest.approx(11.0 * (1 - closure), abs=0.3)
 
 
@@ -28,13 +38,26 @@ def test_open_fissure_is_zero_at_the_canthi_and_11_mm_at_most() -> None:
 
 
 def test_upper_lid_does_not_follow_the_lower() -> None:
-    still, moved = build_skin(LidPose(0.3)), build_skin(LidPose(0.3, 1.0, 1.2))
+    still, moved = build_skin(LidPose(0.3)), build_skin(LidPose(0.3, 1.0, 5.0))
     np.testing.assert_array_equal(still.edges.upper_front, moved.edges.upper_front)
-    shift = moved.edges.lower_front - still.edges.lower_front
-    assert shift[:, 1].max() == pytest.approx(1.0, abs=0.01)
-    nasal = -np.sign(still.edges.x) * shift[:, 0]
-    assert nasal.max() == pytest.approx(1.2, abs=0.01)
+
+
+def test_lower_lid_lifts() -> None:
+    still, moved = build_skin(LidPose(0.3)).edges, build_skin(LidPose(0.3, 1.0)).edges
+    lift = moved.lower_front - still.lower_front
+    assert lift[:, 1].max() == pytest.approx(1.0, abs=0.01)
+    assert lift[:, 1].min() >= 0
+    np.testing.assert_array_equal(lift[:, 0], 0)
+
+
+def test_lower_lid_slides_along_its_own_outline_without_folding() -> None:
+    still, moved = build_skin(LidPose(0.3)).edges, build_skin(LidPose(0.3, 0.0, 5.0)).edges
+    nasal = -np.sign(still.x) * (moved.lower_front - still.lower_front)[:, 0]
+    assert nasal.max() == pytest.approx(5.0, abs=0.01)
     assert nasal.min() >= 0
+    assert np.diff(moved.lower_front[:, 0]).min() > 0
+    outline = np.interp(moved.lower_front[:, 0], still.x, still.lower_front[:, 1])
+    np.testing.assert_allclose(moved.lower_front[:, 1], outline, atol=0.03)
 
 
 def test_skin_beyond_the_lids_stays_where_it_is() -> None:
