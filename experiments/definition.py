@@ -8,7 +8,16 @@ from experiments.base import Declaration, Language, LevelName, Name, Translated
 from experiments.errors import did_you_mean
 from experiments.forms import Form
 from experiments.rendering import RenderOverrides, RenderSettings
-from experiments.rules import AttentionChecks, ExclusionRule, PlaybackRules
+from experiments.rules import (
+    AttentionChecks,
+    ExclusionRule,
+    PlaybackRules,
+    ScreenFormAnswer,
+    ScreeningRule,
+)
+
+# Declarations without these keys keep the hash they had before the keys existed.
+_LeftOutWhenEmpty = Field(exclude_if=lambda value: not value)
 
 
 class Level(Declaration):
@@ -120,13 +129,14 @@ class Session(Declaration):
 
 
 class Texts(Declaration):
-    """The pages of one language, in Markdown."""
+    """The pages of one language, in Markdown. `screened_out` stands in for a few words of the page's own."""
 
     consent: str
     instructions: str
     debrief: str
     practice: str = ""
     block_break: str = ""
+    screened_out: Annotated[str, _LeftOutWhenEmpty] = ""
 
 
 class AnalysisPlan(Declaration):
@@ -158,6 +168,7 @@ class Experiment(Declaration):
     session: Session = Session()
     playback: PlaybackRules = PlaybackRules()
     attention: AttentionChecks = AttentionChecks()
+    screening: Annotated[tuple[ScreeningRule, ...], _LeftOutWhenEmpty] = ()
     exclusions: tuple[ExclusionRule, ...] = ()
     forms: tuple[Form, ...] = ()
     texts: dict[Language, Texts]
@@ -188,6 +199,14 @@ class Experiment(Declaration):
         for language in self.languages:
             if language not in self.texts:
                 raise ValueError(f"texts.{language} is missing: languages lists '{language}'")
+        return self
+
+    @model_validator(mode="after")
+    def _screening_fits_the_forms(self) -> Self:
+        for number, rule in enumerate(self.screening, start=1):
+            fault = rule.fault(self.forms) if isinstance(rule, ScreenFormAnswer) else None
+            if fault:
+                raise ValueError(f"screening: rule {number}: {fault}")
         return self
 
 

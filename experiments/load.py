@@ -121,7 +121,7 @@ def _is_union_tag(part: object) -> bool:
 def _tagged_models() -> Iterator[tuple[str, type[BaseModel]]]:
     from experiments import forms, rules
 
-    for union in (rules.ExclusionRule, forms.FormField):
+    for union in (rules.ExclusionRule, rules.ScreeningRule, forms.FormField):
         for model in get_args(get_args(union)[0]):
             yield model.model_fields["rule" if "rule" in model.model_fields else "type"].default, model
 

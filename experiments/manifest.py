@@ -23,6 +23,8 @@ class Clip(Declaration):
     levels, cell, exemplar: its place in the design. profile: identifier of the blink shown.
     profile_repeated: True where the same recorded eye already stands for another exemplar of this cell.
     closure: closure at 300 fps over the whole clip (0 open, 1 closed); empty for clips not made here.
+    closure_other: the right eye's, where the eyes move apart. lower_vertical_mm, lower_horizontal_mm: the
+    lower lid's lift and its slide towards the nose, at 300 fps; empty where it rests.
     onset_frame: output frame at which the blink begins. width_mm: shown width at actual size.
     """
 
@@ -43,6 +45,8 @@ class Clip(Declaration):
     onset_frame: int | None = None
     closure: tuple[float, ...] = ()
     closure_other: tuple[float, ...] = ()
+    lower_vertical_mm: tuple[float, ...] = ()
+    lower_horizontal_mm: tuple[float, ...] = ()
     inputs: dict[str, str] = Field(default_factory=dict)
     seed: int | None = None
 

@@ -111,20 +111,14 @@ def csv_header(factors: Sequence[str]) -> list[str]:
 
 
 _LEVELS = COLUMN_NAMES.index("levels")
-_BOOLEANS = tuple(place for place, column in enumerate(RATING_COLUMNS) if column.type == "boolean")
 
 
-def csv_row(row: Sequence[Any], factors: tuple[str, ...]) -> list[Any]:
-    """One view row (values in the order of `COLUMN_NAMES`) as CSV cells.
+def csv_row(row: Sequence[Any], factors: tuple[str, ...]) -> tuple[Any, ...]:
+    """One view row (values in the order of `COLUMN_NAMES`, booleans as 0 and 1) as CSV cells.
 
-    Booleans become 0 and 1; what is missing stays None, which a CSV writer leaves empty.
+    What is missing stays None, which a CSV writer leaves empty.
     """
-    cells = list(row)
-    for place in _BOOLEANS:
-        if cells[place] is not None:
-            cells[place] = int(cells[place])
-    cells[_LEVELS : _LEVELS + 1] = _level_cells(row[_LEVELS], factors)
-    return cells
+    return (*row[:_LEVELS], *_level_cells(row[_LEVELS], factors), *row[_LEVELS + 1 :])
 
 
 # A study has few cells but many rows: their JSON is parsed once each.

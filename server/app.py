@@ -15,6 +15,7 @@ from server.context import open_services
 from server.errors import install_error_handlers
 from server.export import endpoints as export
 from server.library import endpoints as library
+from server.library import strips
 from server.middleware import BodyLimit, SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.operations import endpoints as operations
@@ -47,6 +48,7 @@ def _routers() -> tuple[APIRouter, ...]:
         export.router,
         reports.router,
         library.router,
+        strips.router,
         pages.router,
     )
 
@@ -61,6 +63,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(served: FastAPI) -> AsyncIterator[None]:
+        served.state.services.stopping.listen()
         yield
         served.state.services.group_commit.close()
         served.state.services.database.close()

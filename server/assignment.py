@@ -1,7 +1,6 @@
 """Which trials a participant gets and in what order: pure functions of declaration, seed and slot."""
 
 import random
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import cycle, islice, permutations
 from typing import Literal
@@ -54,12 +53,6 @@ def block_orders(experiment: Experiment) -> list[tuple[int, ...]]:
         every = list(islice(permutations(range(count)), MOST_ORDERS + 1))
         return every if len(every) <= MOST_ORDERS else _latin_square(count)
     return [tuple(range(count))]
-
-
-def free_slot(held: Iterable[int]) -> int:
-    """The smallest slot nobody holds: a drop-out's slot is the next to be given out."""
-    taken = set(held)
-    return next(slot for slot in range(len(taken) + 1) if slot not in taken)
 
 
 def _levels(experiment: Experiment) -> list[BlockSpec]:

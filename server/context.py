@@ -11,6 +11,7 @@ from server.db import Database, open_database
 from server.group_commit import GroupCommit
 from server.rate_limit import RateLimit
 from server.settings import Settings
+from server.stopping import Stopping
 from server.versions import Versions
 
 
@@ -26,6 +27,7 @@ class Services:
     versions: Versions
     group_commit: GroupCommit
     sign_ins: RateLimit
+    stopping: Stopping
 
 
 def open_services(settings: Settings) -> Services:
@@ -40,6 +42,7 @@ def open_services(settings: Settings) -> Services:
         versions=Versions(),
         group_commit=GroupCommit(database),
         sign_ins=RateLimit(settings.logins_per_minute),
+        stopping=Stopping(),
     )
 
 

@@ -1,19 +1,26 @@
 """The database: one code path for SQLite and PostgreSQL, and where transactions begin and end."""
 
+import sqlite3
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+import psycopg
 from sqlalchemy import Connection, create_engine, event
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import Engine, make_url
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import DeclarativeBase, Session
 
 from server.settings import Settings
 
 BUSY_TIMEOUT_S = 30
+SQLITE_AWAY = frozenset(
+    (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+)
 
 
 class Database:
@@ -61,6 +68,20 @@ def insert_once(session: Session, table: type[DeclarativeBase], rows: Sequence[d
     dialect = session.get_bind().dialect.name
     statement = postgresql.insert(table) if dialect == "postgresql" else sqlite.insert(table)
     session.execute(statement.on_conflict_do_nothing(), rows)
+
+
+def is_away(error: BaseException) -> bool:
+    """True where the database could not be reached, was restarted or had no connection left: try again."""
+    if isinstance(error, PoolTimeout):
+        return True
+    if not isinstance(error, DBAPIError):
+        return False
+    if isinstance(error.orig, psycopg.OperationalError):
+        # No code: no connection. Classes 08, 53, 57: connection broken, no resources, server shutting down.
+        code = error.orig.sqlstate
+        return code is None or code[:2] in ("08", "53", "57")
+    # Extended codes, such as SQLITE_BUSY_SNAPSHOT, have the primary one in their lowest byte.
+    return error.connection_invalidated or getattr(error.orig, "sqlite_errorcode", -1) & 0xFF in SQLITE_AWAY
 
 
 def open_database(settings: Settings) -> Database:

@@ -8,10 +8,13 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
-from sqlalchemy.exc import DataError
+from sqlalchemy.exc import DataError, DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 from starlette.exceptions import HTTPException
 
 from experiments.errors import InputError
+from server.db import is_away
+from server.operations.logs import described
 
 log = logging.getLogger("palpebra")
 
@@ -97,6 +100,8 @@ def install_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(OverflowError, _out_of_range)
     app.add_exception_handler(DataError, _out_of_range)
+    app.add_exception_handler(DBAPIError, _database)
+    app.add_exception_handler(PoolTimeout, _database)
     app.add_exception_handler(Exception, _unexpected)
 
 
@@ -135,6 +140,14 @@ async def _out_of_range(_request: Request, _error: Exception) -> JSONResponse:
         "A value is out of range: a number is too large, or a text holds a character that cannot be stored."
     )
     return error_response(422, "out_of_range", message)
+
+
+async def _database(_request: Request, error: Exception) -> JSONResponse:
+    if not is_away(error):
+        raise error
+    log.error("the database is away: %s", described(error))
+    message = "The server cannot reach its database at the moment; please try again."
+    return error_response(503, "database_away", message, headers={"retry-after": "2"})
 
 
 async def _unexpected(_request: Request, error: Exception) -> JSONResponse:

@@ -3,13 +3,19 @@
 An endpoint hands its work to a writer thread and awaits it. The writer takes everything that waits, does it
 in one transaction and answers after the commit. SQLite has one writer; PostgreSQL has several, and work with
 the same key goes to the same one, so that two of them do not wait for each other's rows.
+
+Heavy work (a run start writes a hundred rows) waits while lighter work comes, but not for long, and few of it
+share a commit: a thousand people who start at once do not hold up those who rate.
 """
 
 import asyncio
+import math
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from queue import Empty, SimpleQueue
+from itertools import count
+from queue import Empty, PriorityQueue
 from typing import Any, TypeVar
 
 from sqlalchemy import Connection
@@ -19,12 +25,17 @@ from server.errors import ApiError
 
 T = TypeVar("T")
 MOST_AT_ONCE = 64
+"""Weight of what shares one commit; a rating weighs 1."""
 POSTGRES_WRITERS = 4
+"""Writers of light work; PostgreSQL has one more, for heavy work."""
+PATIENCE_S = 0.25
+"""Heavy work lets pass what is lighter and came no later than this after it."""
 
 
 @dataclass
 class _Work:
     do: Callable[[Connection], Any]
+    weight: int
     loop: asyncio.AbstractEventLoop
     future: "asyncio.Future[Any]"
     result: Any = None
@@ -51,36 +62,47 @@ class _Work:
             self.future.set_result(self.result)
 
 
+Queue = PriorityQueue[tuple[float, int, _Work | None]]
+"""When it is due, in seconds; a number that settles ties; the work, or None at the very end."""
+
+
 class GroupCommit:
     """The writers of one process; threads start with the first work."""
 
     def __init__(self, database: Database) -> None:
         self.database = database
-        self._queues: list[SimpleQueue[_Work | None]] = []
+        self._queues: list[Queue] = []
         self._threads: list[threading.Thread] = []
         self._starting = threading.Lock()
+        self._numbers = count()
 
-    async def run(self, key: str, work: Callable[[Connection], T]) -> T:
-        """Do `work` in a transaction shared with others and return its result once that is committed."""
+    async def run(self, key: str, work: Callable[[Connection], T], weight: int = 1) -> T:
+        """Do `work` in a transaction shared with others and return its result once that is committed.
+
+        weight: how many ratings it is worth; work heavier than one waits as the module says.
+        """
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         queues = self._queues or self._start()
-        queues[hash(key) % len(queues)].put(_Work(work, loop, future))
+        due, place = time.monotonic(), hash(key) % max(1, len(queues) - 1)
+        if weight > 1:
+            due, place = due + PATIENCE_S, -1
+        queues[place].put((due, next(self._numbers), _Work(work, weight, loop, future)))
         return await future
 
     def close(self) -> None:
         """Finish what waits, then stop."""
         for queue in self._queues:
-            queue.put(None)
+            queue.put((math.inf, next(self._numbers), None))
         for thread in self._threads:
             thread.join()
         self._queues, self._threads = [], []
 
-    def _start(self) -> "list[SimpleQueue[_Work | None]]":
+    def _start(self) -> list[Queue]:
         with self._starting:
             if not self._queues:
-                count = 1 if self.database.is_sqlite else POSTGRES_WRITERS
-                queues: list[SimpleQueue[_Work | None]] = [SimpleQueue() for _ in range(count)]
+                number = 1 if self.database.is_sqlite else POSTGRES_WRITERS + 1
+                queues: list[Queue] = [PriorityQueue() for _ in range(number)]
                 for queue in queues:
                     thread = threading.Thread(target=self._write, args=(queue,), name="writer", daemon=True)
                     thread.start()
@@ -88,8 +110,8 @@ class GroupCommit:
                 self._queues = queues
             return self._queues
 
-    def _write(self, queue: "SimpleQueue[_Work | None]") -> None:
-        while (first := queue.get()) is not None:
+    def _write(self, queue: Queue) -> None:
+        while (first := queue.get()[2]) is not None:
             batch, ends = _waiting(queue, first)
             self._commit(batch)
             for loop in {work.loop for work in batch}:
@@ -112,17 +134,18 @@ class GroupCommit:
                 self._commit([work])
 
 
-def _waiting(queue: "SimpleQueue[_Work | None]", first: _Work) -> tuple[list[_Work], bool]:
-    """`first` and what waits behind it; True where the end was among it."""
-    batch = [first]
-    while len(batch) < MOST_AT_ONCE:
+def _waiting(queue: Queue, first: _Work) -> tuple[list[_Work], bool]:
+    """`first` and what waits behind it, up to the weight of a batch; True where the end was among it."""
+    batch, weight = [first], first.weight
+    while weight < MOST_AT_ONCE:
         try:
-            work = queue.get_nowait()
+            work = queue.get_nowait()[2]
         except Empty:
             return batch, False
         if work is None:
             return batch, True
         batch.append(work)
+        weight += work.weight
     return batch, False
 
 

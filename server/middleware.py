@@ -105,4 +105,5 @@ class BodyLimit:
 
 
 def _too_large(limit: int) -> str:
-    return f"The request is too large: at most {limit} bytes are accepted."
+    shown = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
+    return f"The request is too large: at most {shown} are accepted."

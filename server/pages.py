@@ -36,6 +36,16 @@ def participant_page(services: ServicesDep, link_token: str) -> Response:  # noq
     return _page(services, "participant")
 
 
+@router.get("/service-worker.js")
+def service_worker(settings: SettingsDep) -> Response:
+    """What keeps the participant's page for a reload without a connection; it serves /run/ alone."""
+    path = settings.frontend_folder / "participant" / "service-worker.js"
+    if not path.is_file():
+        raise NotFound("There is no service worker; the participant's page is not built.")
+    headers = {"cache-control": "no-cache"}
+    return Response(_read(path, path.stat().st_mtime_ns), media_type="text/javascript", headers=headers)
+
+
 @router.get("/admin")
 @router.get("/admin/{rest:path}")
 def admin_page(services: ServicesDep, rest: str = "") -> Response:  # noqa: ARG001 - read by the page

@@ -62,6 +62,9 @@ class Settings(BaseSettings):
     logins_per_minute: int = Field(
         default=10, ge=1, description="Sign-in attempts for one account a minute before it must wait."
     )
+    monitor_stream_minutes: float = Field(
+        default=60.0, gt=0, description="After so long the live monitor's browser connects anew."
+    )
     s3_bucket: str = Field(
         default="", description="Bucket of an S3-compatible store for clips; empty: the data folder."
     )
@@ -115,6 +118,11 @@ class Settings(BaseSettings):
     def stimuli_folder(self) -> Path:
         """Folder of the clip sets that `make run` builds, one a shipped experiment."""
         return self.data_folder / "stimuli"
+
+    @property
+    def strips_folder(self) -> Path:
+        """Folder of the characters' picture strips, as `stimuli strips` writes them."""
+        return self.stimuli_folder / "strips"
 
     @property
     def upload_folder(self) -> Path:

@@ -1,16 +1,19 @@
 """Clips in an S3-compatible object store, passed on by the server or fetched by browsers themselves."""
 
 import hashlib
+import logging
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
 from experiments.errors import InputError
-from server.clips.store import CHUNK_BYTES
+from server.clips.store import CHUNK_BYTES, ClipsAway
 from server.settings import Settings
 
+log = logging.getLogger("palpebra")
 PRESIGNED_S = 3600
+CONNECT_S, READ_S = 3, 10
 SPOOL_BYTES = 1 << 24
 IMMUTABLE = "public, max-age=31536000, immutable"
 
@@ -50,7 +53,7 @@ class S3Store:
         """Length in bytes; None where there is no such clip. It never changes, so it is asked for once."""
         if sha256 not in self._sizes:
             try:
-                found = self.client.head_object(Bucket=self.bucket, Key=self._name(sha256))
+                found = self._answer(self.client.head_object, Key=self._name(sha256))
             except self.client.exceptions.ClientError as error:
                 if error.response["ResponseMetadata"]["HTTPStatusCode"] == 404:
                     return None
@@ -63,13 +66,26 @@ class S3Store:
         if start >= end:
             return
         part = f"bytes={start}-{end - 1}"
-        found = self.client.get_object(Bucket=self.bucket, Key=self._name(sha256), Range=part)
+        found = self._answer(self.client.get_object, Key=self._name(sha256), Range=part)
         yield from found["Body"].iter_chunks(CHUNK_BYTES)
 
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
         self._sizes.pop(sha256, None)
         self.client.delete_object(Bucket=self.bucket, Key=self._name(sha256))
+
+    def problem(self, sha256: str | None) -> str | None:
+        """What keeps clips from being read now: the store is asked each time."""
+        from botocore.exceptions import BotoCoreError, ClientError
+
+        try:
+            if sha256 is None:
+                self.client.head_bucket(Bucket=self.bucket)
+            else:
+                self.client.head_object(Bucket=self.bucket, Key=self._name(sha256))
+        except (BotoCoreError, ClientError) as error:
+            return f"bucket {self.bucket}: {error}"
+        return None
 
     def address(self, sha256: str) -> str | None:
         """A signed address good for an hour, where browsers are to fetch clips from the store."""
@@ -83,6 +99,17 @@ class S3Store:
         address = self.address("0" * 64)
         return f"{urlsplit(address).scheme}://{urlsplit(address).netloc}" if address else None
 
+    def _answer(self, ask: Callable[..., Any], **what: str) -> Any:
+        """What the store answers; ClipsAway where no answer comes."""
+        from botocore.exceptions import ConnectionError as NoConnection
+        from botocore.exceptions import HTTPClientError
+
+        try:
+            return ask(Bucket=self.bucket, **what)
+        except (NoConnection, HTTPClientError) as error:
+            log.error("the object store is away: %s", type(error).__name__)
+            raise ClipsAway("The store of the clips does not answer; please try again.") from error
+
     def _name(self, sha256: str) -> str:
         return f"{self.prefix}{sha256}.mp4"
 
@@ -93,12 +120,19 @@ def open_s3(settings: Settings) -> S3Store:
         import boto3
         from botocore.config import Config
     except ImportError as error:
-        raise InputError("PALPEBRA_S3_BUCKET needs the extra 's3': pip install 'palpebra[s3]'") from error
+        raise InputError("PALPEBRA_S3_BUCKET needs the extra 's3': pip install -e '.[s3]'") from error
     style = "path" if settings.s3_endpoint else "virtual"
     client = boto3.client(
         "s3",
         endpoint_url=settings.s3_endpoint or None,
         region_name=settings.s3_region,
-        config=Config(s3={"addressing_style": style}, signature_version="s3v4", retries={"mode": "standard"}),
+        config=Config(
+            s3={"addressing_style": style},
+            signature_version="s3v4",
+            retries={"mode": "standard"},
+            # A store that hangs must not hold the threads that all other requests need.
+            connect_timeout=CONNECT_S,
+            read_timeout=READ_S,
+        ),
     )
     return S3Store(client, settings.s3_bucket, settings.s3_prefix, presigned=settings.s3_presigned)

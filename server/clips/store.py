@@ -8,8 +8,16 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from experiments.errors import InputError
+from server.errors import ApiError
 
 CHUNK_BYTES = 1 << 20
+
+
+class ClipsAway(ApiError):
+    """The object store does not answer; pages try again."""
+
+    status = 503
+    code = "clips_away"
 
 
 class ClipStore(Protocol):
@@ -26,6 +34,9 @@ class ClipStore(Protocol):
 
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
+
+    def problem(self, sha256: str | None) -> str | None:
+        """What keeps clips from being read now; `sha256` is one that should be there, None where none is."""
 
     def address(self, sha256: str) -> str | None:
         """Where a browser may fetch the clip itself; None: from this server."""
@@ -83,6 +94,16 @@ class FolderStore:
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
         self.path(sha256).unlink(missing_ok=True)
+
+    def problem(self, sha256: str | None) -> str | None:
+        """What keeps clips from being read now; a folder is made with the first clip."""
+        if sha256 is None:
+            return None
+        try:
+            self.path(sha256).open("rb").close()
+        except OSError as error:
+            return f"{self.path(sha256)}: {error.strerror}"
+        return None
 
     def address(self, sha256: str) -> str | None:  # noqa: ARG002 - as other stores have it
         """Clips of a folder come from this server."""

@@ -1,14 +1,15 @@
-"""`server export`: take the ratings of a study out as a tidy CSV."""
+"""`server export`: take the data of a study out, in the same forms as the dashboard's data page."""
 
 import secrets
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from server.cli_common import migrated_services, out
-from server.export.ratings_csv import write_ratings_csv
+from server.export.formats import FORMATS, Format
 from server.studies.lookup import find_study
 
 
@@ -19,24 +20,43 @@ def register(parent: typer.Typer) -> None:
 
 def export(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
-    out_file: Annotated[Path, typer.Option("--out", help="CSV file to write, or - for the standard output.")],
+    out_file: Annotated[Path, typer.Option("--out", help="File to write, or - for the standard output.")],
+    form: Annotated[
+        Format,
+        typer.Option(
+            "--format",
+            help="csv: one row a play; runs: one row a visit; raw: JSON lines with every drawn frame; "
+            "codebook: Markdown; psych-ds: a zip of the dataset folder.",
+        ),
+    ] = "csv",
 ) -> None:
-    """Write one row a play: the columns of experiments/ratings.py, one column a factor.
+    """Write a study's data: as csv, the columns of experiments/ratings.py and one column a factor.
 
     Memory stays constant however many rows there are; the file appears under its name only when complete.
-    Example: server export exp3 --out exp3.csv
+
+    Examples:
+
+      server export exp3 --out exp3.csv
+
+      server export exp3 --format psych-ds --out exp3.zip
     """
     with migrated_services() as services, services.database.read() as session:
         found = find_study(session, study)
-        if str(out_file) == "-":
-            write_ratings_csv(session, found, sys.stdout)
-            return
-        out_file.parent.mkdir(parents=True, exist_ok=True)
-        temporary = out_file.with_name(f".{out_file.name}.{secrets.token_hex(4)}")
-        try:
-            with temporary.open("w", encoding="utf-8", newline="") as stream:
-                rows = write_ratings_csv(session, found, stream)
-            temporary.replace(out_file)
-        finally:
-            temporary.unlink(missing_ok=True)
-    out.print(f"{out_file}: {rows} rows")
+        size = _write(out_file, FORMATS[form](session, found))
+    if str(out_file) != "-":
+        out.print(f"{out_file}: {size:,} bytes")
+
+
+def _write(out_file: Path, pieces: Iterable[bytes]) -> int:
+    """Write the pieces, to a file that gets its name at the end; return their bytes."""
+    if str(out_file) == "-":
+        return sum(sys.stdout.buffer.write(piece) for piece in pieces)
+    out_file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = out_file.with_name(f".{out_file.name}.{secrets.token_hex(4)}")
+    try:
+        with temporary.open("wb") as stream:
+            size = sum(stream.write(piece) for piece in pieces)
+        temporary.replace(out_file)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return size

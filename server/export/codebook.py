@@ -88,10 +88,10 @@ def _variable(column: Column) -> dict[str, Any]:
         "@type": "PropertyValue",
         "name": column.name,
         "description": column.sentence,
-        "valueType": column.type,
+        "additionalType": column.type,
     }
     if column.unit:
         found["unitText"] = column.unit
     if column.values:
-        found["levels"] = list(column.values)
+        found["valueReference"] = [{"@type": "DefinedTerm", "name": value} for value in column.values]
     return found

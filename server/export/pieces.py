@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -16,20 +17,15 @@ ROWS_A_PIECE = 500
 
 def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
     """Rows as CSV in UTF-8, some hundred rows a piece."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    for number, row in enumerate(rows, start=1):
-        writer.writerow(row)
-        if number % ROWS_A_PIECE == 0:
-            yield stream.getvalue().encode("utf-8")
-            stream.seek(0)
-            stream.truncate()
-    yield stream.getvalue().encode("utf-8")
+    remaining = iter(rows)
+    while batch := list(islice(remaining, ROWS_A_PIECE)):
+        stream = io.StringIO()
+        csv.writer(stream, lineterminator="\n").writerows(batch)
+        yield stream.getvalue().encode("utf-8")
 
 
-def rating_table(session: Session, study: Study) -> Iterator[list[Any]]:
+def rating_table(session: Session, study: Study) -> Iterator[Sequence[Any]]:
     """Header and rows of the tidy ratings CSV."""
     factors = factor_names(session, study)
     yield csv_header(factors)
-    for row in rating_rows(session, study):
-        yield csv_row(row, factors)
+    yield from (csv_row(row, factors) for row in rating_rows(session, study))

@@ -87,6 +87,7 @@ def description(study: Study, definition: Experiment, made: str) -> dict[str, An
         "dateModified": made,
         "citation": definition.source or "",
         "measurementTechnique": "Rating of single clips in a web browser",
+        "keywords": ["rating study", "video clips", *(factor.label for factor in definition.factors)],
         "variableMeasured": variables_measured(list(columns.values())),
     }
 

@@ -1,17 +1,19 @@
 """The tidy CSV: the rows of the view `ratings`, one run after another, in constant memory."""
 
-import csv
 from collections.abc import Iterator, Sequence
-from typing import Any, TextIO
+from typing import Any
 
-from sqlalchemy import select, text
+from sqlalchemy import CursorResult, select, text
 from sqlalchemy.orm import Session
 
-from experiments.ratings import COLUMN_NAMES, csv_header, csv_row
+from experiments.ratings import COLUMN_NAMES, RATING_COLUMNS
 from server.models import Study, StudyRun, StudyVersion
 
-_ROWS = text(f"SELECT {', '.join(COLUMN_NAMES)} FROM ratings WHERE run = :run ORDER BY trial_index, play")  # noqa: S608
 RUNS_AT_ONCE = 200
+_BOOLEANS = {column.name for column in RATING_COLUMNS if column.type == "boolean"}
+# PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
+_COLUMNS = ", ".join(f"CAST({name} AS INTEGER)" if name in _BOOLEANS else name for name in COLUMN_NAMES)
+_ROWS = text(f"SELECT {_COLUMNS} FROM ratings WHERE run = :run ORDER BY trial_index, play")  # noqa: S608
 
 
 def factor_names(session: Session, study: Study) -> tuple[str, ...]:
@@ -26,25 +28,20 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 def rating_rows(session: Session, study: Study) -> Iterator[Sequence[Any]]:
     """Rows of the view (values in the order of COLUMN_NAMES) by start of the run, then trial and play.
 
-    One run's rows are in memory at a time.
+    Booleans are 0 and 1. One run's rows are in memory at a time.
     """
     connection, latest = session.connection(), 0
     while runs := _runs_after(session, study, latest):
         latest = runs[-1].id
         for run in runs:
-            yield from connection.execute(_ROWS, {"run": run.public_id}).all()
+            yield from _plain_rows(connection.execute(_ROWS, {"run": run.public_id}))
 
 
-def write_ratings_csv(session: Session, study: Study, stream: TextIO) -> int:
-    """Write header and rows; return the number of rows."""
-    factors = factor_names(session, study)
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(csv_header(factors))
-    count = 0
-    for row in rating_rows(session, study):
-        writer.writerow(csv_row(row, factors))
-        count += 1
-    return count
+def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
+    """All rows as the driver gives them: SQLAlchemy's row objects would take a tenth of an export's time."""
+    rows = result.cursor.fetchall()
+    result.close()
+    return rows
 
 
 def _runs_after(session: Session, study: Study, latest: int) -> Sequence[Any]:

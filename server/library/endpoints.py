@@ -18,12 +18,12 @@ router = APIRouter(prefix="/api/admin/blinks", tags=["blinks"], responses=ERROR_
 
 
 class RecordedProfile(BaseModel):
-    """One recorded blink of one eye at 300 fps."""
+    """One recorded blink at 300 fps: of one eye, or of both on common samples."""
 
     profile_id: str
     recording: str
     person: str
-    eye: str
+    eye: str = Field(description="left, right, both (`closure` is the left eye's), or empty where unknown.")
     down_frames: int
     up_frames: int
     amplitude: float
@@ -31,6 +31,7 @@ class RecordedProfile(BaseModel):
     source: str
     licence: str
     closure: list[float] = Field(description="Closure per frame at `fps`: 0 open, 1 closed.")
+    closure_other: list[float] = Field(description="The right eye's where `eye` is both; else empty.")
 
 
 class BlinkLibrary(BaseModel):
@@ -53,12 +54,15 @@ def get_library(services: ServicesDep, _who: Viewer) -> BlinkLibrary:
 @lru_cache(maxsize=2)
 def _library(folder: Path, _changed_ns: int) -> BlinkLibrary:
     curves: dict[str, list[float]] = defaultdict(list)
+    others: dict[str, list[float]] = defaultdict(list)
     for row in _rows(folder / "closures.csv"):
         curves[row["profile_id"]].append(float(row["closure"]))
+        if row.get("closure_other"):
+            others[row["profile_id"]].append(float(row["closure_other"]))
     profiles = [
         RecordedProfile.model_validate(
             {name: row[name] for name in RecordedProfile.model_fields if name in row}
-            | {"closure": curves[row["profile_id"]]}
+            | {"closure": curves[row["profile_id"]], "closure_other": others[row["profile_id"]]}
         )
         for row in _rows(folder / "profiles.csv")
     ]

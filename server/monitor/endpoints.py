@@ -1,6 +1,7 @@
 """The live monitor: once, or as a stream of server-sent events."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from datetime import timedelta
 
@@ -10,7 +11,7 @@ from fastapi.responses import StreamingResponse
 
 from server.accounts.identity import NotSignedIn, Viewer, identify
 from server.context import Services, ServicesDep
-from server.errors import ERROR_RESPONSES
+from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
 from server.monitor.heat import HeatMaps
 from server.monitor.schemas import MonitorSnapshot
@@ -18,7 +19,10 @@ from server.studies.lookup import active_definition, find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
 EVERY_S = 2.0
-LONGEST_S = 3600.0
+LOOK_S = 0.2
+"""How often a stream that waits looks whether the server is to end."""
+RETRY_MS = 1000
+"""After so long a browser whose stream ended connects again."""
 _maps = HeatMaps()
 
 
@@ -42,28 +46,38 @@ def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
     return after.model_copy(update={"runs": changed}).model_dump_json()
 
 
+async def _waited(services: Services) -> bool:
+    """Wait for the next look at the study; False, at once, where the server is to end."""
+    for _ in range(round(EVERY_S / LOOK_S)):
+        if services.stopping:
+            return False
+        await asyncio.sleep(LOOK_S)
+    return not services.stopping
+
+
 @router.get("/monitor/stream", response_class=StreamingResponse)
 def stream_monitor(request: Request, services: ServicesDep, _who: Viewer, study: str) -> StreamingResponse:
     """Server-sent events: the whole monitor first, then every two seconds what has changed.
 
-    Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour
-    or when the session ends; the browser then connects again by itself.
+    Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
+    when the session ends or the server does; the browser then connects again by itself.
     """
     first = _snapshot(services, study)
 
     async def events() -> AsyncIterator[str]:
         before: MonitorSnapshot | None = None
         current = first
-        for _ in range(int(LONGEST_S / EVERY_S)):
+        yield f"retry: {RETRY_MS}\n\n"
+        until = time.monotonic() + 60 * services.settings.monitor_stream_minutes
+        while time.monotonic() < until:
             yield f"event: monitor\ndata: {changes(before, current)}\n\n"
             before = current
-            await asyncio.sleep(EVERY_S)
-            if await request.is_disconnected():
+            if not await _waited(services) or await request.is_disconnected():
                 return
             try:
                 await run_in_threadpool(identify, request, services)
-            except NotSignedIn:
+                current = await run_in_threadpool(_snapshot, services, study)
+            except (NotSignedIn, NotFound):  # signed out, or the study was deleted meanwhile
                 return
-            current = await run_in_threadpool(_snapshot, services, study)
 
     return StreamingResponse(events(), media_type="text/event-stream", headers={"x-accel-buffering": "no"})

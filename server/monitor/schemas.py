@@ -45,6 +45,8 @@ class MonitorSnapshot(BaseModel):
     complete: int
     active: int
     dropped: int
+    screened_out: int
+    withdrawn: int
     refused_browsers: int
     funnel: list[FunnelStep]
     expected_finish: datetime | None = Field(

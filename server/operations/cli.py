@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from server.cli_common import migrated_services, out
 from server.clock import now
@@ -45,7 +45,8 @@ def doctor(
     if as_json:
         typer.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:
-        table = Table("", "what", "found", "what to do", box=None, pad_edge=False)
+        whole = (Column(name, overflow="fold") for name in ("found", "what to do"))
+        table = Table("", "what", *whole, box=None, pad_edge=False)
         for finding in findings:
             table.add_row(MARKS[finding.verdict], finding.subject, finding.found, finding.advice)
         out.print(table)

@@ -4,10 +4,12 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Response
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from sqlalchemy import Connection
+from sqlalchemy.orm import Session
 
 from server.context import DatabaseDep, ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.participants import links, runs
+from server.participants import completion, links, runs
 from server.participants.refusals import RunUnknown
 from server.participants.schemas import (
     CalibrationResult,
@@ -23,11 +25,14 @@ from server.participants.schemas import (
     RunStarted,
     RunState,
     Saved,
+    ScreenOut,
     StageChange,
     Unsupported,
 )
 from server.tokens import hash_token
 
+RUN_START_WEIGHT = 8
+"""A run start takes about as long as so many ratings."""
 router = APIRouter(prefix="/api", tags=["participants"], responses=ERROR_RESPONSES)
 _bearer = HTTPBearer(auto_error=False, description="The run token of POST /api/links/{link_token}/runs.")
 
@@ -52,11 +57,19 @@ def get_link(services: ServicesDep, link_token: str) -> LinkState:
 
 
 @router.post("/links/{link_token}/runs", status_code=201, responses={200: {"model": RunStarted}})
-def start_run(services: ServicesDep, link_token: str, start: RunStart, response: Response) -> RunStarted:
+async def start_run(
+    services: ServicesDep, link_token: str, start: RunStart, response: Response
+) -> RunStarted:
     """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
     services.run_starts.hit(hash_token(link_token))
-    with services.database.write() as session:
-        started = links.start_run(services, session, link_token, start)
+
+    def begin(connection: Connection) -> RunStarted:
+        with Session(connection, expire_on_commit=False) as session:
+            started = links.start_run(services, session, link_token, start)
+            session.flush()
+        return started
+
+    started = await services.group_commit.run(link_token, begin, RUN_START_WEIGHT)
     response.status_code = 200 if started.resumed else 201
     return started
 
@@ -130,9 +143,16 @@ def post_events(database: DatabaseDep, token: RunToken, events: Events) -> Recei
 
 @router.post("/run/complete")
 def complete_run(services: ServicesDep, token: RunToken) -> Completion:
-    """Close the run and get the code; refused while trials are unanswered."""
+    """Close the run and get the code; refused while trials or required questions are unanswered."""
     with services.database.write() as session:
-        return runs.complete_run(services, session, token)
+        return completion.complete_run(services, session, token)
+
+
+@router.post("/run/screen-out")
+def screen_out(services: ServicesDep, token: RunToken, found: ScreenOut) -> Saved:
+    """End the run because browser or screen will not do; refused where the study does not screen devices."""
+    with services.database.write() as session:
+        return runs.screen_out_device(services, session, token, found)
 
 
 @router.post("/run/withdraw")

@@ -1,7 +1,7 @@
 """What a link leads to, and how a run begins or is taken up again."""
 
 import secrets
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any, Literal
 from uuid import UUID
 
@@ -20,13 +20,14 @@ from server.participants.refusals import (
     LanguageUnknown,
     LinkExpired,
     LinkUnknown,
-    LinkUsed,
+    RunLeft,
     RunTooOld,
     StudyClosed,
     StudyFull,
     StudyPaused,
 )
 from server.participants.schemas import Gates, LinkedStudy, LinkState, RunStart, RunStarted
+from server.participants.screening import screens_devices
 from server.tokens import derived_token, hash_token, new_public_id, new_token
 from server.versions import LoadedVersion
 
@@ -57,10 +58,10 @@ def recruiter_of(link: Link) -> Recruiter:
 def link_state(services: Services, session: Session, token: str) -> LinkState:
     """What a visitor sees before a run begins."""
     link = find_link(session, token)
-    version = repository.active_version(session, link.study)
-    experiment = services.versions.get(session, version.id).experiment
+    version_id = repository.active_version_id(session, link.study)
+    experiment = services.versions.get(session, version_id).experiment
     run = repository.latest_run(session, link) if link.kind == "personal" else None
-    resumable = run is not None and run.status == "active" and _refusal_to_resume(experiment, run) is None
+    resumable = run is not None and run.status == "active" and refusal_to_resume(experiment, run) is None
     over = run is not None and not resumable and not _restarts(experiment, run)
     return LinkState(
         study=LinkedStudy(
@@ -73,6 +74,7 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
         status="open" if resumable else "used" if over else _status(session, link, link.study, experiment),
         kind=link.kind,
         resumable=resumable,
+        screens_devices=screens_devices(experiment),
         gates=Gates.model_validate(experiment.display.model_dump(include=set(Gates.model_fields))),
     )
 
@@ -86,11 +88,18 @@ def start_run(services: Services, session: Session, token: str, start: RunStart)
         experiment = services.versions.get(session, known.version_id).experiment
         if not _restarts(experiment, known):
             return _resumed(services, experiment, known, start.client_id)
-        known.status = "withdrawn"
-        known.client_id = f"{known.client_id}:{known.public_id}"
-        session.flush()
-    version = repository.active_version(session, study)
-    loaded = services.versions.get(session, version.id)
+        with session.begin_nested():  # should a new visit be refused, the old one stays as it is
+            known.status = "withdrawn"
+            known.client_id = f"{known.client_id}:{known.public_id}"
+            session.flush()
+            return _begun(services, session, link, study, start)
+    return _begun(services, session, link, study, start)
+
+
+def _begun(services: Services, session: Session, link: Link, study: Study, start: RunStart) -> RunStarted:
+    """A new visit, or the reason why there is none."""
+    version_id = repository.active_version_id(session, study)
+    loaded = services.versions.get(session, version_id)
     status = _status(session, link, study, loaded.experiment)
     if status != "open":
         refusal, message = _REFUSALS[status]
@@ -98,7 +107,7 @@ def start_run(services: Services, session: Session, token: str, start: RunStart)
     if start.language not in loaded.experiment.languages:
         near = did_you_mean(start.language, loaded.experiment.languages)
         raise LanguageUnknown(f"The study has no texts in '{start.language}'{near}.")
-    run, run_token = _new_run(services, session, link, study, version.id, loaded, start)
+    run, run_token = _new_run(services, session, link, study, version_id, loaded, start)
     return RunStarted(run_token=run_token, run_id=run.public_id, resumed=False)
 
 
@@ -143,19 +152,30 @@ def _restarts(experiment: Experiment, run: StudyRun) -> bool:
     return experiment.session.resume == "restart" and run.status == "active" and run.consented_at is not None
 
 
-def _refusal_to_resume(experiment: Experiment, run: StudyRun) -> LinkUsed | RunTooOld | None:
+def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunTooOld | None:
+    """Why this run may not be taken up again; None where it may, or where it is over and only looked at."""
     if run.status != "active" or run.preview:
         return None
-    if now() - run.started_at > timedelta(hours=experiment.session.maximum_age_hours):
+    if now() > _oldest(experiment, run):
         hours = f"{experiment.session.maximum_age_hours:g}"
         return RunTooOld(f"This visit began more than {hours} hours ago and cannot be taken up again.")
     if experiment.session.resume == "block" and run.consented_at is not None:
-        return LinkUsed("This study must be done in one go; a visit that was left cannot be taken up again.")
+        return RunLeft("This study must be done in one go; a visit that was left cannot be taken up again.")
     return None
 
 
+def resumable_until(experiment: Experiment, run: StudyRun) -> datetime | None:
+    """Until when a reloaded page may go on by itself, without a connection; None where it must ask first."""
+    kept = experiment.session.resume == "resume" and run.status == "active" and not run.preview
+    return _oldest(experiment, run) if kept else None
+
+
+def _oldest(experiment: Experiment, run: StudyRun) -> datetime:
+    return run.started_at + timedelta(hours=experiment.session.maximum_age_hours)
+
+
 def _resumed(services: Services, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
-    refusal = _refusal_to_resume(experiment, run)
+    refusal = refusal_to_resume(experiment, run)
     if refusal is not None:
         raise refusal
     run.last_seen_at = now()
@@ -180,8 +200,8 @@ def _new_run(
         keep = timedelta(hours=services.settings.preview_keep_hours)
         repository.delete_previews(session, study, now() - keep)
     lease = timedelta(minutes=loaded.experiment.session.lease_minutes)
-    held = repository.held_slots(session, version_id, phase, link.synthetic, lease)
-    slot, seed = assignment.free_slot(held), secrets.randbits(SEED_BITS)
+    slot = repository.free_slot(session, version_id, phase, link.synthetic, lease)
+    seed = secrets.randbits(SEED_BITS)
     trials = assignment.assign(loaded.experiment, seed, slot)
     public_id = new_public_id()
     token = derived_token(services.settings.key, RUN_PURPOSE, public_id)

@@ -3,7 +3,9 @@
 A study's (or link's) `recruiter` is an object with these keys, all but `kind` optional:
 kind: prolific, sona, mturk or generic. id_parameter: which address parameter names the participant.
 redirect_url: where to go at the end; {code}, {run} and {any address parameter} are filled in.
-code_complete, code_failed_check, code_screened_out: completion codes; one is made for each run where absent.
+redirect_screened_out: where to go when screened out; on Prolific redirect_url, where there is a code for it.
+code_complete, code_failed_check: completion codes; one is made for each run where absent.
+code_screened_out: of who is screened out; without it none is shown, so that nobody is paid by mistake.
 """
 
 from collections.abc import Mapping
@@ -19,6 +21,7 @@ ID_PARAMETERS = {
     "mturk": "workerId",
     "generic": "participant",
 }
+WEB_ADDRESS = r"^(https?://.*)?$"
 PROLIFIC_URL = "https://app.prolific.com/submissions/complete?cc={code}"
 
 
@@ -29,7 +32,8 @@ class Recruiter(BaseModel):
 
     kind: Literal["prolific", "sona", "mturk", "generic"] = "generic"
     id_parameter: Code = ""
-    redirect_url: Annotated[str, StringConstraints(max_length=1000, pattern=r"^(https?://.*)?$")] = ""
+    redirect_url: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
+    redirect_screened_out: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
     code_complete: Code = ""
     code_failed_check: Code = ""
     code_screened_out: Code = ""
@@ -38,23 +42,28 @@ class Recruiter(BaseModel):
         """The participant's id among the address parameters; None where it is not there."""
         return parameters.get(self.id_parameter or ID_PARAMETERS[self.kind]) or None
 
-    def code(self, outcome: Literal["complete", "failed_check", "screened_out"], own: str) -> str:
+    def code(self, outcome: Literal["complete", "failed_check"], own: str) -> str:
         """The declared code of this outcome, or the run's own."""
-        declared = {
-            "complete": self.code_complete,
-            "failed_check": self.code_failed_check or self.code_complete,
-            "screened_out": self.code_screened_out,
-        }
-        return declared[outcome] or own
+        failed = self.code_failed_check if outcome == "failed_check" else ""
+        return failed or self.code_complete or own
 
     def redirect(self, code: str, run: str, parameters: Mapping[str, str]) -> str | None:
         """The address to go to with this code; None where there is none."""
         address = self.redirect_url or (PROLIFIC_URL if self.kind == "prolific" else "")
-        if not address:
-            return None
-        for name, value in {**parameters, "code": code, "run": run}.items():
-            address = address.replace("{" + name + "}", quote(value, safe=""))
-        return address
+        return _filled_in(address, code, run, parameters)
+
+    def redirect_screened_out_to(self, run: str, parameters: Mapping[str, str]) -> str | None:
+        """The address for who is screened out. Never the ordinary one of itself: it may grant a credit."""
+        if self.redirect_screened_out:
+            return _filled_in(self.redirect_screened_out, self.code_screened_out, run, parameters)
+        by_code = self.kind == "prolific" and self.code_screened_out
+        return self.redirect(self.code_screened_out, run, parameters) if by_code else None
+
+
+def _filled_in(address: str, code: str, run: str, parameters: Mapping[str, str]) -> str | None:
+    for name, value in {**parameters, "code": code, "run": run}.items():
+        address = address.replace("{" + name + "}", quote(value, safe=""))
+    return address or None
 
 
 NO_RECRUITER = Recruiter()

@@ -15,12 +15,6 @@ class LinkExpired(Conflict):
     code = "link_expired"
 
 
-class LinkUsed(Conflict):
-    """The link was for one visit, and that has been."""
-
-    code = "link_used"
-
-
 class StudyClosed(Conflict):
     """The study takes no more participants."""
 
@@ -43,6 +37,12 @@ class RunTooOld(Conflict):
     """The visit began too long ago to be taken up again."""
 
     code = "run_too_old"
+
+
+class RunLeft(Conflict):
+    """The study must be done in one go, and the visit was left."""
+
+    code = "run_left"
 
 
 class RunUnknown(ApiError):
@@ -68,6 +68,18 @@ class RatingsMissing(Conflict):
     """Trials are still to be answered."""
 
     code = "ratings_missing"
+
+
+class FormsMissing(Conflict):
+    """Forms with required questions are still to be answered."""
+
+    code = "forms_missing"
+
+
+class ScreeningUndeclared(Conflict):
+    """The study does not screen by this."""
+
+    code = "screening_undeclared"
 
 
 class LanguageUnknown(Invalid):

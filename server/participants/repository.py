@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import ARRAY, Table, bindparam, delete, func, insert, literal, select, union_all
 from sqlalchemy.orm import Session
 
 from server.clock import now
@@ -19,6 +19,15 @@ from server.models import (
     StudyVersion,
 )
 from server.tokens import hash_token
+
+# A table instead of the class: with its hundred rows a run the ORM would take most of the time of a start.
+_trials = cast(Table, AssignedTrial.__table__)
+_ADD_TRIALS = insert(_trials)
+# PostgreSQL takes all rows as one statement of columns; sent row by row they would take four times as long.
+_ADD_TRIALS_POSTGRES = insert(_trials).from_select(
+    list(_trials.columns.keys()),
+    select(*(func.unnest(bindparam(column.name, type_=ARRAY(column.type))) for column in _trials.columns)),
+)
 
 
 def link_by_token(session: Session, token: str) -> Link | None:
@@ -41,6 +50,12 @@ def lock_study(session: Session, study_id: int) -> Study:
 def active_version(session: Session, study: Study) -> StudyVersion:
     """The version new runs are made with."""
     query = select(StudyVersion).where(StudyVersion.study_id == study.id)
+    return session.scalars(query.where(StudyVersion.number == study.active_version)).one()
+
+
+def active_version_id(session: Session, study: Study) -> int:
+    """Id of the version new runs are made with; its declaration and manifest are large and stay unread."""
+    query = select(StudyVersion.id).where(StudyVersion.study_id == study.id)
     return session.scalars(query.where(StudyVersion.number == study.active_version)).one()
 
 
@@ -79,17 +94,21 @@ def complete_runs(session: Session, study: Study, phase: str) -> int:
     return session.scalar(query) or 0
 
 
-def held_slots(
-    session: Session, version_id: int, phase: str, synthetic: bool, lease: timedelta
-) -> Sequence[int]:
-    """Slots of runs that are complete, or active and seen within the lease."""
-    query = select(StudyRun.slot).where(
+def free_slot(session: Session, version_id: int, phase: str, synthetic: bool, lease: timedelta) -> int:
+    """The smallest slot that no run holds which is complete, or active and seen within the lease.
+
+    The database looks for it: with thousands of runs, fetching their slots would take most of a start's time.
+    """
+    held = select(StudyRun.slot).where(
         StudyRun.version_id == version_id,
         StudyRun.phase == phase,
         StudyRun.synthetic.is_(synthetic),
         *_holding(lease),
     )
-    return session.scalars(query).all()
+    taken = held.cte("taken")
+    candidates = union_all(select(literal(0).label("slot")), select(taken.c.slot + 1)).subquery()
+    query = select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
+    return int(session.scalars(query).one() or 0)
 
 
 def _holding(lease: timedelta) -> tuple[Any, ...]:
@@ -103,7 +122,12 @@ def _holding(lease: timedelta) -> tuple[Any, ...]:
 
 def add_trials(session: Session, rows: list[dict[str, Any]]) -> None:
     """Store a run's trials in one statement."""
-    session.execute(insert(AssignedTrial), rows)
+    connection = session.connection()
+    if connection.dialect.name == "postgresql":
+        columns = {name: [row[name] for row in rows] for name in rows[0]}
+        connection.execute(_ADD_TRIALS_POSTGRES, columns)
+    else:
+        connection.execute(_ADD_TRIALS, rows)
 
 
 def trials(session: Session, run: StudyRun) -> Sequence[Any]:

@@ -60,6 +60,7 @@ class LinkState(BaseModel):
     status: Literal["open", "closed", "expired", "full", "paused", "used"]
     kind: Literal["general", "personal", "preview"]
     resumable: bool = Field(description="A run of this personal link is under way and can be taken up again.")
+    screens_devices: bool = Field(description="A closed gate ends the visit as screened out.")
     gates: Gates
 
 
@@ -147,6 +148,9 @@ class RunState(BaseModel):
     trials: list[TrialInfo]
     elapsed_ms_before: float
     completion_code: str | None
+    resumable_until: datetime | None = Field(
+        description="Until when a reloaded page may go on without asking; null where it must ask."
+    )
     server_time: datetime
 
 
@@ -211,6 +215,13 @@ class Unsupported(BaseModel):
     data: dict[Key, Any] = Field(default_factory=dict, max_length=50)
 
 
+class ScreenOut(BaseModel):
+    """Why the browser or the screen will not do."""
+
+    reason: Key
+    data: dict[Key, Any] = Field(default_factory=dict, max_length=50)
+
+
 class Saved(BaseModel):
     """The server has it."""
 
@@ -220,9 +231,10 @@ class Saved(BaseModel):
 
 
 class Completion(BaseModel):
-    """The code the participant takes away, and where to go."""
+    """How the run ended, the code the participant takes away, and where to go."""
 
-    completion_code: str
+    status: Literal["complete", "screened_out"]
+    completion_code: str | None
     redirect_url: str | None
 
 

@@ -54,10 +54,11 @@ class Person:
     def take_part(
         self, link_token: str, *, stop_after: int | None = None, progress: Callable[[], None] = lambda: None
     ) -> str | None:
-        """Go through the whole run; return the completion code, None where `stop_after` ended it."""
+        """Go through the whole run; return the code, None where `stop_after` or a screening ended it."""
         self.begin(link_token)
         state = self.client.get("/api/run")
-        self._before(state)
+        if not self._before(state):
+            return None
         due = [trial for trial in state["trials"] if not trial["answered"]]
         while due:
             trial = due.pop(0)
@@ -66,7 +67,8 @@ class Person:
             if self.rate(trial, state["trial"]["scale"]):
                 self._offer_again(trial, due)
             progress()
-        self._forms(state, "after")
+        if not self._forms(state, "after"):
+            return None
         self.client.put("/api/run/stage", {"stage": "debrief"})
         return str(self.client.post("/api/run/complete")["completion_code"])
 
@@ -82,18 +84,24 @@ class Person:
         }
         self.client.token = self.client.post(f"/api/links/{link_token}/runs", start)["run_token"]
 
-    def _before(self, state: dict[str, Any]) -> None:
+    def _before(self, state: dict[str, Any]) -> bool:
+        """Up to the first trial; False where an answer screened this person out."""
         self.client.put("/api/run/consent", {"agreed": True})
-        self._forms(state, "before")
+        if not self._forms(state, "before"):
+            return False
         if state["display"]["calibrate"] != "off":
             self.client.put("/api/run/calibration", _CALIBRATION)
         self.client.put("/api/run/stage", {"stage": "trials"})
+        return True
 
-    def _forms(self, state: dict[str, Any], when: str) -> None:
+    def _forms(self, state: dict[str, Any], when: str) -> bool:
         for form in state["forms"]:
             if form["when"] == when:
                 answers = {item["name"]: self._field(item) for item in form["fields"]}
-                self.client.put(f"/api/run/forms/{form['name']}", {"answers": answers})
+                saved = self.client.put(f"/api/run/forms/{form['name']}", {"answers": answers})
+                if saved["status"] != "active":
+                    return False
+        return True
 
     def _field(self, item: dict[str, Any]) -> Any:
         rng = self.rater.rng

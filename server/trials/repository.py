@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Any, cast
 
-from sqlalchemy import Connection, Table, bindparam, insert, or_, select, update
+from sqlalchemy import Connection, Table, bindparam, func, insert, or_, select, update
 
-from server.models import AssignedTrial, Rating, StudyRun
+from server.models import AssignedTrial, Rating, RunEvent, StudyRun
 
 # Tables instead of classes, and statements built once: the ORM would take twice the time of all the rest.
 _runs = cast(Table, StudyRun.__table__)
@@ -43,6 +43,15 @@ _STORED = select(
     or_(_ratings.c.trial_index == bindparam("trial_index"), _ratings.c.rating_id == bindparam("rating_id")),
 )
 _INSERT = insert(_ratings).inline()
+_FAILED_CHECKS = (
+    select(func.count())
+    .select_from(_ratings.join(_trials))
+    .where(
+        _ratings.c.study_run_id == bindparam("run"),
+        _trials.c.kind == "attention",
+        _ratings.c.response.is_distinct_from(_trials.c.expected_response),
+    )
+)
 _SEEN = (
     update(_runs)
     .where(_runs.c.id == bindparam("run"))
@@ -78,3 +87,21 @@ def add_rating(connection: Connection, values: dict[str, Any]) -> None:
 def mark_seen(connection: Connection, run: int, seen: datetime, elapsed_ms: float, answered: int) -> None:
     """Note when the run was last seen, how far its clock is, and how many trials were settled now."""
     connection.execute(_SEEN, {"run": run, "seen": seen, "elapsed": elapsed_ms, "answered": answered})
+
+
+def failed_checks(connection: Connection, run: int) -> int:
+    """Attention checks of a run answered otherwise than asked."""
+    return connection.scalar(_FAILED_CHECKS, {"run": run}) or 0
+
+
+def end_run(connection: Connection, run: int, status: str) -> None:
+    """Close a run with this status."""
+    connection.execute(update(_runs).where(_runs.c.id == run).values(status=status))
+
+
+def add_event(
+    connection: Connection, run: int, event_id: str, kind: str, data: dict[str, Any], at: datetime
+) -> None:
+    """Store what happened in a run."""
+    values = {"event_id": event_id, "study_run_id": run, "type": kind, "received_at": at, "data": data}
+    connection.execute(insert(RunEvent).values(values))

@@ -58,6 +58,9 @@ class Receipt(BaseModel):
     rule: str = Field(description="The rule that gave the verdict, empty where good.")
     again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
     remaining: int = Field(description="Trials of the run that still need an answer.")
+    status: Literal["active", "complete", "screened_out", "withdrawn"] = Field(
+        description="Of the run: screened_out where this answer ended it."
+    )
 
 
 class RatingSaved(BaseModel):

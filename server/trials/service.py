@@ -9,6 +9,8 @@ from experiments.definition import Experiment
 from server.clock import now
 from server.errors import Conflict, Invalid, NotFound
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
+from server.participants.schemas import RunStatus
+from server.participants.screening import by_attention
 from server.tokens import hash_token
 from server.trials import repository
 from server.trials.schemas import PlaybackLog, RatingIn, Receipt
@@ -65,7 +67,8 @@ def save_rating(
     if known is not None:
         again = not is_settled(trial.kind, known.play, known.verdict, most)
         left = run.trials_total - run.trials_answered
-        return _receipt(rating_id, known.saved_at, (known.verdict, known.verdict_rule), again, left), False
+        ruling = (known.verdict, known.verdict_rule)
+        return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
     _check(run, loaded.experiment, trial.kind, rating)
     ruling = _judge(loaded, trial.version_clip_id, rating)
     saved_at = now()
@@ -76,7 +79,9 @@ def save_rating(
     elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)
     repository.mark_seen(connection, run.id, saved_at, elapsed, answered)
     left = run.trials_total - run.trials_answered - answered
-    return _receipt(rating_id, saved_at, ruling, not settles and not before, left), True
+    screened = trial.kind == "attention" and by_attention(connection, run.id, loaded.experiment)
+    status: RunStatus = "screened_out" if screened else run.status
+    return _receipt(rating_id, saved_at, ruling, not settles and not before, left, status), True
 
 
 def _known(stored: list[Any], rating_id: str, rating: RatingIn) -> Any:
@@ -160,7 +165,9 @@ def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: d
     }
 
 
-def _receipt(rating_id: str, saved_at: datetime, ruling: Ruling, again: bool, remaining: int) -> Receipt:
+def _receipt(
+    rating_id: str, saved_at: datetime, ruling: Ruling, again: bool, remaining: int, status: RunStatus
+) -> Receipt:
     return Receipt(
         rating_id=rating_id,
         saved_at=saved_at,
@@ -168,4 +175,5 @@ def _receipt(rating_id: str, saved_at: datetime, ruling: Ruling, again: bool, re
         rule=ruling[1],
         again=again,
         remaining=remaining,
+        status=status,
     )

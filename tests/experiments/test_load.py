@@ -9,6 +9,7 @@ from experiments.load import (
     locate,
     parse_experiment,
 )
+from experiments.rules import ScreenFormAnswer
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")
 
@@ -77,3 +78,57 @@ def test_shipped_experiments_speak_every_language_they_list(name: str) -> None:
         for form in experiment.forms:
             assert form.title[language]
             assert all(field.label[language] for field in form.fields)
+
+
+SCREENED = """
+[[screening]]
+rule = "form_answer"
+form = "{form}"
+field = "{field}"
+{condition}
+"""
+
+
+def screened(form: str = "demographics", field: str = "age", condition: str = "above = 80") -> str:
+    rule = SCREENED.format(form=form, field=field, condition=condition)
+    return EXP1.replace("[[exclusions]]", rule + "\n[[exclusions]]", 1)
+
+
+def test_screening_rules_are_part_of_the_declaration() -> None:
+    rule = parse_experiment(screened()).screening[0]
+    assert isinstance(rule, ScreenFormAnswer)
+    assert [rule.screens_out(age) for age in (18, 80, 81)] == [False, False, True]
+    both = ScreenFormAnswer(form="a", field="b", refused=("x", "y"))
+    assert [both.screens_out(given) for given in ("x", ["z", "y"], "z", ["z"], None)] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (screened(form="demografics"), "no form is called 'demografics'; did you mean 'demographics'?"),
+        (screened(field="agee"), "has no field 'agee'; did you mean 'age'?"),
+        (screened(condition='refused = ["90"]'), "'age' is a number: give `below` or `above`"),
+        (screened(condition=""), "'age' is a number: give `below` or `above`"),
+        (screened(field="vision"), "'vision' is a choice: give `refused`"),
+        (screened(field="vision", condition='refused = ["blnd"]'), "'vision' has no option 'blnd'"),
+        (screened(condition="abov = 80"), "unknown key 'abov'; did you mean 'above'?"),
+    ],
+)
+def test_a_screening_rule_must_fit_the_forms(text: str, message: str) -> None:
+    with pytest.raises(DefinitionError) as caught:
+        parse_experiment(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_definition_without_screening_keeps_the_hash_it_had_before_there_was_any() -> None:
+    plain = load_experiment("exp1").model_dump(mode="json")
+    assert "screening" not in plain  # built clips carry the hash of this dump
+    assert "screened_out" not in plain["texts"]["en"]
+    assert definition_sha256(parse_experiment(screened())) != definition_sha256(load_experiment("exp1"))

@@ -125,10 +125,11 @@ def add_study(
     name: str = "",
     status: str = "live",
     frames: int = 4,
+    clip_bytes: int = 0,
 ) -> StudyInDatabase:
-    """Make tiny clips for a declaration, and take both in."""
+    """Make tiny clips for a declaration (at least `clip_bytes` each), and take both in."""
     experiment = parse_experiment(text)
-    manifest = make_clip_folder(experiment, folder, frames=frames)
+    manifest = make_clip_folder(experiment, folder, frames=frames, clip_bytes=clip_bytes)
     store_clips(services.clips, manifest, folder)
     with services.database.write() as session:
         study = create_study(session, name or experiment.name, experiment, None)
@@ -178,8 +179,17 @@ class Participant:
         body |= {"time_elapsed": 1000.0 * (trial["trial_index"] + 1), "playback": playback} | changes
         return self.request("PUT", f"/ratings/{rating_id or uuid.uuid4()}", body)
 
+    def answer_forms(self, **changes: Any) -> None:
+        """Answer the form of the short study."""
+        assert self.request("PUT", "/forms/about", {"answers": {"age": 30} | changes}).status_code == 200
+
+    def answer_all(self) -> None:
+        """Everything a run needs to be complete: the form and the trials."""
+        self.answer_forms()
+        self.rate_all()
+
     def rate_all(self) -> None:
-        """Answer everything, attention checks as asked."""
+        """Rate every trial, attention checks as asked."""
         for trial in self.state()["trials"]:
             if not trial["answered"]:
                 asked = [

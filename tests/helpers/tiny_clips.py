@@ -16,15 +16,19 @@ from experiments.load import definition_sha256
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest
 
 BARCODE_CELL_PX, BARCODE_BITS = 16, 12
+BOX_HEAD_BYTES = 8
 
 
-def make_clip_folder(experiment: Experiment, folder: Path, *, frames: int = 4, fps: int = 30) -> Manifest:
-    """One playable mp4 for each clip of the design, and the manifest that describes them."""
+def make_clip_folder(
+    experiment: Experiment, folder: Path, *, frames: int = 4, fps: int = 30, clip_bytes: int = 0
+) -> Manifest:
+    """One playable mp4 for each clip of the design, of at least `clip_bytes`, and their manifest."""
     folder.mkdir(parents=True, exist_ok=True)
     video, clips = encoded_video(frames, fps), []
     for spec in design.clips(experiment):
         # A box that players skip makes each file its own, without encoding each anew.
-        data = video + _free_box(f"{spec.cell}/{spec.exemplar}".encode())
+        own = f"{spec.cell}/{spec.exemplar}".encode()
+        data = video + _free_box(own.ljust(clip_bytes - len(video) - BOX_HEAD_BYTES, b"."))
         sha256 = hashlib.sha256(data).hexdigest()
         file = f"{sha256[:16]}.mp4"
         (folder / file).write_bytes(data)
@@ -87,4 +91,4 @@ def _picture(number: int, width: int, height: int) -> np.ndarray:
 
 
 def _free_box(content: bytes) -> bytes:
-    return (len(content) + 8).to_bytes(4, "big") + b"free" + content
+    return (len(content) + BOX_HEAD_BYTES).to_bytes(4, "big") + b"free" + content

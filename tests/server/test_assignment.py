@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from experiments import design
 from experiments.definition import Experiment
 from experiments.load import load_experiment, parse_experiment
-from server.assignment import assign, block_orders, free_slot
+from server.assignment import assign, block_orders
 from tests.helpers.studies import SHORT
 
 seeds = st.integers(min_value=0, max_value=2**53 - 1)
@@ -122,11 +122,3 @@ def test_each_block_has_its_attention_checks_never_first(seed: int) -> None:
     assert all(trial.clip is None and 1 <= (trial.expected_response or 0) <= 7 for trial in checks)
     first = {block: next(trial for trial in trials if trial.block == block) for block in (1, 2)}
     assert all(trial.kind == "main" for trial in first.values())
-
-
-@relaxed
-@given(st.sets(st.integers(min_value=0, max_value=50)))
-def test_the_free_slot_is_the_smallest_not_held(held: set[int]) -> None:
-    slot = free_slot(held)
-    assert slot not in held
-    assert set(range(slot)) <= held

@@ -4,9 +4,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.app import create_app
+from server.context import Services
 from server.settings import Settings
-
-pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+from tests.helpers.studies import StudyInDatabase
 
 
 @pytest.fixture
@@ -28,6 +28,14 @@ def test_pages_are_checked_each_time_and_assets_kept(client: TestClient, pages: 
     asset = client.get("/assets/participant/page-1a2b.js")
     assert asset.headers["cache-control"] == "public, max-age=31536000, immutable"
     assert asset.headers["content-type"].startswith("text/javascript")
+
+
+def test_the_service_worker_is_at_the_root_and_checked_each_time(client: TestClient, pages: Path) -> None:
+    assert client.get("/service-worker.js").status_code == 404
+    (pages / "participant" / "service-worker.js").write_text("self;")
+    worker = client.get("/service-worker.js")
+    assert (worker.status_code, worker.text, worker.headers["cache-control"]) == (200, "self;", "no-cache")
+    assert worker.headers["content-type"].startswith("text/javascript")
 
 
 def test_every_admin_address_is_the_admin_page_with_a_nonce_of_its_own(
@@ -81,3 +89,13 @@ def test_readiness_tells_of_missing_tables(client: TestClient, settings: Setting
         answer = other.get("/readyz")
     assert answer.status_code == 503
     assert "server database upgrade" in answer.json()["error"]["message"]
+
+
+def test_readiness_tells_of_clips_that_cannot_be_read(
+    client: TestClient, services: Services, study: StudyInDatabase
+) -> None:
+    assert client.get("/readyz").status_code == 200
+    services.settings.clip_folder.rename(services.settings.data_folder / "unmounted")
+    answer = client.get("/readyz")
+    assert answer.status_code == 503
+    assert "No such file" in answer.json()["error"]["message"]

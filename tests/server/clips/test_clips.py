@@ -21,7 +21,6 @@ def clip(services: Services) -> None:
 
 
 @pytest.mark.usefixtures("clip")
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 class TestServing:
     def test_a_whole_clip_may_be_kept_for_ever(self, client: TestClient) -> None:
         answer = client.get(URL)

@@ -11,14 +11,15 @@ from fastapi.testclient import TestClient
 from experiments.errors import InputError
 from server.app import create_app
 from server.clips.s3 import S3Store, open_s3
+from server.context import open_services
 from server.settings import Settings
+from tests.helpers.studies import add_study
 
 moto_server = pytest.importorskip("moto.server", reason="moto is not installed")
 CONTENT = bytes(range(256)) * 9000  # more than two pieces
 SHA256 = hashlib.sha256(CONTENT).hexdigest()
 
 pytestmark = [
-    pytest.mark.parametrize("database_url", ["sqlite"], indirect=True),
     # boto3 tells of the end of its support for this Python; requirements say 3.11.
     pytest.mark.filterwarnings("ignore::boto3.exceptions.PythonDeprecationWarning"),
     pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning"),
@@ -97,3 +98,31 @@ def test_browsers_may_fetch_from_the_store_itself(
     fetched = httpx.get(answer.headers["location"], headers={"range": "bytes=0-9"})
     assert fetched.content[:10] == CONTENT[:10]
     assert "X-Amz-Signature" in answer.headers["location"]
+
+
+def test_readiness_asks_the_store(store: S3Store, s3_settings: Settings) -> None:
+    study = add_study(open_services(s3_settings), s3_settings.data_folder / "made")
+    with TestClient(create_app(s3_settings)) as client:
+        assert client.get("/readyz").status_code == 200
+        for clip in store.client.list_objects_v2(Bucket="clips")["Contents"]:
+            store.client.delete_object(Bucket="clips", Key=clip["Key"])
+        answer = client.get("/readyz")
+    assert answer.status_code == 503
+    assert "bucket clips" in answer.json()["error"]["message"]
+    study.services.database.close()
+
+
+def test_readiness_before_the_first_study_needs_the_bucket_alone(
+    store: S3Store, s3_settings: Settings
+) -> None:
+    with TestClient(create_app(s3_settings)) as client:
+        assert client.get("/readyz").status_code == 200
+        store.client.delete_bucket(Bucket="clips")
+        assert client.get("/readyz").status_code == 503
+
+
+def test_a_store_that_does_not_answer_is_told_by_503(s3_settings: Settings) -> None:
+    away = s3_settings.model_copy(update={"s3_endpoint": "http://127.0.0.1:1"})
+    with TestClient(create_app(away)) as client:
+        answer = client.get(f"/clips/{SHA256}.mp4")
+    assert (answer.status_code, answer.json()["error"]["code"]) == (503, "clips_away")

@@ -1,7 +1,6 @@
 import csv
 import io
 import json
-import zipfile
 
 from experiments.ratings import csv_header
 from server.export.codebook import RUN_COLUMNS
@@ -39,23 +38,6 @@ def test_the_codebook_explains_every_exported_column(viewer: Admin, study: Study
     text = viewer.get("/studies/short/data/codebook.md").text
     for name in [*csv_header(["character", "speed"]), *(column.name for column in RUN_COLUMNS)]:
         assert f"| {name} |" in text
-
-
-def test_the_psych_ds_folder_follows_the_specification(viewer: Admin, participant: Participant) -> None:
-    participant.agree().rate_all()
-    archive = zipfile.ZipFile(io.BytesIO(viewer.get("/studies/short/data/psych-ds.zip").content))
-    assert archive.testzip() is None
-    description = json.loads(archive.read("short/dataset_description.json"))
-    assert description["@type"] == "Dataset"
-    assert description["@context"] == "https://schema.org/"
-    measured = {variable["name"] for variable in description["variableMeasured"]}
-    tables = [name for name in archive.namelist() if name.startswith("short/data/")]
-    assert len(tables) == 2
-    for name in tables:
-        assert name.endswith("_data.csv")
-        rows = table(archive.read(name).decode("utf-8"))
-        assert set(rows[0]) <= measured
-        assert {len(row) for row in rows} == {len(rows[0])}
 
 
 def test_an_unknown_study_is_refused_before_the_download_begins(

@@ -5,7 +5,8 @@ from typing import Any
 
 from experiments.ratings import COLUMN_NAMES, RATING_COLUMNS, csv_header, factors_in_header
 from server.context import Services
-from server.export.ratings_csv import rating_rows, write_ratings_csv
+from server.export.formats import ratings_csv
+from server.export.ratings_csv import rating_rows
 from server.models import Study
 from tests.helpers.studies import Participant
 
@@ -25,11 +26,11 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
     for trial, comment in zip(participant.state()["trials"], comments, strict=False):
         participant.rate(trial, comment=comment)
     with services.database.read() as session:
-        study, stream = session.query(Study).one(), io.StringIO()
-        assert write_ratings_csv(session, study, stream) == 5
+        study = session.query(Study).one()
+        stream = io.StringIO(b"".join(ratings_csv(session, study)).decode("utf-8"), newline="")
         rows = [dict(zip(COLUMN_NAMES, row, strict=True)) for row in rating_rows(session, study)]
-    stream.seek(0)
     read = list(csv.DictReader(stream))
+    assert len(read) == 5
     factors = factors_in_header(read[0])
     assert factors == ["character", "speed"]
     for row, line in zip(rows, read, strict=True):
@@ -48,6 +49,5 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
 
 def test_an_empty_study_exports_its_header(services: Services, study: Any) -> None:
     with services.database.read() as session:
-        stream = io.StringIO()
-        assert write_ratings_csv(session, session.query(Study).one(), stream) == 0
-    assert stream.getvalue().strip() == ",".join(csv_header(["character", "speed"]))
+        exported = b"".join(ratings_csv(session, session.query(Study).one())).decode("utf-8")
+    assert exported.strip() == ",".join(csv_header(["character", "speed"]))

@@ -1,8 +1,6 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from server.context import Services, open_services
 from server.operations.checks import CHECKS, Finding
 from server.operations.doctor import examine
@@ -26,7 +24,6 @@ def test_an_installation_in_order(services: Services, study: StudyInDatabase) ->
     assert found["studies"].found == "1"
 
 
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 class TestTroubles:
     def test_every_trouble_comes_with_advice(self, services: Services, study: StudyInDatabase) -> None:
         for path in services.settings.clip_folder.rglob("*.mp4"):

@@ -70,7 +70,6 @@ def test_the_configuration_is_one_that_logging_takes(form: str) -> None:
     assert configuration["formatters"]["lines"]["()"] is expected
 
 
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 @pytest.mark.parametrize(("which", "lines"), [("all", 1), ("none", 0), ("problems", 0)])
 def test_a_request_is_logged_by_its_route(
     client: TestClient, services: Services, caplog: pytest.LogCaptureFixture, which: Any, lines: int

@@ -1,4 +1,3 @@
-import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -42,7 +41,6 @@ def test_answers_and_runs_are_counted_by_route_without_any_token(
     assert participant.link not in text
 
 
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_an_address_nobody_declared_makes_no_label_of_its_own(client: TestClient, services: Services) -> None:
     with_token(client, services)
     client.get("/some/secret/thing")
@@ -53,7 +51,6 @@ def test_an_address_nobody_declared_makes_no_label_of_its_own(client: TestClient
     assert not any("secret" in str(label) for label in labels)
 
 
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 class TestWhoMayAsk:
     def test_without_a_token_this_machine_alone(self, client: TestClient, services: Services) -> None:
         assert client.get("/metrics").status_code == 403  # the test client comes from "testclient"

@@ -13,8 +13,6 @@ from server.settings import Settings
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
-sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-
 
 def test_one_participant_can_neither_read_nor_write_anothers_run(
     client: TestClient, study: StudyInDatabase
@@ -40,7 +38,6 @@ def test_one_participant_can_neither_read_nor_write_anothers_run(
         assert second.rate(trial).status_code in (401, 403, 404)
 
 
-@sqlite
 def test_every_answer_carries_the_headers(client: TestClient, study: StudyInDatabase) -> None:
     for path in ("/healthz", "/api/openapi.json", "/nothing", f"/api/links/{study.link_token}", "/admin/"):
         headers = client.get(path).headers
@@ -56,7 +53,6 @@ def test_every_answer_carries_the_headers(client: TestClient, study: StudyInData
         assert "server" not in headers
 
 
-@sqlite
 def test_behind_https_browsers_are_told_to_stay_there(settings: Settings) -> None:
     secure = settings.model_copy(update={"public_url": "https://lab.example"})
     with TestClient(create_app(secure)) as client:
@@ -64,7 +60,6 @@ def test_behind_https_browsers_are_told_to_stay_there(settings: Settings) -> Non
     assert int(header.split("max-age=")[1].split(";")[0]) >= 31536000
 
 
-@sqlite
 @pytest.mark.parametrize(
     "headers",
     [
@@ -80,7 +75,6 @@ def test_a_change_asked_for_by_another_site_is_refused(
     assert answer.status_code == 403
 
 
-@sqlite
 def test_run_starts_of_one_link_are_limited(
     settings: Settings, study: StudyInDatabase, services: Services
 ) -> None:
@@ -89,7 +83,6 @@ def test_run_starts_of_one_link_are_limited(
     assert statuses == [201, 201, 201, 429, 429]
 
 
-@sqlite
 def test_sign_ins_of_one_account_are_limited(settings: Settings, owner: Admin) -> None:
     with TestClient(create_app(settings.model_copy(update={"logins_per_minute": 3}))) as client:
         body = {"name": owner.name, "password": "wrong guess again"}

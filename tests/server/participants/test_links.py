@@ -1,6 +1,6 @@
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +84,7 @@ def test_a_personal_link_goes_on_from_another_device(client: TestClient, study: 
         "status": "open",
         "kind": "personal",
         "resumable": True,
+        "screens_devices": False,
     }
     assert second.start().status_code == 200
     assert second.run_id == first.run_id
@@ -95,7 +96,7 @@ def test_a_personal_link_is_used_once_complete_but_shows_the_code_again(
 ) -> None:
     link = study.link("personal", label="P08")
     participant = Participant(client, link).agree()
-    participant.rate_all()
+    participant.answer_all()
     code = participant.request("POST", "/complete").json()["completion_code"]
     assert client.get(f"/api/links/{link}").json()["status"] == "used"
     again = Participant(client, link)
@@ -118,7 +119,7 @@ def test_a_prolific_participant_goes_on_from_another_device(
 
 
 @pytest.mark.parametrize(
-    ("policy", "outcome"), [("resume", 200), ("restart", 201), ("block", (409, "link_used"))]
+    ("policy", "outcome"), [("resume", 200), ("restart", 201), ("block", (409, "run_left"))]
 )
 def test_coming_back_follows_the_declared_policy(
     client: TestClient, services: Services, tmp_path: Path, policy: str, outcome: Any
@@ -130,6 +131,34 @@ def test_coming_back_follows_the_declared_policy(
     answer = participant.start()
     assert (answer.status_code if answer.status_code < 300 else error_code(answer)) == outcome
     assert (participant.run_id != first) == (policy == "restart")
+
+
+@pytest.mark.parametrize(
+    ("policy", "until_h", "outcome"), [("resume", 72, 200), ("restart", None, 200), ("block", None, 409)]
+)
+def test_a_page_that_kept_its_token_follows_the_same_policy(
+    client: TestClient, services: Services, tmp_path: Path, policy: str, until_h: int | None, outcome: int
+) -> None:
+    text = SHORT.replace("[session]", f'[session]\nresume = "{policy}"').replace('"short"', f'"{policy}"')
+    study = add_study(services, tmp_path / "clips", text)
+    participant = Participant(client, study.link_token)
+    participant.start()
+    before = participant.state()
+    limit = datetime.fromisoformat(before["resumable_until"]) if until_h else None
+    server_time = datetime.fromisoformat(before["server_time"])
+    assert limit is None or abs(limit - server_time - timedelta(hours=72)) < timedelta(minutes=1)
+    participant.request("PUT", "/consent", {"agreed": True})
+    answer = participant.request("GET", "")
+    assert answer.status_code == outcome
+    assert policy != "block" or error_code(answer) == (409, "run_left")
+
+
+def test_a_kept_token_does_not_take_up_a_run_that_is_too_old(
+    participant: Participant, services: Services
+) -> None:
+    participant.agree()
+    age_runs(services, started_at=timedelta(hours=73))
+    assert error_code(participant.request("GET", "")) == (409, "run_too_old")
 
 
 def test_a_run_that_is_too_old_is_not_taken_up(
@@ -148,7 +177,7 @@ def test_slots_are_dealt_evenly_and_a_drop_outs_slot_returns(
     client: TestClient, study: StudyInDatabase, services: Services
 ) -> None:
     people = [Participant(client, study.link_token).agree() for _ in range(4)]
-    people[0].rate_all()
+    people[0].answer_all()
     people[0].request("POST", "/complete")
     people[2].request("POST", "/withdraw")
     with services.database.write() as session:
@@ -199,7 +228,7 @@ def test_a_preview_works_on_a_draft_and_counts_for_nothing(
 ) -> None:
     study.change(status="draft", quota=0)
     preview = Participant(client, study.link("preview")).agree()
-    preview.rate_all()
+    preview.answer_all()
     assert preview.request("POST", "/complete").status_code == 200
     with services.database.read() as session:
         from sqlalchemy import text

@@ -157,9 +157,20 @@ def test_completion_waits_for_every_trial(participant: Participant) -> None:
     assert answer.json()["error"]["details"]["missing"] == [trial["trial_index"] for trial in trials]
 
 
-def test_completion_gives_the_same_code_each_time(participant: Participant) -> None:
+def test_completion_waits_for_the_required_forms(participant: Participant) -> None:
     participant.agree()
     participant.rate_all()
+    answer = participant.request("POST", "/complete")
+    assert error_code(answer) == (409, "forms_missing")
+    assert answer.json()["error"]["details"]["missing"] == ["about"]
+    assert "about" in answer.json()["error"]["message"]
+    participant.answer_forms()
+    assert participant.request("POST", "/complete").json()["status"] == "complete"
+
+
+def test_completion_gives_the_same_code_each_time(participant: Participant) -> None:
+    participant.agree()
+    participant.answer_all()
     answers = [participant.request("POST", "/complete").json() for _ in range(2)]
     assert answers[0] == answers[1]
     assert len(answers[0]["completion_code"]) == 10
@@ -179,7 +190,7 @@ def test_codes_and_redirects_of_a_recruiter(client: TestClient, study: StudyInDa
     for trial in [trial for trial in trials if trial["kind"] == "attention"] if not honest else []:
         asked = int(trial["prompt"].split("**")[1])
         assert participant.rate(trial, asked % 7 + 1).status_code == 201
-    participant.rate_all()
+    participant.answer_all()
     answer = participant.request("POST", "/complete").json()
     code = "GOOD1" if honest else "BAD1"
     assert answer["completion_code"] == code
@@ -191,7 +202,7 @@ def test_a_study_closes_itself_when_enough_are_complete(
 ) -> None:
     study.change(quota=1)
     participant = Participant(client, study.link_token).agree()
-    participant.rate_all()
+    participant.answer_all()
     participant.request("POST", "/complete")
     with services.database.read() as session:
         assert session.query(Study).one().status == "closed"
@@ -201,7 +212,7 @@ def test_a_study_closes_itself_when_enough_are_complete(
 def test_a_closed_study_lets_those_inside_finish(client: TestClient, study: StudyInDatabase) -> None:
     participant = Participant(client, study.link_token).agree()
     study.change(status="closed")
-    participant.rate_all()
+    participant.answer_all()
     assert participant.request("POST", "/complete").status_code == 200
 
 

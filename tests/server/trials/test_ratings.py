@@ -163,7 +163,6 @@ def test_many_at_once_are_each_stored_once(
         assert {run.trials_answered for run in session.query(StudyRun)} == {12}
 
 
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 @settings(deadline=None, max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 11), st.integers(1, 7)), max_size=10))
 def test_whatever_is_sent_a_trial_has_one_first_play(

@@ -1,0 +1,77 @@
+"""The end of a run: complete, or screened out; the code and the way back."""
+
+from typing import Literal
+
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from experiments.rules import ExcludeAttention
+from server.clock import now
+from server.context import Services
+from server.models import StudyRun
+from server.participants import repository
+from server.participants.links import recruiter_of
+from server.participants.lookup import find_run
+from server.participants.refusals import FormsMissing, RatingsMissing, RunClosed
+from server.participants.schemas import Completion
+from server.participants.trial_list import trial_list
+from server.versions import LoadedVersion
+
+
+def complete_run(services: Services, session: Session, token: str) -> Completion:
+    """Close the run once everything is answered, and give the code; asking again gives the same."""
+    run = find_run(session, token, lock=True)
+    loaded = services.versions.get(session, run.version_id)
+    if run.status == "active":
+        _need_everything(session, run, loaded)
+        run.status, run.stage, run.completed_at = "complete", "debrief", now()
+        run.last_seen_at = run.completed_at
+        _close_when_full(session, run)
+    if run.status == "screened_out":
+        return _screened_out(run)
+    if run.status != "complete":
+        raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")
+    code = completion_code(session, run, loaded)
+    address = recruiter_of(run.link).redirect(code, run.public_id, run.recruiter_parameters)
+    return Completion(status="complete", completion_code=code, redirect_url=address)
+
+
+def _need_everything(session: Session, run: StudyRun, loaded: LoadedVersion) -> None:
+    trials = [trial.trial_index for trial in trial_list(session, run, loaded) if not trial.answered]
+    if trials:
+        message = f"{len(trials)} of {run.trials_total} trials are still to be answered."
+        raise RatingsMissing(message, missing=trials)
+    answered = repository.answered_forms(session, run)
+    forms = [name for name in _required_forms(loaded.experiment) if name not in answered]
+    if forms:
+        message = f"Expected answers to every required question; still to be answered: {', '.join(forms)}."
+        raise FormsMissing(message, missing=forms)
+
+
+def _required_forms(experiment: Experiment) -> list[str]:
+    return [form.name for form in experiment.forms if any(field.required for field in form.fields)]
+
+
+def completion_code(session: Session, run: StudyRun, loaded: LoadedVersion) -> str:
+    """The code of a complete run: another one where it failed too many attention checks."""
+    rules = [rule for rule in loaded.experiment.exclusions if isinstance(rule, ExcludeAttention)]
+    outcome: Literal["complete", "failed_check"] = "complete"
+    if rules and repository.failed_checks(session, run) > rules[0].more_than:
+        outcome = "failed_check"
+    return recruiter_of(run.link).code(outcome, run.completion_code)
+
+
+def _screened_out(run: StudyRun) -> Completion:
+    recruiter = recruiter_of(run.link)
+    address = recruiter.redirect_screened_out_to(run.public_id, run.recruiter_parameters)
+    code = recruiter.code_screened_out or None
+    return Completion(status="screened_out", completion_code=code, redirect_url=address)
+
+
+def _close_when_full(session: Session, run: StudyRun) -> None:
+    study = repository.lock_study(session, run.study_id)
+    if study.quota is None or study.status not in ("pilot", "live") or run.preview:
+        return
+    session.flush()
+    if repository.complete_runs(session, study, run.phase) >= study.quota:
+        study.status, study.closed_at = "closed", now()

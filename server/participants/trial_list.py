@@ -1,0 +1,49 @@
+"""A run's trials as the page gets them: in stored order, with what is still to be shown of each."""
+
+from sqlalchemy.orm import Session
+
+from server.models import StudyRun
+from server.participants import repository
+from server.participants.schemas import TrialInfo
+from server.trials.verdict import is_settled
+from server.versions import LoadedVersion
+
+
+def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[TrialInfo]:
+    """Every trial of a run; nothing in it tells the participant which cell a clip is of."""
+    done = repository.plays(session, run)
+    most = loaded.experiment.playback.max_repeats
+    trials = []
+    for row in repository.trials(session, run):
+        clip = loaded.clips[row.version_clip_id] if row.version_clip_id is not None else None
+        plays = done.get(row.trial_index, [])
+        settled = any(is_settled(row.kind, play, verdict, most) for play, verdict in plays)
+        trials.append(
+            TrialInfo(
+                trial_index=row.trial_index,
+                kind=row.kind,
+                block=row.block,
+                clip_sha256=clip.sha256 if clip else None,
+                clip_url=f"/clips/{clip.sha256}.mp4" if clip else None,
+                frames=clip.frames if clip else None,
+                fps=clip.fps if clip else None,
+                bytes=clip.bytes if clip else None,
+                width_px=clip.width_px if clip else None,
+                height_px=clip.height_px if clip else None,
+                width_mm=clip.width_mm if clip else None,
+                inter_ocular_px=loaded.inter_ocular_px if clip else None,
+                prompt=_prompt(loaded, run.language, row.expected_response),
+                plays_done=len(plays),
+                plays_wanted=len(plays) if settled else len(plays) + 1,
+                answered=settled,
+            )
+        )
+    return trials
+
+
+def _prompt(loaded: LoadedVersion, language: str, expected: int | None) -> str | None:
+    if expected is None:
+        return None
+    texts = loaded.experiment.attention.text
+    text = texts.get(language) or texts.get("en") or next(iter(texts.values()))
+    return text.replace("{response}", str(expected))

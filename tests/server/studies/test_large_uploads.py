@@ -1,0 +1,54 @@
+"""Uploads of two gigabytes and more are refused before they are stored, in words that say what would do."""
+
+import io
+import zipfile
+
+import pytest
+
+from server.context import Services
+from server.studies import uploads
+from tests.helpers.admins import Admin
+
+pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+PIECE = b"0" * (1 << 20)
+
+
+def test_a_request_that_says_it_is_too_large_is_not_read(services: Services, experimenter: Admin) -> None:
+
+    size = services.settings.max_upload_bytes + 1
+    answer = experimenter.client.post(
+        "/api/admin/uploads",
+        content=iter([PIECE]),
+        headers={"content-length": str(size), "content-type": "multipart/form-data; boundary=x"},
+    )
+    assert (answer.status_code, answer.json()["error"]["code"]) == (413, "too_large")
+    assert "at most 2048 MiB" in answer.json()["error"]["message"]
+    folder = services.settings.upload_folder
+    assert not folder.exists() or list(folder.iterdir()) == []
+
+
+def test_a_zip_that_unpacks_to_more_than_the_limit_is_refused_unopened(
+    services: Services, experimenter: Admin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "MOST_UNPACKED_BYTES", 2 << 20)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        for number in range(3):
+            archive.writestr(f"clip_{number}.mp4", PIECE)
+    answer = experimenter.client.post("/api/admin/uploads", files={"files": ("clips.zip", packed.getvalue())})
+    assert (answer.status_code, answer.json()["error"]["code"]) == (413, "too_large")
+    assert "unpacks to 3 MiB; 2 is the most" in answer.json()["error"]["message"]
+    assert list(services.settings.upload_folder.iterdir()) == []
+
+
+def test_a_zip_that_lies_about_its_sizes_is_stopped_on_the_way(
+    services: Services, experimenter: Admin
+) -> None:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("clip.mp4", PIECE)
+    # The directory says 1000 bytes where a mebibyte follows.
+    lying = packed.getvalue().replace(len(PIECE).to_bytes(4, "little"), (1000).to_bytes(4, "little"))
+    answer = experimenter.client.post("/api/admin/uploads", files={"files": ("clips.zip", lying)})
+    assert answer.status_code in (413, 422), answer.text
+    assert list(services.settings.upload_folder.iterdir()) == []

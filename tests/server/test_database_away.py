@@ -1,0 +1,55 @@
+"""A database that is away is told by 503, so that pages send again, and by one line in the log."""
+
+import logging
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+from sqlalchemy.exc import DBAPIError
+
+from server.app import create_app
+from server.context import Services
+from server.db import Database, is_away
+from server.settings import Settings
+from tests.helpers.studies import Participant
+
+
+def refused(url: str, statement: str = "SELECT 1") -> DBAPIError:
+    database = Database(url)
+    with pytest.raises(DBAPIError) as caught, database.engine.connect() as connection:
+        connection.exec_driver_sql(statement)
+    database.close()
+    return caught.value
+
+
+def test_what_cannot_be_reached_is_away(tmp_path: Path) -> None:
+    assert is_away(refused("postgresql+psycopg://me@127.0.0.1:1/none"))
+    assert is_away(refused(f"sqlite:///{tmp_path / 'no folder' / 'file'}"))
+    assert not is_away(refused(f"sqlite:///{tmp_path / 'file'}", "SELECT nothing"))
+    assert not is_away(ValueError())
+
+
+def test_a_request_gets_503_and_the_log_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    settings = Settings(data_folder=tmp_path, database_url="postgresql://me@127.0.0.1:1/none")
+    with caplog.at_level(logging.ERROR, "palpebra"), TestClient(create_app(settings)) as client:
+        for path in ("/api/links/any", "/readyz"):
+            answer = client.get(path)
+            assert (answer.status_code, answer.json()["error"]["code"]) == (503, "database_away")
+        assert client.get("/healthz").status_code == 200
+    said = [record for record in caplog.records if record.name == "palpebra"]
+    assert len(said) == 2
+    assert all(record.exc_info is None for record in said)
+
+
+@pytest.mark.parametrize(
+    "database_url", [pytest.param("postgres", marks=pytest.mark.postgres)], indirect=True
+)
+def test_after_every_connection_was_cut_ratings_go_on(services: Services, participant: Participant) -> None:
+    participant.agree()
+    first, second, *_ = participant.state()["trials"]
+    assert participant.rate(first).status_code == 201
+    with services.database.engine.connect() as connection:
+        cut = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid() "
+        connection.execute(text(cut + "AND datname = current_database()"))
+    assert participant.rate(second).status_code == 201
