@@ -14,5 +14,6 @@ export default defineConfig({
     target: "es2022",
     modulePreload: { polyfill: false },
     sourcemap: false,
+    manifest: true,
   },
 });

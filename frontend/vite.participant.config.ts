@@ -1,10 +1,27 @@
-import { defineConfig } from "vite";
+import { defineConfig, type Plugin } from "vite";
+
+const BASE = "/assets/participant/";
+const OFFLINE = "service-worker";
+
+/** Tells the service worker the names of the built files, which it keeps. */
+function listFiles(): Plugin {
+  return {
+    name: "list-files",
+    generateBundle(_options, bundle) {
+      const files = Object.keys(bundle).filter((name) => /\.(js|css)$/.test(name) && name !== `${OFFLINE}.js`);
+      const worker = bundle[`${OFFLINE}.js`];
+      if (worker?.type !== "chunk") throw new Error(`expected ${OFFLINE}.js in the bundle`);
+      worker.code = worker.code.replaceAll("__FILES__", JSON.stringify(files.map((name) => BASE + name)));
+    },
+  };
+}
 
 // The server answers /assets/participant/NAME with dist/participant/NAME, and /run/TOKEN with its index.html.
 export default defineConfig({
   root: "src/participant",
-  base: "/assets/participant/",
+  base: BASE,
   publicDir: "public",
+  plugins: [listFiles()],
   build: {
     outDir: "../../dist/participant",
     emptyOutDir: true,
@@ -13,6 +30,10 @@ export default defineConfig({
     target: "es2022",
     modulePreload: { polyfill: false },
     sourcemap: false,
+    rollupOptions: {
+      input: { index: "src/participant/index.html", [OFFLINE]: "src/participant/service-worker.ts" },
+      output: { entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : "[name]-[hash].js") },
+    },
   },
   worker: { format: "es" },
 });

@@ -1,15 +1,53 @@
-// Prints the participant bundle's size, gzipped, and fails above the budget of docs/participant.md.
-import { readdirSync, readFileSync } from "node:fs";
+// Prints what a page loads at first, gzipped, and fails above its budget: `node bundle_size.mjs participant | admin`.
+// The participant's page counts whole; the admin site counts the entry and the largest page, whose parts load when
+// they are first opened.
+import { existsSync, readdirSync, readFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 
-const BUDGET_BYTES = 100 * 1024;
-const folder = new URL("../dist/participant/", import.meta.url);
-const sizes = readdirSync(folder).map((name) => [name, gzipSync(readFileSync(new URL(name, folder)), { level: 9 }).length]);
-const total = sizes.reduce((sum, [, bytes]) => sum + bytes, 0);
+const BUDGETS = { participant: 100 * 1024, admin: 400 * 1024 };
+const site = process.argv[2] ?? "participant";
+const budget = BUDGETS[site];
+if (budget === undefined) {
+  console.error(`error: expected participant or admin, got ${site}`);
+  process.exit(2);
+}
+const folder = new URL(`../dist/${site}/`, import.meta.url);
+const bytesOf = (name) => gzipSync(readFileSync(new URL(name, folder)), { level: 9 }).length;
+const sum = (names) => [...names].reduce((total, name) => total + bytesOf(name), 0);
 
-for (const [name, bytes] of sizes) console.log(`${String(bytes).padStart(7)}  ${name}`);
-console.log(`${String(total).padStart(7)}  participant bundle, gzipped; budget ${BUDGET_BYTES}`);
-if (total > BUDGET_BYTES) {
-  console.error(`error: expected at most ${BUDGET_BYTES} bytes gzipped, got ${total}; find what grew`);
-  process.exit(1);
+/** What `start` loads, by the manifest: its file, styles and everything it imports, but no page opened later. */
+function filesOf(manifest, start, found = new Set()) {
+  const { file, css = [], imports = [] } = manifest[start];
+  if (found.has(file)) return found;
+  for (const name of [file, ...css]) found.add(name);
+  for (const name of imports) filesOf(manifest, name, found);
+  return found;
+}
+
+function report(total, what) {
+  console.log(`${String(total).padStart(7)}  ${what}, gzipped; budget ${budget}`);
+  if (total <= budget) return;
+  console.error(`error: expected at most ${budget} bytes gzipped, got ${total}: ${what}; find what grew`);
+  process.exitCode = 1;
+}
+
+const manifestFile = new URL(".vite/manifest.json", folder);
+if (site === "participant") {
+  const names = readdirSync(folder, { withFileTypes: true }).filter((entry) => entry.isFile());
+  for (const { name } of names) console.log(`${String(bytesOf(name)).padStart(7)}  ${name}`);
+  report(sum(names.map(({ name }) => name)), "participant bundle");
+} else if (!existsSync(manifestFile)) {
+  console.error("error: expected dist/admin/.vite/manifest.json; build the site first");
+  process.exitCode = 1;
+} else {
+  const manifest = JSON.parse(readFileSync(manifestFile, "utf8"));
+  const entry = Object.keys(manifest).find((name) => manifest[name].isEntry);
+  const first = filesOf(manifest, entry);
+  const pages = (manifest[entry].dynamicImports ?? []).map((name) => {
+    const files = filesOf(manifest, name, new Set(first));
+    return [sum(files), name];
+  });
+  for (const [bytes, name] of pages.sort(([a], [b]) => b - a).slice(0, 5)) console.log(`${String(bytes).padStart(7)}  with ${name}`);
+  report(sum(first), "admin site, before any page");
+  report(Math.max(...pages.map(([bytes]) => bytes)), "admin site, first load of the largest page");
 }

@@ -34,10 +34,15 @@ def built_page() -> Path:
     return folder
 
 
+def system_chromium() -> str | None:
+    """The path of the system's Chromium; None where Playwright's own is to be used."""
+    return next((path for name in CHROMIUM_NAMES if (path := shutil.which(name))), None)
+
+
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Browser]:
     """A headless Chromium: the system's, or the one Playwright has installed."""
-    found = next((path for name in CHROMIUM_NAMES if (path := shutil.which(name))), None)
+    found = system_chromium()
     with sync_playwright() as playwright:
         if found is None and not Path(playwright.chromium.executable_path).exists():
             pytest.skip("no Chromium here: sudo apt-get install chromium, or `playwright install chromium`")

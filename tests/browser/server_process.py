@@ -34,10 +34,14 @@ def free_port() -> int:
 
 
 class ServerProcess:
-    """The server on a data folder. `kill` is kill -9; `start` after it takes the same port."""
+    """The server on a data folder. `kill` is kill -9; `start` after it takes the same port.
 
-    def __init__(self, data_folder: Path) -> None:
-        self.settings = Settings(data_folder=data_folder, secret_key="browser tests")
+    further: other settings, by their names in `Settings`.
+    """
+
+    def __init__(self, data_folder: Path, **further: str) -> None:
+        self.settings = Settings(data_folder=data_folder, secret_key="browser tests", **further)
+        self.further = {f"PALPEBRA_{name.upper()}": value for name, value in further.items()}
         self.port = free_port()
         self.log = data_folder.with_suffix(".log")
         self.process: subprocess.Popen[bytes] | None = None
@@ -63,10 +67,15 @@ class ServerProcess:
                 link = create_link(session, services.settings.key, study, "general")
                 return StudyInDatabase(services, experiment.name, experiment, link_token(services, link))
 
-    def link(self, study: StudyInDatabase, kind: LinkKind) -> str:
+    def link(self, study: StudyInDatabase, kind: LinkKind, **options: Any) -> str:
         """The token of a new link, made while the server runs."""
         with migrated_services(self.settings) as services:
-            return replace(study, services=services).link(kind)
+            return replace(study, services=services).link(kind, **options)
+
+    def change(self, statement: str) -> None:
+        """Change the server's database behind its back."""
+        with migrated_services(self.settings) as services, services.database.write() as session:
+            session.execute(text(statement))
 
     def rows(self, statement: str) -> list[dict[str, Any]]:
         """What an SQL query gives on the server's database."""
@@ -83,7 +92,8 @@ class ServerProcess:
         return found
 
     def start(self) -> "ServerProcess":
-        environment = os.environ | {
+        environment = os.environ | self.further
+        environment |= {
             "PALPEBRA_DATA_FOLDER": str(self.settings.data_folder),
             "PALPEBRA_SECRET_KEY": self.settings.secret_key,
         }

@@ -26,7 +26,7 @@ class Visit:
         self.page.wait_for_selector("h1, .trial")
         return self
 
-    def begin(self) -> "Visit":
+    def begin(self, age: str = "34") -> "Visit":
         """Start page, consent, the form before."""
         page = self.page
         page.wait_for_selector("text=About")
@@ -36,12 +36,16 @@ class Visit:
         self.look("consent")
         page.check("input[type=checkbox]")
         page.click(".primary")
-        page.wait_for_selector("form")
-        self.look("form")
-        page.fill("input.short", "34")
-        page.check("input[value=normal]")
-        page.click(".primary")
+        self.form(age)
         return self
+
+    def form(self, age: str = "34") -> None:
+        """The form before, with an answer to each required question."""
+        self.page.wait_for_selector("form")
+        self.look("form")
+        self.page.fill("input.short", age)
+        self.page.check("input[value=normal]")
+        self.page.click(".primary")
 
     def measure(self) -> "Visit":
         """Card, ruler and distance."""

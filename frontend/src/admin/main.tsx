@@ -5,16 +5,24 @@ import "@mantine/notifications/styles.css";
 import "./admin.css";
 import { MantineProvider } from "@mantine/core";
 import { Notifications } from "@mantine/notifications";
-import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
+import { MutationCache, QueryCache, QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { RouterProvider } from "@tanstack/react-router";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { Refused } from "./api";
 import { styleNonce } from "./nonce";
+import { sessionQuery } from "./queries";
 import { router } from "./router";
 import { readable, theme } from "./theme";
 
+/** Where the session has ended meanwhile, asking for it again shows the page to sign in. */
+function onRefusal(error: Error): void {
+  if (error instanceof Refused && error.status === 401) void queries.invalidateQueries({ queryKey: sessionQuery.queryKey });
+}
+
 const queries = new QueryClient({
+  queryCache: new QueryCache({ onError: onRefusal }),
+  mutationCache: new MutationCache({ onError: onRefusal }),
   defaultOptions: {
     queries: { staleTime: 5_000, retry: (times, error) => !(error instanceof Refused) && times < 2 },
   },

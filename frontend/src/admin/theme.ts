@@ -1,4 +1,4 @@
-import { createTheme, type CSSVariablesResolver, type MantineColorsTuple } from "@mantine/core";
+import { Alert, Anchor, Badge, createTheme, type CSSVariablesResolver, type MantineColorsTuple } from "@mantine/core";
 
 // A calm petrol, dark enough for white text at every shade that buttons use.
 const petrol: MantineColorsTuple = [
@@ -12,8 +12,21 @@ export const theme = createTheme({
   luminanceThreshold: 0.35,
   colors: { petrol },
   fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif",
+  headings: { sizes: { h1: { fontSize: "26px", lineHeight: "1.3" }, h2: { fontSize: "20px", lineHeight: "1.35" } } },
   defaultRadius: "sm",
   respectReducedMotion: true,
+  components: {
+    // A quiet box whose edge says what kind of note it is: the same in light and dark.
+    Alert: Alert.extend({
+      defaultProps: { variant: "default" },
+      styles: (_, { color = "petrol" }) => ({
+        root: { borderInlineStart: `4px solid var(--mantine-color-${color}-6)` },
+        title: { color: "var(--mantine-color-text)" },
+      }),
+    }),
+    Anchor: Anchor.extend({ defaultProps: { underline: "hover" } }),
+    Badge: Badge.extend({ defaultProps: { tt: "none", fw: 600, radius: "sm" } }),
+  },
 });
 
 /** Dimmed and placeholder text dark enough (or light enough) for WCAG's 4.5 : 1. */

@@ -34,7 +34,7 @@ export interface RunDocument extends Omit<Schemas["RunState"], "texts" | "forms"
   display: Gates & { background: string };
 }
 
-export interface Texts { consent: string; instructions: string; practice: string; block_break: string; debrief: string }
+export interface Texts { consent: string; instructions: string; practice: string; block_break: string; debrief: string; screened_out?: string }
 
 export interface Scale { minimum: number; maximum: number; question: Translated; low: Translated; high: Translated }
 export interface ClipRating {

@@ -29,7 +29,7 @@ export interface paths {
         };
         /**
          * Readyz
-         * @description The database answers and has the newest revision.
+         * @description The database answers and has the newest revision; clips can be read.
          */
         get: operations["readyz"];
         put?: never;
@@ -291,9 +291,29 @@ export interface paths {
         put?: never;
         /**
          * Complete Run
-         * @description Close the run and get the code; refused while trials are unanswered.
+         * @description Close the run and get the code; refused while trials or required questions are unanswered.
          */
         post: operations["complete_run"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/run/screen-out": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Screen Out
+         * @description End the run because browser or screen will not do; refused where the study does not screen devices.
+         */
+        post: operations["screen_out"];
         delete?: never;
         options?: never;
         head?: never;
@@ -967,8 +987,8 @@ export interface paths {
          * Stream Monitor
          * @description Server-sent events: the whole monitor first, then every two seconds what has changed.
          *
-         *     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour
-         *     or when the session ends; the browser then connects again by itself.
+         *     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
+         *     when the session ends or the server does; the browser then connects again by itself.
          */
         get: operations["stream_monitor"];
         put?: never;
@@ -1239,6 +1259,46 @@ export interface paths {
          * @description Recorded profiles and the PCA model.
          */
         get: operations["get_library"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/blinks/strips": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Strips
+         * @description What strips there are; none where they have not been made on this server.
+         */
+        get: operations["get_strips"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/blinks/strips/{name}.webp": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Strip
+         * @description The strip of one character.
+         */
+        get: operations["get_strip"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1547,11 +1607,16 @@ export interface components {
         };
         /**
          * Completion
-         * @description The code the participant takes away, and where to go.
+         * @description How the run ended, the code the participant takes away, and where to go.
          */
         Completion: {
+            /**
+             * Status
+             * @enum {string}
+             */
+            status: "complete" | "screened_out";
             /** Completion Code */
-            completion_code: string;
+            completion_code: string | null;
             /** Redirect Url */
             redirect_url: string | null;
         };
@@ -1874,6 +1939,11 @@ export interface components {
              * @description A run of this personal link is under way and can be taken up again.
              */
             resumable: boolean;
+            /**
+             * Screens Devices
+             * @description A closed gate ends the visit as screened out.
+             */
+            screens_devices: boolean;
             gates: components["schemas"]["Gates"];
         };
         /**
@@ -1955,6 +2025,10 @@ export interface components {
             active: number;
             /** Dropped */
             dropped: number;
+            /** Screened Out */
+            screened_out: number;
+            /** Withdrawn */
+            withdrawn: number;
             /** Refused Browsers */
             refused_browsers: number;
             /** Funnel */
@@ -2366,6 +2440,12 @@ export interface components {
              * @description Trials of the run that still need an answer.
              */
             remaining: number;
+            /**
+             * Status
+             * @description Of the run: screened_out where this answer ended it.
+             * @enum {string}
+             */
+            status: "active" | "complete" | "screened_out" | "withdrawn";
         };
         /**
          * Received
@@ -2377,7 +2457,7 @@ export interface components {
         };
         /**
          * RecordedProfile
-         * @description One recorded blink of one eye at 300 fps.
+         * @description One recorded blink at 300 fps: of one eye, or of both on common samples.
          */
         RecordedProfile: {
             /** Profile Id */
@@ -2386,7 +2466,10 @@ export interface components {
             recording: string;
             /** Person */
             person: string;
-            /** Eye */
+            /**
+             * Eye
+             * @description left, right, both (`closure` is the left eye's), or empty where unknown.
+             */
             eye: string;
             /** Down Frames */
             down_frames: number;
@@ -2405,6 +2488,11 @@ export interface components {
              * @description Closure per frame at `fps`: 0 open, 1 closed.
              */
             closure: number[];
+            /**
+             * Closure Other
+             * @description The right eye's where `eye` is both; else empty.
+             */
+            closure_other: number[];
         };
         /**
          * RecoveryCodes
@@ -2435,6 +2523,11 @@ export interface components {
              * @default
              */
             redirect_url?: string;
+            /**
+             * Redirect Screened Out
+             * @default
+             */
+            redirect_screened_out?: string;
             /**
              * Code Complete
              * @default
@@ -2615,6 +2708,11 @@ export interface components {
             /** Completion Code */
             completion_code: string | null;
             /**
+             * Resumable Until
+             * @description Until when a reloaded page may go on without asking; null where it must ask.
+             */
+            resumable_until: string | null;
+            /**
              * Server Time
              * Format: date-time
              */
@@ -2698,6 +2796,18 @@ export interface components {
             status: "active" | "complete" | "screened_out" | "withdrawn";
         };
         /**
+         * ScreenOut
+         * @description Why the browser or the screen will not do.
+         */
+        ScreenOut: {
+            /** Reason */
+            reason: string;
+            /** Data */
+            data?: {
+                [key: string]: unknown;
+            };
+        };
+        /**
          * SecondFactorSetup
          * @description What an authenticator app needs.
          */
@@ -2775,6 +2885,26 @@ export interface components {
              * @enum {string}
              */
             stage: "consent" | "forms_before" | "calibration" | "instructions" | "practice" | "trials" | "forms_after" | "debrief" | "done";
+        };
+        /**
+         * Strips
+         * @description Picture strips, one a character: frames of one size, one below the other.
+         */
+        Strips: {
+            /** Width Px */
+            width_px: number;
+            /** Height Px */
+            height_px: number;
+            /**
+             * Closures
+             * @description Closure of each frame, ascending: 0 open, 1 shut.
+             */
+            closures: number[];
+            /**
+             * Characters
+             * @description Their pictures are at …/strips/NAME.webp.
+             */
+            characters: string[];
         };
         /**
          * StudyDetail
@@ -3763,6 +3893,48 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Completion"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    screen_out: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ScreenOut"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Saved"];
                 };
             };
             /** @description The request's content is not acceptable */
@@ -6028,6 +6200,82 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["BlinkLibrary"];
                 };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_strips: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Strips"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_strip: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The request's content is not acceptable */
             422: {

@@ -65,7 +65,7 @@ export const de: Messages = {
   distance_type: "Stattdessen den Abstand eingeben",
   distance_cm: "Abstand von Ihren Augen zum Bildschirm in Zentimetern",
   distance_bad: "Bitte geben Sie einen Abstand von {minimum} bis {maximum} cm ein.",
-  distance_missed: "Der Punkt ist am Ende. Schauen Sie auf das Quadrat und drücken Sie die Leertaste, sobald der Punkt verschwindet.",
+  distance_missed: "Diese Runde zählt nicht. Schauen Sie die ganze Zeit auf das Quadrat und drücken Sie die Leertaste, sobald der Punkt verschwindet.",
 
   preload_title: "Die Filme werden geholt",
   preload_text: "Sie werden vorher geladen, damit jeder ohne Stocken läuft.",
@@ -85,6 +85,7 @@ export const de: Messages = {
 
   ready: "Leertaste startet den Film",
   ready_again: "Leertaste zeigt ihn noch einmal ({view} von {views})",
+  ready_again_touch: "Tippen zeigt ihn noch einmal ({view} von {views})",
   ready_touch: "Tippen startet den Film",
   ready_replay: "Dieser Film lief vorhin nicht flüssig. Hier ist er noch einmal.",
   start_clip: "Film starten",
@@ -114,6 +115,7 @@ export const de: Messages = {
   finishing_title: "Ihre letzten Antworten werden gespeichert",
   finishing_wait: "Noch {count} zu senden. Bitte lassen Sie diese Seite offen.",
   done_code: "Ihr Abschlusscode",
+  out_code: "Ihr Code",
   done_copy: "Kopieren",
   done_copied: "Kopiert",
   done_return: "Zurück dorthin, wo Sie sich angemeldet haben",
@@ -130,7 +132,9 @@ export const de: Messages = {
   withdrawn_title: "Sie haben die Teilnahme beendet",
   withdrawn: "Die Studie endet hier. Danke für Ihre Zeit. Sie können diese Seite schließen.",
   screened_out_title: "Vielen Dank",
-  screened_out: "Nach Ihren Antworten ist diese Studie nicht für Sie gedacht. Sie können diese Seite schließen.",
+  screened_out: "Nach Ihren Antworten ist diese Studie nicht für Sie gedacht. Vielen Dank für Ihre Zeit.",
+  close: "Sie können diese Seite schließen.",
+  no_device: "Ich habe keinen größeren Bildschirm und kein größeres Fenster",
 
   second_tab_title: "Die Studie ist in einem anderen Tab offen",
   second_tab: "Sie kann nur an einer Stelle laufen. Machen Sie dort weiter, oder übernehmen Sie hier.",
@@ -147,6 +151,7 @@ export const de: Messages = {
   link_full: "Diese Studie hat alle Teilnehmenden, die sie braucht. Danke für Ihr Interesse.",
   link_paused: "Diese Studie macht eine Pause. Bitte versuchen Sie es später noch einmal.",
   link_used: "Dieser Link wurde schon benutzt.",
+  run_left: "Diese Studie muss in einem Zug bearbeitet werden. Ihr Besuch wurde unterbrochen und kann nicht fortgesetzt werden. Bitte wenden Sie sich an die Person, die Sie eingeladen hat.",
   run_too_old: "Ihr Besuch hat vor zu langer Zeit begonnen, um fortgesetzt zu werden. Bitte fragen Sie die Person, die Sie eingeladen hat.",
   link_title: "Sie können gerade nicht teilnehmen",
 
@@ -155,10 +160,12 @@ export const de: Messages = {
   problem_title: "Etwas ist schiefgegangen",
   problem: "Was Sie bisher getan haben, bleibt erhalten. Laden Sie die Seite neu; wenn es wiederkommt, schreiben Sie bitte der Person, die Sie eingeladen hat: {detail}",
 
-  gate_title: "Dieser Browser kann die Studie nicht zeigen",
+  gate_title: "Die Studie kann hier nicht gezeigt werden",
+  gate_open_title: "Bevor Sie beginnen",
   gate_insecure: "Die Seite wurde ohne sichere Verbindung geöffnet, und ohne sie kann der Browser die Filme nicht prüfen. Öffnen Sie den Link mit https:// am Anfang. Wenn das nicht geht, sagen Sie es der Person, die Sie eingeladen hat.",
-  gate_browser: "Er kann Filme nicht Bild für Bild zeigen. Bitte öffnen Sie den Link in einem aktuellen Chrome, Edge, Firefox oder Safari auf einem Computer.",
+  gate_browser: "Dieser Browser kann Filme nicht Bild für Bild zeigen. Bitte öffnen Sie den Link in einem aktuellen Chrome, Edge, Firefox oder Safari auf einem Computer.",
   gate_video: "Ihr Browser kann die Filme nicht Bild für Bild dekodieren und spielt sie deshalb als gewöhnliches Video. Das geht, aber ein aktueller Chrome, Edge oder Firefox kann es besser.",
+  gate_h264: "Diesem Browser scheint der H.264-Decoder zu fehlen, den die meisten Filme brauchen. Bitte öffnen Sie den Link in Chrome, Edge oder Safari, oder in Firefox mit den Codecs Ihres Systems. Wenn Sie hier weitermachen, werden die Filme vielleicht nicht gezeigt.",
   gate_screen: "Der Bildschirm dieses Geräts ist zu klein: Die Studie braucht {width} mal {height} Pixel, dieser hat {have_width} mal {have_height}. Bitte nehmen Sie einen Computer oder ein größeres Tablet.",
   gate_touch: "Diese Studie braucht eine Tastatur. Bitte öffnen Sie den Link auf einem Computer.",
   gate_storage: "Dieser Browser lässt die Seite nichts aufbewahren, vielleicht wegen eines privaten Fensters. Sie können weitermachen, aber jede Antwort muss den Server erreichen, bevor der nächste Film kommt; dazu braucht es eine gute Verbindung. Ein normales Fenster ist besser.",

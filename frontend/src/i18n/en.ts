@@ -19,7 +19,7 @@ export const en = {
   form_missing: "Please answer this question.",
   form_number: "Please enter a whole number from {minimum} to {maximum}.",
   form_length: "Please use at most {maximum} characters.",
-  form_fix: "Please look at the questions marked below.",
+  form_fix: "Please look at the marked questions.",
 
   screen_title: "Your screen",
   full_screen_text: "The clips are shown in full screen, so that nothing else is moving beside them. You can leave it at any time with Esc.",
@@ -63,7 +63,7 @@ export const en = {
   distance_type: "Enter the distance instead",
   distance_cm: "Distance from your eyes to the screen, in centimetres",
   distance_bad: "Please enter a distance from {minimum} to {maximum} cm.",
-  distance_missed: "The dot reached the end. Look at the square, and press Space as soon as the dot disappears.",
+  distance_missed: "That round does not count. Keep looking at the square, and press Space as soon as the dot disappears.",
 
   preload_title: "Getting the clips",
   preload_text: "They are loaded beforehand, so that each one runs smoothly.",
@@ -83,6 +83,7 @@ export const en = {
 
   ready: "Press Space to start the clip",
   ready_again: "Press Space to see it again ({view} of {views})",
+  ready_again_touch: "Tap to see it again ({view} of {views})",
   ready_touch: "Tap to start the clip",
   ready_replay: "This clip did not run smoothly before. Here it is once more.",
   start_clip: "Start the clip",
@@ -112,6 +113,7 @@ export const en = {
   finishing_title: "Saving your last answers",
   finishing_wait: "{count} still to be sent. Please keep this page open.",
   done_code: "Your completion code",
+  out_code: "Your code",
   done_copy: "Copy",
   done_copied: "Copied",
   done_return: "Go back to where you signed up",
@@ -128,7 +130,9 @@ export const en = {
   withdrawn_title: "You have withdrawn",
   withdrawn: "The study ends here. Thank you for the time you gave. You can close this page.",
   screened_out_title: "Thank you",
-  screened_out: "By your answers this study is not meant for you. You can close this page.",
+  screened_out: "By your answers this study is not meant for you. Thank you for your time.",
+  close: "You can close this page.",
+  no_device: "I have no larger screen or window",
 
   second_tab_title: "The study is open in another tab",
   second_tab: "It can run in one place only. Go on in the other tab, or take over here.",
@@ -145,6 +149,7 @@ export const en = {
   link_full: "This study has all the participants it needs. Thank you for your interest.",
   link_paused: "This study is paused. Please try again later.",
   link_used: "This link has been used already.",
+  run_left: "This study must be done in one go, and your visit was interrupted, so it cannot be continued. Please ask the person who invited you.",
   run_too_old: "Your visit began too long ago to be continued. Please ask the person who invited you.",
   link_title: "You cannot take part now",
 
@@ -153,10 +158,12 @@ export const en = {
   problem_title: "Something went wrong",
   problem: "What you have done so far is kept. Load the page again; if this comes back, please write to the person who invited you: {detail}",
 
-  gate_title: "This browser cannot show the study",
+  gate_title: "The study cannot be shown here",
+  gate_open_title: "Before you begin",
   gate_insecure: "The page was opened without a secure connection, and without one the browser cannot check the clips. Open the link with https:// at its beginning. If that does not work, tell the person who invited you.",
-  gate_browser: "It cannot show clips frame by frame. Please open the link in a recent Chrome, Edge, Firefox or Safari, on a computer.",
+  gate_browser: "This browser cannot show clips frame by frame. Please open the link in a recent Chrome, Edge, Firefox or Safari, on a computer.",
   gate_video: "Your browser cannot decode the clips frame by frame, so they are played as an ordinary video. That works, but a recent Chrome, Edge or Firefox does it better.",
+  gate_h264: "This browser seems to lack the H.264 decoder that most clips need. Please open the link in Chrome, Edge or Safari, or in Firefox with the codecs of your system installed. If you go on here, the clips may not be shown.",
   gate_screen: "The screen of this device is too small: the study needs {width} by {height} pixels, this one has {have_width} by {have_height}. Please use a computer or a larger tablet.",
   gate_touch: "This study needs a keyboard. Please open the link on a computer.",
   gate_storage: "This browser does not let the page keep anything, perhaps because of a private window. You can go on, but each answer must reach the server before the next clip, so a good connection is needed. A normal window is better.",

@@ -4,9 +4,13 @@ import type { LinkDocument, RunDocument, StartedRun } from "../api/participant";
 import { Refused } from "../api/request";
 import { preferred, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround } from "./flow/appearance";
-import { Identity, recruiterQuery } from "./flow/identity";
-import { fetchLink, fetchRun, passGates, persistently, showRefusal, startRun } from "./flow/link";
+import { ended } from "./flow/ended";
+import { abilities, type Abilities, findings, type GateFinding } from "./flow/gates";
+import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
+import { type Kept, KeptVisit } from "./flow/kept-visit";
+import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGate, showRefusal, startRun } from "./flow/link";
 import { describeDevice, flush, openSession } from "./flow/open-session";
+import { serveOffline } from "./flow/serve-offline";
 import { startPage } from "./flow/start-page";
 import { timeline } from "./flow/timeline";
 import { watch } from "./flow/watchers";
@@ -15,54 +19,109 @@ import { IndexedDbStore } from "./outbox/indexed-db";
 import { Outbox } from "./outbox/outbox";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
 import { claimTab } from "./screen/one-tab";
-import { completed, RatingsMissing, showCompletion } from "./screens/finish";
+import { AnswersMissing, showCompletion } from "./screens/finish";
 import { emptied, showNotice } from "./screens/notice";
 import { openStopDialog } from "./screens/stop-dialog";
 import type { Session } from "./session";
-import { button } from "../ui/page";
 
+/** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
+const RETURNED = "palpebra returns";
+
+/** What is known when the link has answered, or an earlier visit answers for it. */
+interface Entry { root: HTMLElement; t: Translate; link_token: string; link: LinkDocument; language: string; keeping: KeptVisit; kept: Kept | null }
 
 export async function main(root: HTMLElement): Promise<void> {
   let t = translator(preferred(["en", "de"], navigator.languages));
   const fail = (error: unknown): void => showProblem(root, t, error);
   window.addEventListener("unhandledrejection", (event) => fail(event.reason));
   const link_token = location.pathname.split("/").filter(Boolean).at(-1) ?? "";
+  const keeping = new KeptVisit(storageKey("palpebra visit", link_token, location.search), storageOf("localStorage"));
   try {
-    const link = await persistently(root, t, () => fetchLink(link_token));
+    const { link, kept } = await reach(root, t, link_token, keeping.read());
     setSurround(link.study.background);
     const language = preferred(link.study.languages, navigator.languages);
     setLanguage(language);
     document.title = link.study.title;
     t = translator(language);
-    await visit(root, t, link_token, link, language);
+    await visit({ root, t, link_token, link, language, keeping, kept });
   } catch (error) {
     if (error instanceof Refused) showRefusal(root, t, error.code, error.message);
     else fail(error);
   }
 }
 
-async function visit(root: HTMLElement, t: Translate, link_token: string, link: LinkDocument, language: string): Promise<void> {
+async function visit(entry: Entry): Promise<void> {
+  const { root, t, link_token, link, language, kept } = entry;
   const identity = new Identity(link_token, link.kind, location.search);
   // A visit that this browser or this personal link has begun may go on though no new one may begin.
-  const returns = identity.isKnown || link.resumable;
+  const returns = kept !== null || identity.isKnown || link.resumable;
   if (link.status !== "open" && !returns) return showRefusal(root, t, link.status);
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
-  const found = await passGates(root, t, link_token, link, store.durable);
-  if (!found) return;
+  const found = await abilities(store.durable);
+  const list = findings(found, link.gates);
+  const start = { language, client_id: identity.client_id(), query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
+  if (list[0]?.closed) return turnedAway(entry, identity, returns ? null : start, list[0], found);
+  await passGates(root, t, list);
   if (!(await oneTab(root, t, link_token))) return;
-  const chosen = returns ? language : await startPage(root, link, language);
-  const start = { language: chosen, client_id: identity.client_id(), query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
-  const started = await persistently(root, t, () => startRun(link_token, start));
-  const outbox = new Outbox(store, { onUnauthorized: () => root.dispatchEvent(new CustomEvent("taken-over")) });
-  const unsent = await flush(outbox, started);
+  if (!returns) start.language = await startPage(root, link, language);
+  const started = kept?.started ?? (await persistently(root, t, () => startRun(link_token, start)));
+  await enter(entry, identity, store, started, list);
+}
+
+/** A closed gate: explained; where the study screens devices, a new visit ends here with a way back. */
+async function turnedAway({ root, t, link_token, link }: Entry, identity: Identity, start: object | null, closed: GateFinding, found: Abilities): Promise<void> {
+  if (!start || !link.screens_devices) return showClosedGate(root, t, link_token, closed, found);
+  const started = await persistently(root, t, () => screenOutDevice(link_token, start, closed, found));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
-  setLanguage(run.language);
-  const t_run = translator(run.language);
-  if (run.status !== "active") return ended(root, t_run, run, started, identity);
+  await ended(root, t, run, started, identity, t(closed.reason, closed.values));
+}
+
+/** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
+async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: StartedRun, found: GateFinding[]): Promise<void> {
+  const { root, t, link, keeping, kept } = entry;
+  const outbox = outboxOf(root, store, keeping);
+  const unsent = await flush(outbox, started, kept ? 0 : undefined);
+  const run = kept?.run ?? (await persistently(root, t, () => fetchRun(started.run_token)));
+  if (!kept) keeping.begin({ link, started, run });
   const session = openSession(root, link, run, outbox, unsent);
+  setLanguage(run.language);
+  const over = (): Promise<void> => {
+    keeping.forget();
+    return persistently(root, session.t, () => fetchRun(started.run_token)).then((now) => ended(root, session.t, now, started, identity));
+  };
+  if (run.status !== "active") return over();
+  root.addEventListener("run-over", () => {
+    session.over.abort();
+    emptied(root);
+    void over();
+  }, { once: true });
   for (const { reason } of found) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
+  if (kept) session.events.add("offline", { loaded_without_server: true });
+  if (run.resumable_until) serveOffline();
   await play(session, started, store.durable);
+  if (session.completion) keeping.forget();
+}
+
+/** An outbox whose answers keep the visit up to date, and tell where the run ends or goes on elsewhere. */
+function outboxOf(root: HTMLElement, store: OutboxStore, keeping: KeptVisit): Outbox {
+  const tell = (what: "run-over" | "taken-over"): void => void root.dispatchEvent(new CustomEvent(what));
+  return new Outbox(store, {
+    onAccepted(item, body) {
+      keeping.note(item, body);
+      if (statusIn(body) === "screened_out") tell("run-over");
+    },
+    onRefused({ status, code }) {
+      if (status === 401) tell("taken-over");
+      else if (code === "run_closed") tell("run-over");
+    },
+  });
+}
+
+/** The run's status in the answer to a write, or in its receipt. */
+function statusIn(body: unknown): RunDocument["status"] | undefined {
+  const answer = body as { status?: RunDocument["status"]; receipt?: { status: RunDocument["status"] } } | null;
+  return answer?.receipt?.status ?? answer?.status;
 }
 
 /** False where another tab has the study and the participant leaves it there. */
@@ -91,7 +150,9 @@ async function play(session: Session, started: StartedRun, durable: boolean): Pr
   void describeDevice(session, durable);
   root.replaceChildren();
   await runTimeline(root, timeline(session, started.run_token), simulation(run));
-  if (session.completion) showCompletion(session, emptied(root), session.completion);
+  if (!session.completion) return;
+  sessionStorage.removeItem(RETURNED);
+  showCompletion(session, emptied(root), session.completion);
 }
 
 /** Only previews and synthetic runs may answer themselves. */
@@ -100,21 +161,11 @@ function simulation(run: RunDocument): SimulationMode | null {
   return (run.preview || run.synthetic) && (wanted === "visual" || wanted === "data-only") ? wanted : null;
 }
 
-async function ended(root: HTMLElement, t: Translate, run: RunDocument, started: StartedRun, identity: Identity): Promise<void> {
-  if (run.status === "withdrawn") return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn") });
-  if (run.status === "screened_out") return void showNotice(root, { title: t("screened_out_title"), text: t("screened_out") });
-  const done = await persistently(root, t, () => completed(started.run_token));
-  // On a laboratory's computer the next person comes by the same link.
-  const next = identity.isNamed ? [] : [button(t("new_visit"), () => (identity.forget(), location.reload()), "plain")];
-  showCompletion({ t, run }, emptied(root), done, next);
-}
-
 function showProblem(root: HTMLElement, t: Translate, error: unknown): void {
   console.error(error);
-  const key = "palpebra returns";
-  const returns = Number(sessionStorage.getItem(key) ?? 0);
-  if (error instanceof RatingsMissing && returns < RETURNS) {
-    sessionStorage.setItem(key, String(returns + 1));
+  const returns = Number(sessionStorage.getItem(RETURNED) ?? 0);
+  if (error instanceof AnswersMissing && returns < RETURNS) {
+    sessionStorage.setItem(RETURNED, String(returns + 1));
     return location.reload();
   }
   const reload = { label: t("reload"), press: () => location.reload() };

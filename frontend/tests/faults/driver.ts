@@ -2,7 +2,9 @@
  * Many participants at once, each with the page's own outbox and IndexedDB (a shim in memory), against a real
  * server behind a bad network. They reload at random, and write down what was acknowledged.
  *
- * node driver.js ADDRESS LINK PARTICIPANTS PACE_MS > acknowledged.json
+ * node driver.js ADDRESS LINK PARTICIPANTS PACE_MS HURRY > acknowledged.json
+ *
+ * HURRY shortens the pauses between tries: at 4 a person's patience of a minute passes in a quarter of one.
  */
 import { IDBFactory } from "fake-indexeddb";
 import { isTemporary, NetworkError, request, type Answer } from "../../src/api/request";
@@ -14,7 +16,7 @@ import { flush } from "../../src/participant/flow/open-session";
 import { playbackRecord } from "../../src/participant/playback/record";
 
 declare const process: { argv: string[] };
-const [base = "", link = "", participants = "1", pace_ms = "20"] = process.argv.slice(2);
+const [base = "", link = "", participants = "1", pace_ms = "20", hurry = "1"] = process.argv.slice(2);
 const RATING = "/api/run/ratings/";
 const RELOAD_CHANCE = 0.02;
 
@@ -24,6 +26,7 @@ const refused: { path: string; status: number; body: unknown }[] = [];
 let given = 0;
 let reloads = 0;
 
+const pause = (ms: number): Promise<void> => sleep(ms / Number(hurry));
 const sleep = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
 
 async function insist<Body>(method: string, path: string, options: { token?: string; body?: unknown } = {}): Promise<Body> {
@@ -36,7 +39,7 @@ async function insist<Body>(method: string, path: string, options: { token?: str
       if (answer.status >= 300) throw new Error(`${method} ${path}: ${answer.status} ${JSON.stringify(answer.body)}`);
       return answer.body as Body;
     }
-    await sleep(backoff(failures));
+    await pause(backoff(failures));
   }
 }
 
@@ -63,7 +66,7 @@ async function participant(): Promise<void> {
 /** One visit from load to reload; true when the run is complete. */
 async function visit(factory: IDBFactory, client_id: string): Promise<boolean> {
   const started = await insist<StartedRun>("POST", `/api/links/${link}/runs`, { body: { language: "en", client_id, query: {}, device: {} } });
-  const outbox = new Outbox(await IndexedDbStore.open(factory), { send: watched(started.run_id) });
+  const outbox = new Outbox(await IndexedDbStore.open(factory), { send: watched(started.run_id), pause });
   const unsent = await flush(outbox, started);
   const run = await insist<RunDocument>("GET", "/api/run", { token: started.run_token });
   if (!run.consented_at) await outbox.put("PUT", "/api/run/consent", { agreed: true });

@@ -70,11 +70,33 @@ describe("outbox", () => {
     expect(await store.all()).toHaveLength(0);
   });
 
-  it("tells when the run's token is not valid any more", async () => {
-    const onUnauthorized = vi.fn();
-    const { outbox } = await opened(new IDBFactory(), [401], { onUnauthorized });
+  it("tells of what is refused for good, of this run only", async () => {
+    const factory = new IDBFactory();
+    const other = await opened(factory, ["silence", "silence"], { pause: () => new Promise<void>(() => {}) });
+    await other.outbox.put("PUT", "/other", {});
+    other.outbox.stop();
+    const onRefused = vi.fn();
+    const fake = server([401, 409]);
+    const outbox = new Outbox(await IndexedDbStore.open(factory), { send: fake.send, pause: noPause, onRefused });
+    await outbox.open("second run", "token");
     await (await outbox.put("PUT", "/a", {})).receipt;
-    expect(onUnauthorized).toHaveBeenCalledOnce();
+    expect(onRefused).toHaveBeenCalledOnce();
+    expect(onRefused.mock.calls[0]?.[0]).toMatchObject({ status: 409 });
+  });
+
+  it("tells of a write that was accepted before it is forgotten", async () => {
+    const factory = new IDBFactory();
+    const seen: [string, unknown, number][] = [];
+    const store = await IndexedDbStore.open(factory);
+    let left = 1;
+    const outbox = new Outbox(store, {
+      send: server().send, pause: noPause,
+      onAccepted: (item, body) => void seen.push([item.path, body, left]),
+    });
+    await outbox.open("run", "token");
+    const { receipt } = await outbox.put("PUT", "/a", {});
+    await receipt.then(() => (left = 0));
+    expect(seen).toEqual([["/a", { receipt: "/a" }, 1]]);
   });
 
   it("sends events together, after the writes", async () => {

@@ -50,13 +50,14 @@ describe("actual size", () => {
 });
 
 describe("gates", () => {
-  const fine: Abilities = { secure: true, web_codecs: true, video: true, storage: true, touch_only: false, screen_width_px: 1_440, screen_height_px: 900 };
+  const fine: Abilities = { secure: true, web_codecs: true, video: true, h264: true, storage: true, touch_only: false, screen_width_px: 1_440, screen_height_px: 900 };
   const gates = { minimum_width_px: 800, minimum_height_px: 500, allow_touch: true, full_screen: true, calibrate: "required" as const, viewing_distance: false, inter_ocular_mm: 60 };
   it.each([
     [{}, []],
     [{ secure: false }, ["gate_insecure"]],
     [{ web_codecs: false }, ["gate_video"]],
     [{ web_codecs: false, video: false }, ["gate_browser"]],
+    [{ h264: false }, ["gate_h264"]],
     [{ storage: false }, ["gate_storage"]],
     [{ screen_width_px: 390, screen_height_px: 844 }, ["gate_screen"]],
     [{ screen_width_px: 768, screen_height_px: 1_024 }, []],

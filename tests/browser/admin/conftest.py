@@ -62,6 +62,7 @@ def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> 
                 asked = [int(letter) for letter in (trial["prompt"] or "") if letter.isdigit()]
                 person.rate(trial, *(asked[:1] or [chance.randint(2, 7)]))
             if number:
+                person.answer_forms()
                 person.request("POST", "/complete")
     process.start()
     yield process

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Page, expect
 
-from stimuli_builder.blinks.labelling import preset
+from stimuli_builder.blinks.label_options import preset
 from stimuli_builder.blinks.run import BlinksJob, run_blinks
 from stimuli_builder.tracking.labels import load_labels
 from tests.browser.admin.conftest import Dashboard

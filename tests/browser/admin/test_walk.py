@@ -5,11 +5,13 @@ import os
 import re
 from pathlib import Path
 
+import pyotp
 import pytest
 from playwright.sync_api import expect
 
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.visit import axe_violations
+from tests.helpers.admins import PASSWORD
 
 pytestmark = pytest.mark.browser
 PAGES = {
@@ -22,12 +24,14 @@ PAGES = {
     "monitor": ("/studies/short/monitor", "How far people come"),
     "results": ("/studies/short/results", "Analysis reports"),
     "data": ("/studies/short/data", "Psych-DS dataset"),
-    "participants": ("/studies/short/participants", "Plays not good"),
+    "participants": ("/studies/short/participants", "12 of 12"),
     "settings": ("/studies/short/settings", "Versions"),
-    "people": ("/people", "Make a one-time link"),
-    "audit": ("/audit", "account created"),
+    "people": ("/people", "Invite somebody"),
+    "audit": ("/audit", "account created: account ada"),
     "account": ("/account", "API tokens"),
     "blinks": ("/blinks", "Component 1"),
+    "labelling": ("/labelling", "Points round the eyes"),
+    "review": ("/blink-review", "The blinks that"),
 }
 
 
@@ -49,7 +53,7 @@ def test_a_page_shows_what_it_should_and_is_accessible(dashboard: Dashboard, nam
     assert dashboard.complaints == []
 
 
-@pytest.mark.parametrize("name", ["studies", "monitor", "results"])
+@pytest.mark.parametrize("name", PAGES)
 def test_dark_and_narrow(dashboard: Dashboard, name: str) -> None:
     page = dashboard.page
     page.emulate_media(color_scheme="dark")
@@ -71,6 +75,54 @@ def test_the_monitor_is_live(dashboard: Dashboard) -> None:
     page = dashboard.open("/studies/short/monitor")
     expect(page.get_by_text("finished").first).to_be_visible()
     assert page.locator("canvas").count() == 4
+
+
+def test_the_timeline_of_a_run_shows_each_trial(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/participants")
+    page.get_by_role("table").get_by_role("link").first.click()
+    page.get_by_text("Each frame drawn").wait_for()
+    shoot(dashboard, "timeline")
+    assert axe_violations(page) == []
+
+
+def test_a_page_asked_for_before_signing_in_opens_afterwards(dashboard: Dashboard) -> None:
+    browser = dashboard.page.context.browser
+    assert browser is not None
+    context = browser.new_context(locale="en-GB")
+    page = context.new_page()
+    page.goto(f"{dashboard.server.address}/admin/studies/short/links")
+    page.get_by_label("Name").fill("ada")
+    page.locator("input[autocomplete=current-password]").fill(PASSWORD)
+    assert axe_violations(page) == []
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("heading", name="New links")).to_be_visible()
+    context.close()
+
+
+@pytest.mark.parametrize("token", ["", "nonsense"])
+def test_an_invitation_that_is_none_says_what_to_do(dashboard: Dashboard, token: str) -> None:
+    browser = dashboard.page.context.browser
+    assert browser is not None
+    context = browser.new_context(locale="en-GB")
+    page = context.new_page()
+    page.goto(f"{dashboard.server.address}/admin/invitation#{token}")
+    expect(page.get_by_role("alert")).to_contain_text("Ask an owner of this server for a new one")
+    assert axe_violations(page) == []
+    context.close()
+
+
+def test_the_second_factor_is_set_up_and_turned_off(dashboard: Dashboard) -> None:
+    page = dashboard.open("/account")
+    page.get_by_role("button", name="Set up").click()
+    secret = page.locator("pre").first.inner_text().strip()
+    assert axe_violations(page) == []
+    shoot(dashboard, "second-factor")
+    page.get_by_label("Code of the app").locator("input").first.click()
+    page.keyboard.type(pyotp.TOTP(secret).now())
+    expect(page.get_by_text("Keep these recovery codes")).to_be_visible()
+    page.get_by_label("Password, to turn it off").fill(PASSWORD)
+    page.get_by_role("button", name="Turn off").click()
+    expect(page.get_by_role("button", name="Set up")).to_be_visible()
 
 
 def test_a_participant_is_excluded_and_taken_back(dashboard: Dashboard) -> None:

@@ -70,6 +70,21 @@ def test_a_screen_that_is_too_small(server: ServerProcess, tmp_path: Path, chrom
     assert "gate_screen" in reasons(server)
 
 
+def test_without_h264_the_participant_is_warned_and_may_try(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    page.add_init_script("VideoDecoder.isConfigSupported = async (config) => ({config, supported: false})")
+    visit = Visit(page, server.address).open(study.link_token)
+    page.wait_for_selector("text=H.264")
+    page.wait_for_load_state("networkidle")
+    assert axe_violations(page) == []
+    page.click("text=Go on all the same")
+    visit.begin()
+    assert "gate_h264" in reasons(server)
+
+
 def test_without_webcodecs_the_video_element_is_used_and_flagged(
     server: ServerProcess, tmp_path: Path, page: Page
 ) -> None:

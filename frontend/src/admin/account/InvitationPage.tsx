@@ -1,75 +1,81 @@
 /** Where a one-time link leads: make an account. The token stands behind '#', so no log ever sees it. */
 
-import { Button, Container, Paper, PasswordInput, Stack, Text, TextInput, Title } from "@mantine/core";
-import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { useNavigate } from "@tanstack/react-router";
-import { type FormEvent, useState } from "react";
-import { api, unwrap } from "../api";
-import { sessionQuery } from "../queries";
-import { Answer, ErrorAlert } from "../ui/Answer";
+import { Alert, Anchor, Text } from "@mantine/core";
+import { useMutation, useQuery } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
+import { useState } from "react";
+import { api, Refused, type Schemas, unwrap } from "../api";
+import { Answer } from "../ui/Answer";
+import { EntryForm, EntryPage } from "./EntryPage";
+import { NameField, PasswordField } from "./fields";
+import { useEntered } from "./useEntered";
+
+const CLOSED: Record<string, string> = {
+  used: "This link has been used already.",
+  expired: "This link was valid for a week and has expired.",
+  not_found: "This link is not complete, or was withdrawn.",
+};
 
 export function InvitationPage() {
   const [token] = useState(() => window.location.hash.slice(1));
-  const [name, setName] = useState("");
-  const [password, setPassword] = useState("");
-  const navigate = useNavigate();
-  const queries = useQueryClient();
-  const path = { params: { path: { token } } };
   const invitation = useQuery({
     queryKey: ["invitation", token],
-    queryFn: () => unwrap(api.GET("/api/admin/invitations/{token}/state", path)),
+    queryFn: () =>
+      unwrap(api.GET("/api/admin/invitations/{token}/state", { params: { path: { token: token || "-" } } })),
   });
+  const unknown = invitation.error instanceof Refused && invitation.error.status === 404;
+  return (
+    <EntryPage title="Welcome to Palpebra">
+      {unknown ? (
+        <Closed why="not_found" />
+      ) : (
+        <Answer of={invitation}>
+          {({ role, status }) =>
+            status === "open" ? <MakeAccount token={token} role={role} /> : <Closed why={status} />
+          }
+        </Answer>
+      )}
+    </EntryPage>
+  );
+}
+
+function Closed({ why }: { why: string }) {
+  return (
+    <Alert color="yellow" title={CLOSED[why] ?? CLOSED["not_found"]} role="alert">
+      <Text size="sm" mb="xs">
+        Ask an owner of this server for a new one: People, “Make a one-time link”.
+      </Text>
+      <Anchor component={Link} to="/sign-in" size="sm">
+        I have an account
+      </Anchor>
+    </Alert>
+  );
+}
+
+const MAY: Record<Schemas["InvitationState"]["role"], string> = {
+  owner: "You will be an owner: you may do everything, accounts included.",
+  experimenter: "You will be an experimenter: you may make and change studies.",
+  viewer: "You will be a viewer: you may look at studies and their data.",
+};
+
+function MakeAccount({ token, role }: { token: string; role: Schemas["InvitationState"]["role"] }) {
+  const [name, setName] = useState("");
+  const [password, setPassword] = useState("");
   const accept = useMutation({
     mutationFn: () =>
-      unwrap(api.POST("/api/admin/invitations/{token}/account", { ...path, body: { name, password } })),
-    onSuccess: (me) => {
-      queries.setQueryData(sessionQuery.queryKey, me);
-      void navigate({ to: "/" });
-    },
+      unwrap(
+        api.POST("/api/admin/invitations/{token}/account", {
+          params: { path: { token } },
+          body: { name, password },
+        }),
+      ),
+    onSuccess: useEntered(),
   });
-  const submit = (event: FormEvent) => {
-    event.preventDefault();
-    accept.mutate();
-  };
   return (
-    <Container size={420} py={64} component="main">
-      <Title order={1} ta="center" mb="lg">
-        Welcome to Palpebra
-      </Title>
-      <Answer of={invitation}>
-        {({ role, status }) =>
-          status !== "open" ? (
-            <Text ta="center">This link was {status === "used" ? "used already" : "valid for a week and has expired"}; ask for a new one.</Text>
-          ) : (
-            <Paper withBorder p="lg" component="form" onSubmit={submit}>
-              <Stack>
-                <Text>You will be: {role}.</Text>
-                <TextInput
-                  label="Name to sign in with"
-                  autoComplete="username"
-                  required
-                  value={name}
-                  onChange={(event) => setName(event.currentTarget.value)}
-                />
-                <PasswordInput
-                  label="Password"
-                  description="At least 10 characters."
-                  autoComplete="new-password"
-                  required
-                  minLength={10}
-                  value={password}
-                  onChange={(event) => setPassword(event.currentTarget.value)}
-                  visibilityToggleButtonProps={{ "aria-label": "Show the password" }}
-                />
-                {accept.error !== null && <ErrorAlert error={accept.error} />}
-                <Button type="submit" loading={accept.isPending}>
-                  Make the account
-                </Button>
-              </Stack>
-            </Paper>
-          )
-        }
-      </Answer>
-    </Container>
+    <EntryForm sending={accept} button="Make the account">
+      <Text size="sm">{MAY[role]}</Text>
+      <NameField label="Name to sign in with" value={name} onChange={setName} />
+      <PasswordField label="Password" fresh value={password} onChange={setPassword} />
+    </EntryForm>
   );
 }

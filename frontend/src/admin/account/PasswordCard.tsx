@@ -1,7 +1,8 @@
-import { Button, Card, PasswordInput, Stack, Title } from "@mantine/core";
+import { Button, Card, Stack, Title } from "@mantine/core";
 import { type FormEvent, useState } from "react";
 import { api, unwrap } from "../api";
 import { useChange } from "../ui/useChange";
+import { PasswordField } from "./fields";
 
 export function PasswordCard() {
   const [password, setPassword] = useState("");
@@ -21,32 +22,15 @@ export function PasswordCard() {
     event.preventDefault();
     change.mutate(undefined);
   };
-  const eye = { visibilityToggleButtonProps: { "aria-label": "Show the password" } };
   return (
     <Card withBorder component="form" onSubmit={submit}>
-      <Stack>
+      <Stack align="flex-start">
         <Title order={2} size="h4">
           Password
         </Title>
-        <PasswordInput
-          label="Present password"
-          autoComplete="current-password"
-          required
-          value={password}
-          onChange={(event) => setPassword(event.currentTarget.value)}
-          {...eye}
-        />
-        <PasswordInput
-          label="New password"
-          description="At least 10 characters."
-          autoComplete="new-password"
-          required
-          minLength={10}
-          value={fresh}
-          onChange={(event) => setFresh(event.currentTarget.value)}
-          {...eye}
-        />
-        <Button type="submit" loading={change.isPending} maw={220}>
+        <PasswordField w="100%" maw={360} label="Present password" value={password} onChange={setPassword} />
+        <PasswordField w="100%" maw={360} label="New password" fresh value={fresh} onChange={setFresh} />
+        <Button type="submit" loading={change.isPending}>
           Change the password
         </Button>
       </Stack>

@@ -1,9 +1,10 @@
-import { Alert, Button, Card, Code, Group, PasswordInput, PinInput, Stack, Text, Title } from "@mantine/core";
+import { Alert, Button, Card, Code, Group, PinInput, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { sessionQuery } from "../queries";
 import { useChange } from "../ui/useChange";
+import { PasswordField } from "./fields";
 
 export function SecondFactorCard() {
   const { data } = useQuery(sessionQuery);
@@ -13,7 +14,7 @@ export function SecondFactorCard() {
   const on = data?.account?.second_factor === true;
   return (
     <Card withBorder>
-      <Stack>
+      <Stack align="flex-start">
         <Title order={2} size="h4">
           Second factor
         </Title>
@@ -22,8 +23,8 @@ export function SecondFactorCard() {
           <Remove />
         ) : setup === null ? (
           <>
-            <Text>An authenticator app on your phone makes a stolen password useless.</Text>
-            <Button maw={220} onClick={() => start.mutate(undefined)} loading={start.isPending}>
+            <Text size="sm">Off. With an authenticator app on your phone, a stolen password alone is useless.</Text>
+            <Button onClick={() => start.mutate(undefined)} loading={start.isPending}>
               Set up
             </Button>
           </>
@@ -49,9 +50,11 @@ function Confirm({ setup, done }: { setup: Schemas["SecondFactorSetup"]; done: (
   const picture = `data:image/svg+xml;utf8,${encodeURIComponent(setup.qr_svg)}`;
   return (
     <>
-      <Text>Scan this with your authenticator app, or type the secret in, then enter the app's code.</Text>
-      <img src={picture} alt="QR code of the secret" width={200} height={200} />
-      <Code block>{setup.secret}</Code>
+      <Text size="sm">Scan this with your authenticator app, or type the secret in; then enter the code that the app shows.</Text>
+      <img src={picture} alt="QR code of the secret" width={200} height={200} className="qr" />
+      <Code block className="wrap-anywhere">
+        {setup.secret}
+      </Code>
       <PinInput
         length={6}
         type="number"
@@ -80,14 +83,10 @@ function Remove() {
   });
   return (
     <Group align="end">
-      <Text w="100%">The second factor is on.</Text>
-      <PasswordInput
-        label="Password, to turn it off"
-        value={password}
-        onChange={(event) => setPassword(event.currentTarget.value)}
-        visibilityToggleButtonProps={{ "aria-label": "Show the password" }}
-        w={260}
-      />
+      <Text w="100%" size="sm">
+        On: signing in asks for the code of your authenticator app.
+      </Text>
+      <PasswordField label="Password, to turn it off" required={false} value={password} onChange={setPassword} w={260} />
       <Button variant="default" disabled={password === ""} onClick={() => remove.mutate(undefined)}>
         Turn off
       </Button>

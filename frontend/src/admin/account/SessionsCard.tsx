@@ -1,8 +1,9 @@
-import { Badge, Button, Card, Table, Title } from "@mantine/core";
+import { Badge, Button, Card, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
-import { when } from "../ui/format";
+import { DataTable } from "../ui/DataTable";
+import { browserName, when } from "../ui/format";
 import { useChange } from "../ui/useChange";
 
 export function SessionsCard() {
@@ -18,34 +19,26 @@ export function SessionsCard() {
       </Title>
       <Answer of={sessions}>
         {(rows) => (
-          <Table.ScrollContainer minWidth={520}>
-            <Table>
-              <Table.Thead>
-                <Table.Tr>
-                  <Table.Th>Browser</Table.Th>
-                  <Table.Th>Last seen</Table.Th>
-                  <Table.Th>Action</Table.Th>
-                </Table.Tr>
-              </Table.Thead>
-              <Table.Tbody>
-                {rows.map((row) => (
-                  <Table.Tr key={row.id}>
-                    <Table.Td className="wrap-anywhere">{row.user_agent.slice(0, 80) || "unknown"}</Table.Td>
-                    <Table.Td>{when(row.last_seen_at)}</Table.Td>
-                    <Table.Td>
-                      {row.current ? (
-                        <Badge variant="light">this one</Badge>
-                      ) : (
-                        <Button size="xs" variant="default" onClick={() => end.mutate(row.id)}>
-                          Sign out
-                        </Button>
-                      )}
-                    </Table.Td>
-                  </Table.Tr>
-                ))}
-              </Table.Tbody>
-            </Table>
-          </Table.ScrollContainer>
+          <DataTable
+            rows={rows}
+            rowKey={(row) => row.id}
+            empty="Nowhere."
+            columns={[
+              { title: "Browser", cell: (row) => <span title={row.user_agent}>{browserName(row.user_agent)}</span> },
+              { title: "Last seen", wide: true, cell: (row) => when(row.last_seen_at) },
+              {
+                title: "Action",
+                cell: (row) =>
+                  row.current ? (
+                    <Badge variant="default">this one</Badge>
+                  ) : (
+                    <Button size="xs" variant="default" onClick={() => end.mutate(row.id)}>
+                      Sign out
+                    </Button>
+                  ),
+              },
+            ]}
+          />
         )}
       </Answer>
     </Card>

@@ -1,9 +1,10 @@
-import { Alert, Button, Card, Checkbox, Code, Group, Stack, Table, Text, TextInput, Title } from "@mantine/core";
+import { Alert, Button, Card, Checkbox, Code, Group, Stack, Text, TextInput, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
+import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
 
@@ -37,7 +38,9 @@ export function TokensCard() {
         <Text size="sm">For scripts: send it as “Authorization: Bearer …”. A token can do no more than you.</Text>
         {fresh !== null && (
           <Alert title="Your new token, shown only now" color="yellow">
-            <Code block>{fresh}</Code>
+            <Code block className="wrap-anywhere">
+              {fresh}
+            </Code>
           </Alert>
         )}
         <Group align="end">
@@ -54,42 +57,31 @@ export function TokensCard() {
           </Button>
         </Group>
         <Answer of={tokens}>
-          {(rows) =>
-            rows.length === 0 ? (
-              <Text c="dimmed">No tokens.</Text>
-            ) : (
-              <Table.ScrollContainer minWidth={480}>
-                <Table>
-                  <Table.Thead>
-                    <Table.Tr>
-                      <Table.Th>Name</Table.Th>
-                      <Table.Th>May</Table.Th>
-                      <Table.Th>Last used</Table.Th>
-                      <Table.Th>Action</Table.Th>
-                    </Table.Tr>
-                  </Table.Thead>
-                  <Table.Tbody>
-                    {rows.map((row) => (
-                      <Table.Tr key={row.id}>
-                        <Table.Td>{row.name}</Table.Td>
-                        <Table.Td>{row.scopes.join(", ")}</Table.Td>
-                        <Table.Td>{when(row.last_used_at)}</Table.Td>
-                        <Table.Td>
-                          <ConfirmButton
-                            size="xs"
-                            label="Revoke"
-                            question={`Scripts that use “${row.name}” will stop working.`}
-                            confirm="Revoke"
-                            onConfirm={() => revoke.mutate(row.id)}
-                          />
-                        </Table.Td>
-                      </Table.Tr>
-                    ))}
-                  </Table.Tbody>
-                </Table>
-              </Table.ScrollContainer>
-            )
-          }
+          {(rows) => (
+            <DataTable
+              rows={rows}
+              rowKey={(row) => row.id}
+              empty="No tokens."
+              columns={[
+                { title: "Name", cell: (row) => row.name },
+                { title: "May", cell: (row) => row.scopes.join(", ") },
+                { title: "Last used", wide: true, cell: (row) => when(row.last_used_at) },
+                { title: "Ends", wide: true, cell: (row) => when(row.expires_at) },
+                {
+                  title: "Action",
+                  cell: (row) => (
+                    <ConfirmButton
+                      size="xs"
+                      label="Revoke"
+                      question={`Scripts that use “${row.name}” will stop working.`}
+                      confirm="Revoke"
+                      onConfirm={() => revoke.mutate(row.id)}
+                    />
+                  ),
+                },
+              ]}
+            />
+          )}
         </Answer>
       </Stack>
     </Card>

@@ -1,5 +1,7 @@
-import { Anchor, Card, Code, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Button, Card, Code, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
+import { studyQuery } from "../queries";
 
 const FILES: [file: string, title: string, words: string][] = [
   ["ratings.csv", "Ratings", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
@@ -11,25 +13,44 @@ const FILES: [file: string, title: string, words: string][] = [
 
 export function DataTab() {
   const { study = "" } = useParams({ strict: false });
+  const detail = useQuery(studyQuery(study)).data;
+  const version = detail?.summary.version ?? 1;
   return (
     <Stack>
+      <Text size="sm">
+        Pilot and live data, excluded runs and simulated people are all in the files, each marked in its column; previews
+        and erased people are not.
+      </Text>
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
         {FILES.map(([file, title, words]) => (
           <Card withBorder key={file}>
             <Title order={2} size="h4">
               {title}
             </Title>
-            <Text size="sm" my="xs">
+            <Text size="sm" mt={4} mb="md">
               {words}
             </Text>
-            <Anchor href={`/api/admin/studies/${study}/data/${file}`} download>
+            <Button
+              component="a"
+              variant="default"
+              mt="auto"
+              style={{ alignSelf: "flex-start" }}
+              href={`/api/admin/studies/${study}/data/${file}`}
+              download
+            >
               Download {file}
-            </Anchor>
+            </Button>
           </Card>
         ))}
       </SimpleGrid>
-      <Text size="sm">On the server's command line:</Text>
-      <Code block>{`server export ${study} --out ${study}.csv\nanalysis run definition.toml --csv ${study}.csv`}</Code>
+      <Text size="sm">
+        The same on the server's command line, and the analysis; the{" "}
+        <Anchor underline="always" href={`/api/admin/studies/${study}/versions/${version}`} download={`${study}.toml`}>
+          definition
+        </Anchor>{" "}
+        saved as {study}.toml:
+      </Text>
+      <Code block tabIndex={0} aria-label="Commands">{`server export ${study} --out ${study}.csv\nserver export ${study} --format psych-ds --out ${study}.zip\nanalysis run ${study}.toml --csv ${study}.csv`}</Code>
     </Stack>
   );
 }

@@ -4,7 +4,7 @@ import type { Schemas } from "../api";
 import { closurePlot } from "../studies/closurePlot";
 import { downloadText } from "../ui/download";
 import { PlotFigure } from "../ui/PlotFigure";
-import { Eye } from "./Eye";
+import { Character } from "./Character";
 import { blinkOf, readModel } from "./model";
 import { curveCsv } from "./Recorded";
 
@@ -19,8 +19,9 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
         <Stack gap="lg">
           {model.explained.map((share, mode) => (
             <div key={`mode${String(mode)}`}>
-              <Text size="sm">
-                Component {mode + 1}: {(100 * share).toFixed(1)}% of the variance
+              <Text size="sm" className="number">
+                Component {mode + 1}: {(100 * share).toFixed(1)}% of the variance, now at{" "}
+                {(deviations[mode] ?? 0).toFixed(1)} sd
               </Text>
               <Slider
                 min={-2}
@@ -50,8 +51,8 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
           </Text>
         </Stack>
       </Card>
-      <Card withBorder>
-        <Eye closure={closure} fps={model.fps} />
+      <Card withBorder className="first-when-narrow">
+        <Character closure={closure} fps={model.fps} />
         <PlotFigure options={options} label="Closure of this blink over time" />
         <Text size="sm">
           {((closure.length * 1000) / model.fps).toFixed(0)} ms, greatest closure {Math.max(...closure).toFixed(2)}

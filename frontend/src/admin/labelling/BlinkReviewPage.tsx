@@ -8,7 +8,7 @@ import { OpenFile } from "./OpenFile";
 import { TraceView } from "./TraceView";
 import { useBlinkReview } from "./useBlinkReview";
 import { useShortcuts } from "./useShortcuts";
-import { useUnsaved } from "./useUnsaved";
+import { useUnsaved } from "../ui/useUnsaved";
 
 type Review = ReturnType<typeof useBlinkReview>;
 

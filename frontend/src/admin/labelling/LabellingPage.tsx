@@ -11,7 +11,7 @@ import { OpenFile } from "./OpenFile";
 import { Stage } from "./Stage";
 import { useLabelling } from "./useLabelling";
 import { useShortcuts } from "./useShortcuts";
-import { useUnsaved } from "./useUnsaved";
+import { useUnsaved } from "../ui/useUnsaved";
 
 type Labelling = ReturnType<typeof useLabelling>;
 

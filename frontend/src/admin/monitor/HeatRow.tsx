@@ -1,8 +1,7 @@
 /** One run of the heat map: a picture one pixel a trial, stretched by the page. */
 
 import { useEffect, useRef } from "react";
-
-const COLOURS: Record<string, string> = { ".": "#8883", g: "#2a9d74", f: "#e0a100", x: "#d1383d" };
+import { TRIAL_COLOURS } from "./colours";
 
 export function HeatRow({ heat, label }: { heat: string; label: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -11,7 +10,7 @@ export function HeatRow({ heat, label }: { heat: string; label: string }) {
     if (drawing == null) return;
     drawing.clearRect(0, 0, heat.length, 1);
     for (let trial = 0; trial < heat.length; trial += 1) {
-      drawing.fillStyle = COLOURS[heat[trial] ?? "."] ?? "#888";
+      drawing.fillStyle = TRIAL_COLOURS[heat[trial] as keyof typeof TRIAL_COLOURS][0];
       drawing.fillRect(trial, 0, 1, 1);
     }
   }, [heat]);

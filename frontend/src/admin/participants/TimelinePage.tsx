@@ -4,7 +4,7 @@ import { Link, useParams } from "@tanstack/react-router";
 import { api, unwrap } from "../api";
 import { useMay } from "../queries";
 import { Answer } from "../ui/Answer";
-import { when } from "../ui/format";
+import { when, words } from "../ui/format";
 import { RunActions } from "./RunActions";
 import { TrialTable } from "./TrialTable";
 
@@ -29,17 +29,17 @@ export function TimelinePage() {
                   {data.summary.participant}
                 </Title>
                 <Text size="sm" c="dimmed">
-                  {data.summary.status}, began {when(data.summary.started_at)}, agreed {when(data.consented_at)},{" "}
+                  {words(data.summary.status)}, began {when(data.summary.started_at)}, {data.consented_at === null ? "has not agreed" : `agreed ${when(data.consented_at)}`},{" "}
                   {data.summary.minutes.toFixed(1)} minutes, language {data.summary.language}, through “
                   {data.summary.link}”
                 </Text>
-                {data.summary.excluded && <Text c="red">Excluded: {data.summary.exclusion_reason}</Text>}
+                {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>
               {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} />}
             </Group>
-            <Group align="start">
+            <Group align="stretch">
               {data.forms.map((form) => (
-                <Facts key={form.form} title={form.form} values={form.answers} />
+                <Facts key={form.form} title={`Form “${words(form.form)}”`} values={form.answers} />
               ))}
               {data.calibrations.map((one) => (
                 <Facts
@@ -58,7 +58,7 @@ export function TimelinePage() {
                 </Title>
                 {data.events.map((event, place) => (
                   <Text size="sm" key={`${event.received_at}${String(place)}`}>
-                    {when(event.received_at)}: {event.type.replaceAll("_", " ")}
+                    {when(event.received_at)}: {words(event.type)}
                   </Text>
                 ))}
               </Card>
@@ -80,7 +80,7 @@ function Facts({ title, values }: { title: string; values: Record<string, unknow
       </Title>
       {entries.map(([name, value]) => (
         <Text size="sm" key={name} className="wrap-anywhere">
-          {name}: {typeof value === "object" ? JSON.stringify(value) : String(value)}
+          {words(name)}: {typeof value === "object" ? JSON.stringify(value) : String(value)}
         </Text>
       ))}
     </Card>

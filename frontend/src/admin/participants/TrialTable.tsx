@@ -1,55 +1,62 @@
 /** Every play of a run: what was shown, frame by frame, and what was answered. */
 
-import { Badge, Table, Text } from "@mantine/core";
+import { Badge } from "@mantine/core";
 import type { Schemas } from "../api";
-import { fixed } from "../ui/format";
+import { type Column, DataTable } from "../ui/DataTable";
+import { fixed, words } from "../ui/format";
 
 type Trial = Schemas["TimelineTrial"];
 const COLOURS: Record<string, string> = { good: "teal.9", flagged: "yellow.9", failed: "red.9" };
 
+const COLUMNS: Column<Trial>[] = [
+  {
+    title: "Trial",
+    number: true,
+    cell: (trial) => (
+      <>
+        {trial.trial_index}
+        {trial.play > 1 && ` (play ${trial.play})`}{" "}
+        {trial.kind !== "main" && (
+          <Badge variant="default" size="sm">
+            {trial.kind}
+          </Badge>
+        )}
+      </>
+    ),
+  },
+  { title: "Clip", wrap: true, cell: (trial) => (trial.cell === null ? "–" : `${trial.cell} ${trial.exemplar ?? ""}`) },
+  {
+    title: "Answer",
+    number: true,
+    cell: (trial) => `${trial.response ?? "–"}${trial.expected_response === null ? "" : ` (asked for ${trial.expected_response})`}`,
+  },
+  { title: "After", number: true, wide: true, cell: (trial) => (trial.rt === null ? "–" : `${fixed(trial.rt, 0)} ms`) },
+  {
+    title: "Shown",
+    cell: (trial) => (
+      <Badge color={COLOURS[trial.verdict] ?? "gray.7"} size="sm" title={words(trial.verdict_rule)}>
+        {trial.verdict}
+      </Badge>
+    ),
+  },
+  {
+    title: "Frames",
+    number: true,
+    wide: true,
+    cell: (trial) => (trial.frames_drawn === null ? "–" : `${trial.frames_drawn}, ${trial.frames_missing ?? 0} missing`),
+  },
+  { title: "Each frame drawn", wide: true, cell: (trial) => (trial.drawn === null ? "–" : <Ticks drawn={trial.drawn} />) },
+];
+
 export function TrialTable({ trials }: { trials: Trial[] }) {
-  if (trials.length === 0) return <Text c="dimmed">No ratings.</Text>;
   return (
-    <Table.ScrollContainer minWidth={760}>
-      <Table verticalSpacing={3}>
-        <Table.Thead>
-          <Table.Tr>
-            <Table.Th>Trial</Table.Th>
-            <Table.Th>Clip</Table.Th>
-            <Table.Th>Answer</Table.Th>
-            <Table.Th>After</Table.Th>
-            <Table.Th>Shown</Table.Th>
-            <Table.Th>Frames</Table.Th>
-            <Table.Th w={220}>Drawn in time</Table.Th>
-          </Table.Tr>
-        </Table.Thead>
-        <Table.Tbody>
-          {trials.map((trial) => (
-            <Table.Tr key={`${String(trial.trial_index)}-${String(trial.play)}`}>
-              <Table.Td className="number">
-                {trial.trial_index}
-                {trial.play > 1 && ` (play ${trial.play})`} {trial.kind !== "main" && <Badge variant="default">{trial.kind}</Badge>}
-              </Table.Td>
-              <Table.Td>{trial.cell === null ? "" : `${trial.cell} ${trial.exemplar ?? ""}`}</Table.Td>
-              <Table.Td className="number">
-                {trial.response ?? "–"}
-                {trial.expected_response !== null && ` (asked for ${trial.expected_response})`}
-              </Table.Td>
-              <Table.Td className="number">{trial.rt === null ? "–" : `${fixed(trial.rt, 0)} ms`}</Table.Td>
-              <Table.Td>
-                <Badge color={COLOURS[trial.verdict] ?? "gray.7"} title={trial.verdict_rule}>
-                  {trial.verdict}
-                </Badge>
-              </Table.Td>
-              <Table.Td className="number">
-                {trial.frames_drawn === null ? "–" : `${trial.frames_drawn}, ${trial.frames_missing ?? 0} missing`}
-              </Table.Td>
-              <Table.Td>{trial.drawn !== null && <Ticks drawn={trial.drawn} />}</Table.Td>
-            </Table.Tr>
-          ))}
-        </Table.Tbody>
-      </Table>
-    </Table.ScrollContainer>
+    <DataTable
+      dense
+      rows={trials}
+      rowKey={(trial) => `${String(trial.trial_index)}-${String(trial.play)}`}
+      columns={COLUMNS}
+      empty="No ratings."
+    />
   );
 }
 

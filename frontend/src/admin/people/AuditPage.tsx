@@ -1,55 +1,61 @@
-import { Button, Stack, Table, Title } from "@mantine/core";
+import { Button, Center, Loader, Stack, Text, Title } from "@mantine/core";
 import { useInfiniteQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { ErrorAlert } from "../ui/Answer";
-import { when } from "../ui/format";
+import { DataTable } from "../ui/DataTable";
+import { when, words } from "../ui/format";
+
+const A_PAGE = 50;
 
 export function AuditPage() {
   const log = useInfiniteQuery({
     queryKey: ["audit"],
     queryFn: ({ pageParam }) =>
-      unwrap(api.GET("/api/admin/audit", { params: { query: { before: pageParam, limit: 100 } } })),
+      unwrap(api.GET("/api/admin/audit", { params: { query: { before: pageParam, limit: A_PAGE } } })),
     initialPageParam: null as number | null,
-    getNextPageParam: (last) => (last.length === 100 ? (last.at(-1)?.id ?? null) : null),
+    getNextPageParam: (last) => (last.length === A_PAGE ? (last.at(-1)?.id ?? null) : null),
   });
-  const rows = log.data?.pages.flat() ?? [];
   return (
     <Stack>
-      <Title order={1}>Audit log</Title>
-      {log.error !== null && <ErrorAlert error={log.error} />}
-      <Table.ScrollContainer minWidth={640}>
-        <Table>
-          <Table.Thead>
-            <Table.Tr>
-              <Table.Th>When</Table.Th>
-              <Table.Th>Who</Table.Th>
-              <Table.Th>What</Table.Th>
-              <Table.Th>Details</Table.Th>
-            </Table.Tr>
-          </Table.Thead>
-          <Table.Tbody>
-            {rows.map((row) => (
-              <Table.Tr key={row.id}>
-                <Table.Td>{when(row.at)}</Table.Td>
-                <Table.Td>{row.actor}</Table.Td>
-                <Table.Td>
-                  {row.action} {row.target_kind} {row.target}
-                </Table.Td>
-                <Table.Td className="wrap-anywhere">
-                  {Object.entries(row.details)
-                    .map(([name, value]) => `${name}: ${String(value)}`)
-                    .join(", ")}
-                </Table.Td>
-              </Table.Tr>
-            ))}
-          </Table.Tbody>
-        </Table>
-      </Table.ScrollContainer>
+      <div>
+        <Title order={1}>Audit log</Title>
+        <Text size="sm" c="dimmed">
+          Every change that an account or the command line made, latest first.
+        </Text>
+      </div>
+      {log.error !== null && <ErrorAlert error={log.error} retry={() => void log.refetch()} />}
+      {log.isPending && (
+        <Center py="xl">
+          <Loader aria-label="Loading" />
+        </Center>
+      )}
+      {log.data !== undefined && (
+        <DataTable
+          rows={log.data.pages.flat()}
+          rowKey={(row) => row.id}
+          empty="Nothing yet."
+          paged={false}
+          columns={[
+            { title: "When", wrap: true, cell: (row) => when(row.at) },
+            { title: "Who", cell: (row) => row.actor },
+            { title: "What", wrap: true, cell: (row) => `${words(row.action)}: ${words(row.target_kind)} ${row.target}`.trim() },
+            { title: "Details", wrap: true, wide: true, cell: (row) => detailWords(row.details) },
+          ]}
+        />
+      )}
       {log.hasNextPage && (
-        <Button variant="default" maw={200} onClick={() => void log.fetchNextPage()}>
+        <Button variant="default" style={{ alignSelf: "flex-start" }} loading={log.isFetchingNextPage} onClick={() => void log.fetchNextPage()}>
           Earlier entries
         </Button>
       )}
     </Stack>
   );
+}
+
+/** "version 2, note: shorter text"; what is empty is left out. */
+function detailWords(details: Record<string, unknown>): string {
+  return Object.entries(details)
+    .filter(([, value]) => value !== "" && value !== null)
+    .map(([name, value]) => `${words(name)}: ${typeof value === "object" ? JSON.stringify(value) : String(value)}`)
+    .join(", ");
 }

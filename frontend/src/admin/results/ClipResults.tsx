@@ -1,6 +1,6 @@
 /** Every clip with its answers; the chosen one plays beside them. */
 
-import { Card, Group, ScrollArea, Stack, Table, Text, Title, UnstyledButton } from "@mantine/core";
+import { Card, Group, ScrollArea, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import type { Schemas } from "../api";
@@ -8,46 +8,75 @@ import { clipsQuery } from "../queries";
 import { ClipCard } from "../studies/ClipsTab";
 import { fixed } from "../ui/format";
 
+type Clip = Schemas["ClipResult"];
+const keyOf = (clip: Clip) => `${clip.cell} ${String(clip.exemplar)} ${clip.clip_sha256}`;
+
 export function ClipResults({ study, data }: { study: string; data: Schemas["Results"] }) {
   const clips = useQuery(clipsQuery(study));
-  const [chosen, setChosen] = useState<Schemas["ClipResult"] | null>(data.clips[0] ?? null);
-  const shown = clips.data?.find((clip) => clip.clip_sha256 === chosen?.clip_sha256 && clip.cell === chosen.cell);
+  const [chosen, setChosen] = useState("");
+  const current = data.clips.find((clip) => keyOf(clip) === chosen) ?? data.clips[0];
+  const shown = clips.data?.find((clip) => clip.clip_sha256 === current?.clip_sha256 && clip.cell === current.cell);
   return (
     <Card withBorder>
       <Title order={2} size="h4" mb="sm">
         Each clip
       </Title>
       <Group align="start" wrap="wrap">
-        <ScrollArea h={380} flex="1 1 420px" viewportProps={{ tabIndex: 0, "aria-label": "Clips" }}>
+        <ScrollArea h={420} flex="1 1 300px" viewportProps={{ tabIndex: 0, "aria-label": "Clips" }}>
           <Table stickyHeader>
             <Table.Thead>
               <Table.Tr>
                 <Table.Th>Clip</Table.Th>
                 <Table.Th>Ratings</Table.Th>
                 <Table.Th>Mean</Table.Th>
-                <Table.Th>Answers from {data.scale_minimum} to {data.scale_maximum}</Table.Th>
+                <Table.Th className="only-wide">
+                  Answers from {data.scale_minimum} to {data.scale_maximum}
+                </Table.Th>
               </Table.Tr>
             </Table.Thead>
             <Table.Tbody>
               {data.clips.map((clip) => (
-                <Table.Tr key={`${clip.cell}${String(clip.exemplar)}`} bg={clip === chosen ? "var(--mantine-color-default-hover)" : ""}>
+                <Table.Tr key={keyOf(clip)} bg={clip === current ? "var(--mantine-color-default-hover)" : ""}>
                   <Table.Td>
-                    <UnstyledButton onClick={() => setChosen(clip)} fz="sm" td="underline">
+                    <button type="button" className="line-link" aria-pressed={clip === current} onClick={() => setChosen(keyOf(clip))}>
                       {clip.cell} {clip.exemplar}
-                    </UnstyledButton>
+                    </button>
                   </Table.Td>
                   <Table.Td className="number">{clip.ratings}</Table.Td>
                   <Table.Td className="number">{fixed(clip.mean)}</Table.Td>
-                  <Table.Td className="number">{clip.counts.join("  ")}</Table.Td>
+                  <Table.Td className="only-wide">
+                    <Bars counts={clip.counts} lowest={data.scale_minimum} />
+                  </Table.Td>
                 </Table.Tr>
               ))}
             </Table.Tbody>
           </Table>
         </ScrollArea>
         <Stack flex="1 1 300px" maw={460}>
-          {shown === undefined ? <Text c="dimmed">Choose a clip to see it.</Text> : <ClipCard clip={shown} />}
+          {shown === undefined ? <Text c="dimmed">This clip is of an earlier version of the study.</Text> : <ClipCard key={shown.url} clip={shown} />}
         </Stack>
       </Group>
     </Card>
+  );
+}
+
+/** How often each answer was given: small bars, with the counts for those who hear the page. */
+function Bars({ counts, lowest }: { counts: number[]; lowest: number }) {
+  const most = Math.max(1, ...counts);
+  const label = counts.map((count, place) => `${place + lowest}: ${count}`).join(", ");
+  return (
+    <svg width={14 * counts.length} height={22} role="img" aria-label={label}>
+      <title>{label}</title>
+      {counts.map((count, place) => (
+        <rect
+          key={`${String(place)}`}
+          x={14 * place}
+          y={21 - (20 * count) / most}
+          width={11}
+          height={(20 * count) / most + 1}
+          fill="var(--mantine-primary-color-filled)"
+        />
+      ))}
+    </svg>
   );
 }

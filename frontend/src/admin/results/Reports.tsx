@@ -22,7 +22,7 @@ export function Reports({ study, phase }: { study: string; phase: "pilot" | "liv
   );
   return (
     <Card withBorder>
-      <Group justify="space-between" mb="sm">
+      <Group justify="space-between" mb="sm" gap="sm">
         <Title order={2} size="h4">
           Analysis reports
         </Title>
@@ -42,7 +42,7 @@ export function Reports({ study, phase }: { study: string; phase: "pilot" | "liv
       <Answer of={reports}>
         {(rows) =>
           rows.length === 0 ? (
-            <Text c="dimmed">None yet.</Text>
+            <Text c="dimmed">None yet. A report holds the tables, figures and the analysis of variance of this study.</Text>
           ) : (
             <Stack gap="xs">
               {rows.map((row) => (

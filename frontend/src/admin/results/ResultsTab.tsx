@@ -3,17 +3,21 @@ import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useMemo, useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
+import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
+import { words } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
-import { cellPlot, delayPlot, marginPlot, timePlot } from "./plots";
+import { cellPlot, delayPlot, type Factors, labelsOf, marginPlot, timePlot } from "./plots";
 import { Reports } from "./Reports";
 
 type Phase = "pilot" | "live";
 
 export function ResultsTab() {
   const { study = "" } = useParams({ strict: false });
-  const [phase, setPhase] = useState<Phase>("live");
+  const detail = useQuery(studyQuery(study)).data;
+  const [chosen, setPhase] = useState<Phase | null>(null);
+  const phase = chosen ?? (detail?.summary.status === "pilot" ? "pilot" : "live");
   const results = useQuery({
     queryKey: ["results", study, phase],
     queryFn: () =>
@@ -36,9 +40,9 @@ export function ResultsTab() {
       <Answer of={results}>
         {(data) =>
           data.ratings === 0 ? (
-            <Text c="dimmed">No ratings yet.</Text>
+            <Text c="dimmed">No ratings yet{phase === "live" ? " while the study was live" : " while the study was a pilot"}.</Text>
           ) : (
-            <Shown study={study} data={data} />
+            <Shown study={study} data={data} factors={detail?.design.factors ?? []} />
           )
         }
       </Answer>
@@ -47,20 +51,20 @@ export function ResultsTab() {
   );
 }
 
-function Shown({ study, data }: { study: string; data: Schemas["Results"] }) {
+function Shown({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
   const singles = data.margins.filter((margin) => margin.factors.length <= 2);
   const cells = useMemo(() => cellPlot(data), [data]);
   const times = useMemo(() => timePlot(data), [data]);
   const delays = useMemo(() => delayPlot(data), [data]);
   return (
     <Stack>
-      <Alert variant="light">
-        {data.participants} participants, {data.ratings} ratings. These are means as data arrive, for a look at whether
+      <Alert>
+        {data.participants} participants, {data.ratings.toLocaleString()} ratings. These are means as data arrive, for a look at whether
         all is well; the analysis is the report below.
       </Alert>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {singles.map((margin) => (
-          <MarginCard key={margin.factors.join(":")} margin={margin} data={data} />
+          <MarginCard key={margin.factors.join(":")} margin={margin} data={data} factors={factors} />
         ))}
         <Card withBorder>
           <Title order={2} size="h5">
@@ -78,11 +82,9 @@ function Shown({ study, data }: { study: string; data: Schemas["Results"] }) {
           <Title order={2} size="h5">
             How clips were shown
           </Title>
-          <Text size="sm">
-            {Object.entries({ ...data.playback.verdicts, ...data.playback.rules, ...data.playback.methods })
-              .map(([word, count]) => `${word}: ${String(count)}`)
-              .join(", ")}
-          </Text>
+          <Counts title="Verdicts" counts={data.playback.verdicts} />
+          <Counts title="Reasons" counts={data.playback.rules} />
+          <Counts title="Played by" counts={data.playback.methods} />
           <PlotFigure options={delays} label="Histogram of the time from key to first frame" />
         </Card>
       </SimpleGrid>
@@ -91,9 +93,25 @@ function Shown({ study, data }: { study: string; data: Schemas["Results"] }) {
   );
 }
 
-function MarginCard({ margin, data }: { margin: Schemas["Margin"]; data: Schemas["Results"] }) {
-  const options = useMemo(() => marginPlot(margin, data), [margin, data]);
-  const title = margin.factors.join(" x ");
+function Counts({ title, counts }: { title: string; counts: Record<string, number> }) {
+  const entries = Object.entries(counts);
+  if (entries.length === 0) return null;
+  return (
+    <Text size="sm">
+      {title}: {entries.map(([word, count]) => `${words(word)} ${count.toLocaleString()}`).join(", ")}
+    </Text>
+  );
+}
+
+interface MarginProps {
+  margin: Schemas["Margin"];
+  data: Schemas["Results"];
+  factors: Factors;
+}
+
+function MarginCard({ margin, data, factors }: MarginProps) {
+  const options = useMemo(() => marginPlot(margin, data, factors), [margin, data, factors]);
+  const title = margin.factors.map((name) => labelsOf(factors, name).title).join(" x ");
   return (
     <Card withBorder>
       <Title order={2} size="h5">

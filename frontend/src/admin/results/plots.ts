@@ -4,33 +4,51 @@ import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../api";
 
 type Results = Schemas["Results"];
+export type Factors = Schemas["DesignOut"]["factors"];
+
+/** The label of a level, and the labels of a factor in declared order. */
+export function labelsOf(factors: Factors, name: string): { title: string; of: (level: string) => string; all: string[] } {
+  const factor = factors.find((one) => one.name === name);
+  const labels = new Map(factor?.levels.map((level) => [level.name, level.label]) ?? []);
+  return { title: factor?.label ?? name, of: (level) => labels.get(level) ?? level, all: [...labels.values()] };
+}
 
 /** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
-export function marginPlot(margin: Schemas["Margin"], { scale_minimum, scale_maximum }: Results): Plot.PlotOptions {
+export function marginPlot(
+  margin: Schemas["Margin"],
+  { scale_minimum, scale_maximum }: Results,
+  factors: Factors,
+): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
+  const [across, beside] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
   const rows = margin.means.map((mean) => ({
-    x: mean.levels[first] ?? "",
-    colour: second === undefined ? "" : (mean.levels[second] ?? ""),
+    x: across.of(mean.levels[first] ?? ""),
+    colour: second === undefined ? "" : beside.of(mean.levels[second] ?? ""),
     mean: mean.mean,
     low: mean.mean - (mean.se_within ?? 0),
     high: mean.mean + (mean.se_within ?? 0),
   }));
-  const colour = second === undefined ? "currentColor" : "colour";
   const crossed = second !== undefined;
+  const colour = crossed ? "colour" : "currentColor";
   return {
-    height: 240,
-    marginBottom: 36,
-    x: { type: "point", padding: 0.6, label: null, domain: [...new Set(rows.map((row) => row.x))] },
+    height: 250,
+    marginBottom: 52,
+    x: { type: "point", padding: 0.6, label: null, domain: across.all.length > 0 ? across.all : rows.map((row) => row.x) },
     y: { domain: [scale_minimum, scale_maximum], grid: true, label: "mean rating" },
-    color: { legend: crossed, scheme: "observable10" },
+    color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: beside.all } : {}) },
     marks: [
+      // Long labels break into lines.
+      Plot.axisX({ lineWidth: 24 / Math.max(3, across.all.length), label: null }),
       ...(crossed ? [Plot.line(rows, { x: "x", y: "mean", stroke: "colour", z: "colour", strokeOpacity: 0.5 })] : []),
       Plot.ruleX(rows, { x: "x", y1: "low", y2: "high", stroke: colour, strokeWidth: 1.5 }),
-      Plot.dot(rows, { x: "x", y: "mean", fill: colour, r: 4, tip: true }),
+      Plot.dot(rows, { x: "x", y: "mean", fill: colour, r: 3, tip: true }),
     ],
   };
 }
 
+const SHARE_COLOUR = "#3c8697";
+
+/** One row a cell, one column an answer: the share of answers as depth of colour, and as a number. */
 export function cellPlot({ cells, scale_minimum }: Results): Plot.PlotOptions {
   const rows = cells.flatMap((cell) =>
     cell.counts.map((count, place) => ({
@@ -39,49 +57,58 @@ export function cellPlot({ cells, scale_minimum }: Results): Plot.PlotOptions {
       share: cell.ratings === 0 ? 0 : count / cell.ratings,
     })),
   );
+  const deepest = Math.max(0.01, ...rows.map((row) => row.share));
   return {
-    height: Math.max(160, 18 * cells.length + 60),
-    marginLeft: 190,
+    height: Math.max(140, 26 * cells.length + 50),
+    marginLeft: 12 + 7 * Math.max(4, ...cells.map((cell) => Math.min(22, cell.cell.length))),
+    marginBottom: 36,
     x: { label: "answer" },
-    y: { label: null },
-    color: { scheme: "blues", label: "share", legend: true },
-    marks: [Plot.cell(rows, { x: "response", y: "cell", fill: "share", inset: 0.5, tip: true })],
+    y: { label: null, domain: cells.map((cell) => cell.cell), tickFormat: (name: string) => (name.length > 22 ? `${name.slice(0, 21)}…` : name) },
+    marks: [
+      Plot.cell(rows, { x: "response", y: "cell", fill: SHARE_COLOUR, fillOpacity: (row: { share: number }) => (0.75 * row.share) / deepest, inset: 0.5 }),
+      Plot.text(rows, {
+        x: "response",
+        y: "cell",
+        text: (row: { share: number }) => (row.share >= 0.005 ? `${Math.round(100 * row.share)}%` : ""),
+        fill: "currentColor",
+        fontSize: 11,
+      }),
+    ],
+  };
+}
+
+/** A histogram of bins `step` wide that start at `from`. */
+function histogram(bins: { from: number; count: number }[], step: number, label: string, counted: string): Plot.PlotOptions {
+  return {
+    height: 210,
+    marginLeft: 52,
+    marginBottom: 36,
+    x: { label },
+    y: { label: counted, grid: true },
+    marks: [
+      Plot.rectY(bins, {
+        x1: "from",
+        x2: ({ from }: { from: number }) => from + step,
+        y: "count",
+        fill: SHARE_COLOUR,
+        tip: true,
+      }),
+      Plot.ruleY([0]),
+    ],
   };
 }
 
 export function timePlot({ response_times }: Results): Plot.PlotOptions {
-  const rows = response_times.filter(({ start_ms }) => start_ms <= 10_000);
-  return {
-    height: 200,
-    x: { label: "ms" },
-    y: { label: "answers", grid: true },
-    marks: [
-      Plot.rectY(rows, {
-        x1: "start_ms",
-        x2: ({ start_ms }: Schemas["TimeBin"]) => start_ms + 250,
-        y: "answers",
-        fill: "currentColor",
-        fillOpacity: 0.6,
-      }),
-      Plot.ruleY([0]),
-    ],
-  };
+  const bins = response_times.map(({ start_ms, answers }) => ({ from: start_ms, count: answers }));
+  return histogram(
+    bins.filter(({ from }) => from <= 10_000),
+    250,
+    "ms",
+    "answers",
+  );
 }
 
 export function delayPlot({ playback }: Results): Plot.PlotOptions {
-  return {
-    height: 160,
-    x: { label: "from key to first frame (ms; last bin: 100 and more)" },
-    y: { label: "plays", grid: true },
-    marks: [
-      Plot.rectY(playback.key_to_first_frame_ms, {
-        x1: (_, place: number) => 10 * place,
-        x2: (_, place: number) => 10 * place + 10,
-        y: (count: number) => count,
-        fill: "currentColor",
-        fillOpacity: 0.6,
-      }),
-      Plot.ruleY([0]),
-    ],
-  };
+  const bins = playback.key_to_first_frame_ms.map((count, place) => ({ from: 10 * place, count }));
+  return histogram(bins, 10, "from key to first frame (ms; last bin: 100 and more)", "plays");
 }

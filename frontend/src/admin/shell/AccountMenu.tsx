@@ -1,25 +1,20 @@
 import { Button, Menu, useMantineColorScheme } from "@mantine/core";
-import { useQueryClient } from "@tanstack/react-query";
-import { Link, useNavigate } from "@tanstack/react-router";
+import { Link } from "@tanstack/react-router";
 import { api, type Schemas, unwrap } from "../api";
 import { useChange } from "../ui/useChange";
 
 export function AccountMenu({ account }: { account: Schemas["AccountOut"] }) {
   const { colorScheme, setColorScheme } = useMantineColorScheme();
-  const navigate = useNavigate();
-  const queries = useQueryClient();
   const signOut = useChange(() => unwrap(api.DELETE("/api/admin/session")), {
     touches: [],
-    then: () => {
-      queries.clear();
-      void navigate({ to: "/sign-in" });
-    },
+    // A fresh page: nothing of what was loaded stays in memory for whoever comes next.
+    then: () => window.location.assign("/admin/sign-in"),
   });
   return (
     <Menu position="bottom-end">
       <Menu.Target>
         <Button variant="subtle" size="compact-md">
-          {account.name}
+          {account.name} ▾
         </Button>
       </Menu.Target>
       <Menu.Dropdown>

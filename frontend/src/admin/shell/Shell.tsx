@@ -1,22 +1,32 @@
 /** The frame of every page: who is signed in, where one can go. */
 
-import { AppShell, Burger, Group, NavLink, Text, Title } from "@mantine/core";
+import { AppShell, Burger, Group, NavLink, Text } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
-import { Link, Navigate, Outlet, useLocation } from "@tanstack/react-router";
+import { Link, Outlet, useLocation, useNavigate } from "@tanstack/react-router";
+import { useEffect, useState } from "react";
 import { sessionQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { AccountMenu } from "./AccountMenu";
 
 const PAGES = [
-  { to: "/", label: "Studies", role: "viewer" },
-  { to: "/blinks", label: "Blinks", role: "viewer" },
-  { to: "/labelling", label: "Label video", role: "viewer" },
-  { to: "/blink-review", label: "Review blinks", role: "viewer" },
-  { to: "/people", label: "People", role: "owner" },
-  { to: "/audit", label: "Audit log", role: "owner" },
-  { to: "/account", label: "My account", role: "viewer" },
+  { to: "/", label: "Studies", role: "viewer", group: "Rating" },
+  { to: "/blinks", label: "Blinks", role: "viewer", group: "Stimuli" },
+  { to: "/labelling", label: "Label video", role: "viewer", group: "Stimuli" },
+  { to: "/blink-review", label: "Review blinks", role: "viewer", group: "Stimuli" },
+  { to: "/people", label: "People", role: "owner", group: "This server" },
+  { to: "/audit", label: "Audit log", role: "owner", group: "This server" },
+  { to: "/account", label: "My account", role: "viewer", group: "This server" },
 ] as const;
+const GROUPS = [...new Set(PAGES.map(({ group }) => group))];
+
+/** Leads to the page to sign in, once: the address changes while that page still loads. */
+function ToSignIn({ from }: { from: string }) {
+  const navigate = useNavigate();
+  const [next] = useState(from);
+  useEffect(() => void navigate({ to: "/sign-in", search: { next }, replace: true }), [navigate, next]);
+  return null;
+}
 
 export function Shell() {
   const session = useQuery(sessionQuery);
@@ -26,7 +36,7 @@ export function Shell() {
     <Answer of={session}>
       {({ account }) =>
         account === null ? (
-          <Navigate to="/sign-in" search={{ next: pathname }} replace />
+          <ToSignIn from={pathname} />
         ) : (
           <AppShell
             header={{ height: 52 }}
@@ -40,9 +50,9 @@ export function Shell() {
               <Group h="100%" px="md" justify="space-between" wrap="nowrap">
                 <Group gap="sm" wrap="nowrap">
                   <Burger opened={opened} onClick={toggle} hiddenFrom="sm" size="sm" aria-label="Menu" />
-                  <Title order={2} size="h3">
+                  <Text fw={700} size="lg">
                     Palpebra
-                  </Title>
+                  </Text>
                   <Text c="dimmed" size="sm" visibleFrom="sm">
                     clip-rating studies
                   </Text>
@@ -51,15 +61,22 @@ export function Shell() {
               </Group>
             </AppShell.Header>
             <AppShell.Navbar p="xs">
-              {PAGES.filter(({ role }) => role === "viewer" || account.role === "owner").map(({ to, label }) => (
-                <NavLink
-                  key={to}
-                  component={Link}
-                  to={to}
-                  label={label}
-                  onClick={close}
-                  active={to === "/" ? pathname === "/" || pathname.startsWith("/studies") : pathname.startsWith(to)}
-                />
+              {GROUPS.map((group) => (
+                <div key={group}>
+                  <Text size="xs" c="dimmed" px="sm" pt="sm" pb={4}>
+                    {group}
+                  </Text>
+                  {PAGES.filter((page) => page.group === group && (page.role === "viewer" || account.role === "owner")).map(({ to, label }) => (
+                    <NavLink
+                      key={to}
+                      component={Link}
+                      to={to}
+                      label={label}
+                      onClick={close}
+                      active={to === "/" ? pathname === "/" || pathname.startsWith("/studies") : pathname.startsWith(to)}
+                    />
+                  ))}
+                </div>
               ))}
             </AppShell.Navbar>
             <AppShell.Main id="content">

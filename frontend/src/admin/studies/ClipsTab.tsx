@@ -1,11 +1,13 @@
-import { Badge, Card, Group, Pagination, Select, SimpleGrid, Stack, Text } from "@mantine/core";
+import { Card, Group, Select, SimpleGrid, Stack, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
 import { clipsQuery } from "../queries";
 import { Answer } from "../ui/Answer";
+import { Pages } from "../ui/DataTable";
 import { PlotFigure } from "../ui/PlotFigure";
+import { ClipVideo } from "./ClipVideo";
 import { closurePlot } from "./closurePlot";
 
 const A_PAGE = 6;
@@ -43,12 +45,7 @@ function Clips({ clips }: { clips: Schemas["ClipOut"][] }) {
           <ClipCard key={`${clip.cell}${String(clip.exemplar)}`} clip={clip} />
         ))}
       </SimpleGrid>
-      <Pagination
-        total={Math.ceil(chosen.length / A_PAGE)}
-        value={page}
-        onChange={setPage}
-        getControlProps={(control) => ({ "aria-label": `${control} page` })}
-      />
+      {chosen.length > A_PAGE && <Pages total={Math.ceil(chosen.length / A_PAGE)} value={page} onChange={setPage} />}
     </Stack>
   );
 }
@@ -57,14 +54,11 @@ export function ClipCard({ clip }: { clip: Schemas["ClipOut"] }) {
   const options = useMemo(() => closurePlot(clip.closure), [clip.closure]);
   return (
     <Card withBorder padding="sm">
-      <video className="clip" src={clip.url} controls muted loop preload="metadata" aria-label={`${clip.cell}, ${clip.exemplar}`} />
-      <Group justify="space-between" mt="xs">
-        <Text size="sm" className="wrap-anywhere">
-          {clip.cell}
-        </Text>
-        <Badge variant="default">no. {clip.exemplar}</Badge>
-      </Group>
-      <Text size="xs" c="dimmed">
+      <Text size="sm" fw={600} className="wrap-anywhere" mb={6}>
+        {clip.cell}, no. {clip.exemplar}
+      </Text>
+      <ClipVideo url={clip.url} label={`${clip.cell}, no. ${clip.exemplar}`} />
+      <Text size="xs" c="dimmed" mt={6} className="wrap-anywhere">
         {clip.profile !== "" && `${clip.profile}, `}
         {clip.frames} frames at {clip.fps} fps, {Math.round(clip.bytes / 1024)} KiB
       </Text>

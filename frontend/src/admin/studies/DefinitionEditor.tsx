@@ -26,7 +26,7 @@ export function DefinitionEditor({ toml, onChange }: Props) {
       <Textarea
         ref={place}
         className="editor"
-        label="Definition"
+        aria-label="Definition"
         autosize
         minRows={12}
         maxRows={28}
@@ -40,7 +40,7 @@ export function DefinitionEditor({ toml, onChange }: Props) {
             {checked.problems.map((problem) => (
               <List.Item key={`${String(problem.line)}${problem.path}${problem.message}`}>
                 {problem.line !== null && (
-                  <button type="button" onClick={() => goTo(problem.line ?? 1)}>
+                  <button type="button" className="line-link" onClick={() => goTo(problem.line ?? 1)}>
                     Line {problem.line}
                   </button>
                 )}{" "}

@@ -1,7 +1,8 @@
 /** What a definition expands to: factors, cells, blocks, minutes. */
 
-import { Badge, Card, Group, SimpleGrid, Stack, Table, Text, Title } from "@mantine/core";
+import { Badge, Group, Stack, Table, Title } from "@mantine/core";
 import type { Schemas } from "../api";
+import { Figures } from "../ui/Figures";
 
 export function Design({ design }: { design: Schemas["DesignOut"] }) {
   const figures: [string, string | number][] = [
@@ -13,18 +14,7 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
   ];
   return (
     <Stack>
-      <SimpleGrid cols={{ base: 2, sm: 5 }}>
-        {figures.map(([label, value]) => (
-          <Card withBorder key={label} padding="sm">
-            <Text size="xl" fw={600} className="number">
-              {value}
-            </Text>
-            <Text size="sm" c="dimmed">
-              {label}
-            </Text>
-          </Card>
-        ))}
-      </SimpleGrid>
+      <Figures figures={figures} />
       <Title order={2} size="h4">
         Factors
       </Title>
@@ -38,7 +28,7 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
               <Table.Td>
                 <Group gap={6}>
                   {factor.levels.map(({ name, label }) => (
-                    <Badge key={name} variant="default" tt="none" title={name}>
+                    <Badge key={name} variant="default" title={name}>
                       {label}
                     </Badge>
                   ))}
@@ -53,7 +43,7 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
       </Title>
       <Group gap={6}>
         {design.blocks.map((block, place) => (
-          <Badge key={`${block.label}-${String(place)}`} variant="default" tt="none">
+          <Badge key={`${block.label}-${String(place)}`} variant="default">
             {block.label}: {block.trials} trials
           </Badge>
         ))}

@@ -42,8 +42,9 @@ export function FromDefinition({ name }: { name: string }) {
         maw={500}
       />
       {upload !== null && <Text size="sm">{upload.files.length} clips received.</Text>}
+      {name === "" && <Text size="sm">Give the study a short name above.</Text>}
       <Button
-        maw={200}
+        style={{ alignSelf: "flex-start" }}
         disabled={name === "" || !usable || (upload === null && shipped === null)}
         loading={create.isPending || send.isPending}
         onClick={() => create.mutate(upload !== null ? { name, toml, upload: upload.id } : { name, toml, shipped })}

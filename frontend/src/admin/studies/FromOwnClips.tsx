@@ -105,8 +105,9 @@ function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }
       {field("question", "Question")}
       {field("low", "Lowest answer means")}
       {field("high", "Highest answer means")}
+      {name === "" && <Text size="sm">Give the study a short name above.</Text>}
       <Button
-        maw={200}
+        style={{ alignSelf: "flex-start" }}
         disabled={name === "" || asked.title === ""}
         loading={create.isPending}
         onClick={() =>
@@ -129,7 +130,7 @@ function Example({ pattern, files }: { pattern: string; files: string[] }) {
   const matcher = new RegExp(`^${source}$`);
   if (fields.length === 0) return null;
   return (
-    <Table aria-label="What the pattern reads">
+    <Table aria-label="What the pattern reads" className="wrap-anywhere">
       <Table.Thead>
         <Table.Tr>
           <Table.Th>file</Table.Th>

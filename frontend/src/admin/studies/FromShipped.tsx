@@ -1,4 +1,4 @@
-import { Alert, Button, Card, Group, SimpleGrid, Text, Title } from "@mantine/core";
+import { Alert, Button, Card, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
@@ -13,33 +13,35 @@ export function FromShipped({ name }: { name: string }) {
   return (
     <Answer of={shipped}>
       {(experiments) => (
-        <SimpleGrid cols={{ base: 1, sm: 3 }}>
-          {experiments.map((experiment) => (
-            <Card withBorder key={experiment.name}>
-              <Title order={2} size="h4">
-                {experiment.title}
-              </Title>
-              <Text size="sm" c="dimmed" mb="md">
-                {experiment.name}
-              </Text>
-              {experiment.clips_ready ? (
-                <Group mt="auto">
-                  <Button
-                    disabled={name === ""}
-                    loading={create.isPending}
-                    onClick={() => create.mutate({ name, shipped: experiment.name })}
-                  >
-                    Create
-                  </Button>
-                </Group>
-              ) : (
-                <Alert color="yellow">
-                  Its clips are not built on this server. Run <code>make run</code>, or upload them.
-                </Alert>
-              )}
-            </Card>
-          ))}
-        </SimpleGrid>
+        <Stack>
+          <Text size="sm">The three experiments of the paper, ready to run; you can change texts and settings afterwards.</Text>
+          <SimpleGrid cols={{ base: 1, sm: 3 }}>
+            {experiments.map((experiment) => (
+              <Card withBorder key={experiment.name}>
+                <Title order={2} size="h4">
+                  {experiment.title}
+                </Title>
+                <Text size="sm" c="dimmed" mb="md">
+                  {experiment.name}
+                </Text>
+                {experiment.clips_ready ? (
+                  <Group mt="auto">
+                    <Button
+                      loading={create.isPending && create.variables.shipped === experiment.name}
+                      onClick={() => create.mutate({ name: name || experiment.name, shipped: experiment.name })}
+                    >
+                      Create “{name || experiment.name}”
+                    </Button>
+                  </Group>
+                ) : (
+                  <Alert color="yellow">
+                    Its clips are not built on this server. Run <code>make run</code>, or upload them.
+                  </Alert>
+                )}
+              </Card>
+            ))}
+          </SimpleGrid>
+        </Stack>
       )}
     </Answer>
   );

@@ -1,9 +1,10 @@
-import { Anchor, Badge, Button, Group, Paper, Stack, Table, Text, Title } from "@mantine/core";
+import { Anchor, Badge, Button, Group, Paper, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import type { Schemas } from "../api";
 import { studiesQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
+import { type Column, DataTable } from "../ui/DataTable";
 import { StatusBadge } from "./StatusBadge";
 
 export function StudiesPage() {
@@ -19,7 +20,15 @@ export function StudiesPage() {
           </Button>
         )}
       </Group>
-      <Answer of={studies}>{(rows) => (rows.length === 0 ? <Nothing /> : <StudyTable rows={rows} />)}</Answer>
+      <Answer of={studies}>
+        {(rows) =>
+          rows.length === 0 ? (
+            <Nothing />
+          ) : (
+            <DataTable rows={rows} rowKey={(row) => row.name} columns={COLUMNS} empty="No studies." />
+          )
+        }
+      </Answer>
     </Stack>
   );
 }
@@ -34,48 +43,35 @@ function Nothing() {
   );
 }
 
-function StudyTable({ rows }: { rows: Schemas["StudySummary"][] }) {
-  return (
-    <Table.ScrollContainer minWidth={560}>
-      <Table highlightOnHover verticalSpacing="sm">
-        <Table.Thead>
-          <Table.Tr>
-            <Table.Th>Study</Table.Th>
-            <Table.Th>Status</Table.Th>
-            <Table.Th>Complete</Table.Th>
-            <Table.Th>Under way</Table.Th>
-            <Table.Th>Version</Table.Th>
-          </Table.Tr>
-        </Table.Thead>
-        <Table.Tbody>
-          {rows.map((row) => (
-            <Table.Tr key={row.name}>
-              <Table.Td>
-                <Anchor component={Link} to={`/studies/${row.name}`}>
-                  {row.title}
-                </Anchor>
-                <Text size="xs" c="dimmed">
-                  {row.name}
-                </Text>
-              </Table.Td>
-              <Table.Td>
-                <StatusBadge status={row.status} />
-                {row.paused && (
-                  <Badge ml={6} color="yellow" autoContrast>
-                    paused
-                  </Badge>
-                )}
-              </Table.Td>
-              <Table.Td className="number">
-                {row.complete}
-                {row.quota === null ? "" : ` of ${row.quota}`}
-              </Table.Td>
-              <Table.Td className="number">{row.active}</Table.Td>
-              <Table.Td className="number">{row.version}</Table.Td>
-            </Table.Tr>
-          ))}
-        </Table.Tbody>
-      </Table>
-    </Table.ScrollContainer>
-  );
-}
+const COLUMNS: Column<Schemas["StudySummary"]>[] = [
+  {
+    title: "Study",
+    wrap: true,
+    cell: (row) => (
+      <>
+        <Anchor component={Link} to={`/studies/${row.name}`}>
+          {row.title}
+        </Anchor>
+        <Text size="xs" c="dimmed">
+          {row.name}
+        </Text>
+      </>
+    ),
+  },
+  {
+    title: "Status",
+    cell: (row) => (
+      <>
+        <StatusBadge status={row.status} />
+        {row.paused && (
+          <Badge ml={6} color="yellow" autoContrast>
+            paused
+          </Badge>
+        )}
+      </>
+    ),
+  },
+  { title: "Complete", number: true, cell: (row) => `${row.complete}${row.quota === null ? "" : ` of ${row.quota}`}` },
+  { title: "Under way", number: true, wide: true, cell: (row) => row.active },
+  { title: "Version", number: true, wide: true, cell: (row) => row.version },
+];

@@ -1,6 +1,7 @@
 /** A study's heading and tabs. */
 
 import { Group, Stack, Tabs, Text, Title } from "@mantine/core";
+import { useEffect, useRef } from "react";
 import { useQuery } from "@tanstack/react-query";
 import { Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
 import { studyQuery, useMay } from "../queries";
@@ -26,6 +27,11 @@ export function StudyLayout() {
   const navigate = useNavigate();
   const mayChange = useMay("experimenter");
   const current = pathname.split("/")[3] || "design";
+  const line = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    // On a phone the tabs are wider than the screen: the open one is brought into view.
+    line.current?.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest", inline: "center" });
+  });
   return (
     <Answer of={useQuery(studyQuery(study))}>
       {({ summary }) => (
@@ -33,13 +39,14 @@ export function StudyLayout() {
           <Group justify="space-between" align="start">
             <div>
               <Group gap="sm">
-                <Title order={1} size="h2">
+                <Title order={1}>
                   {summary.title}
                 </Title>
                 <StatusBadge status={summary.status} />
               </Group>
               <Text c="dimmed" size="sm">
                 {summary.name}, version {summary.version}
+                {summary.paused && ", paused: nobody can begin"}
               </Text>
             </div>
             {mayChange && <StatusButtons summary={summary} />}
@@ -49,7 +56,7 @@ export function StudyLayout() {
             keepMounted={false}
             onChange={(to) => void navigate({ to: `/studies/${study}${to === "design" ? "" : `/${to ?? ""}`}` })}
           >
-            <Tabs.List>
+            <Tabs.List ref={line} className="tabs-line">
               {TABS.filter(([path]) => mayChange || (path !== "links" && path !== "settings")).map(([path, label]) => (
                 <Tabs.Tab key={path} value={path}>
                   {label}

@@ -1,11 +1,16 @@
-import { Alert, Button, Group, Select, Stack, Textarea } from "@mantine/core";
+/** The pages a participant reads: written on the left, as they will look on the right. */
+
+import { Alert, Button, Group, Paper, Select, SimpleGrid, Stack, Textarea } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
-import { useState } from "react";
+import { useEffect, useRef, useState } from "react";
+import { markdown } from "../../ui/markdown";
 import { api, type Schemas, unwrap } from "../api";
 import { studyQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
+import { languageName } from "../ui/format";
 import { useChange } from "../ui/useChange";
+import { useUnsaved } from "../ui/useUnsaved";
 
 const PAGES = { consent: "Consent", instructions: "Instructions", practice: "Practice", block_break: "Break", debrief: "Debrief" };
 
@@ -30,6 +35,9 @@ function Texts({ detail }: { detail: Schemas["StudyDetail"] }) {
   const [edits, setEdits] = useState<Record<string, string>>({});
   const mayChange = useMay("experimenter");
   const { name, revision, status } = detail.summary;
+  const present = textsOf(detail.definition, language);
+  const changed = Object.entries(edits).some(([page, text]) => text !== (present[page] ?? ""));
+  useUnsaved(changed);
   const save = useChange(
     () =>
       unwrap(
@@ -40,49 +48,76 @@ function Texts({ detail }: { detail: Schemas["StudyDetail"] }) {
       ),
     { touches: [["study", name]], done: "Saved as a new version." },
   );
-  const present = textsOf(detail.definition, language);
   return (
-    <Stack maw={860}>
+    <Stack>
       {status === "live" && mayChange && (
         <Alert color="yellow">This study is live. A change makes a new version; runs under way keep theirs.</Alert>
       )}
-      <Select
-        label="Language"
-        data={languages}
-        value={language}
-        allowDeselect={false}
-        onChange={(chosen) => {
-          setLanguage(chosen ?? language);
-          setEdits({});
-        }}
-        maw={160}
-      />
+      <Group align="end" justify="space-between">
+        <Select
+          label="Language"
+          description={changed ? "Save or undo before you change it." : undefined}
+          data={languages.map((code) => ({ value: code, label: languageName(code) }))}
+          value={language}
+          allowDeselect={false}
+          disabled={changed}
+          onChange={(chosen) => setLanguage(chosen ?? language)}
+        />
+        {mayChange && (
+          <Group gap="xs">
+            <Button variant="default" disabled={!changed} onClick={() => setEdits({})}>
+              Undo changes
+            </Button>
+            <Button disabled={!changed} loading={save.isPending} onClick={() => save.mutate(undefined)}>
+              Save
+            </Button>
+          </Group>
+        )}
+      </Group>
       {Object.entries(PAGES).map(([page, label]) => (
-        <Textarea
+        <OnePage
           key={page}
-          label={`${label} (Markdown)`}
-          autosize
-          minRows={3}
-          maxRows={20}
-          readOnly={!mayChange}
-          value={edits[page] ?? present[page] ?? ""}
-          onChange={(event) => setEdits({ ...edits, [page]: event.currentTarget.value })}
+          label={label}
+          text={edits[page] ?? present[page] ?? ""}
+          onChange={mayChange ? (text) => setEdits({ ...edits, [page]: text }) : null}
         />
       ))}
-      {mayChange && (
-        <Group>
-          <Button
-            disabled={Object.keys(edits).length === 0}
-            loading={save.isPending}
-            onClick={() => save.mutate(undefined)}
-          >
-            Save
-          </Button>
-          <Button variant="default" disabled={Object.keys(edits).length === 0} onClick={() => setEdits({})}>
-            Undo changes
-          </Button>
-        </Group>
-      )}
     </Stack>
   );
+}
+
+interface PageProps {
+  label: string;
+  text: string;
+  onChange: ((text: string) => void) | null;
+}
+
+function OnePage({ label, text, onChange }: PageProps) {
+  return (
+    <SimpleGrid cols={{ base: 1, md: 2 }} spacing="sm">
+      <Textarea
+        label={`${label} (Markdown)`}
+        autosize
+        minRows={3}
+        maxRows={20}
+        readOnly={onChange === null}
+        value={text}
+        onChange={(event) => onChange?.(event.currentTarget.value)}
+      />
+      <Paper withBorder p="sm" mt={{ base: 0, md: 25 }} role="group" aria-label={`${label}, as participants see it`}>
+        <Shown text={text} />
+      </Paper>
+    </SimpleGrid>
+  );
+}
+
+function Shown({ text }: { text: string }) {
+  const place = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const parts = markdown(text === "" ? "*No text.*" : text);
+    // Inside this page they are no headings of it.
+    for (const part of parts) if (/^H\d$/.test(part.tagName)) part.setAttribute("role", "presentation");
+    place.current?.replaceChildren(...parts);
+  }, [text]);
+  return <div className="prose" ref={place} />;
 }

@@ -1,7 +1,7 @@
 /** Can this browser, on this device, show the study? Reasons are message keys, worst first. */
 import type { Gates } from "../../api/participant";
 import type { MessageKey } from "../../i18n";
-import { hasVideo, hasWebCodecs } from "../playback/choose";
+import { hasVideo, hasWebCodecs, playsH264 } from "../playback/choose";
 
 export interface GateFinding {
   reason: MessageKey;
@@ -14,6 +14,7 @@ export interface Abilities {
   secure: boolean;
   web_codecs: boolean;
   video: boolean;
+  h264: boolean;
   storage: boolean;
   /** No mouse or keyboard to be seen: a phone or a tablet. */
   touch_only: boolean;
@@ -21,11 +22,12 @@ export interface Abilities {
   screen_height_px: number;
 }
 
-export function abilities(storage: boolean): Abilities {
+export async function abilities(storage: boolean): Promise<Abilities> {
   return {
     secure: window.isSecureContext && "subtle" in (globalThis.crypto ?? {}),
     web_codecs: hasWebCodecs(),
     video: hasVideo(),
+    h264: hasVideo() && (await playsH264()),
     storage,
     touch_only: matchMedia("(pointer: coarse)").matches && !matchMedia("(any-pointer: fine)").matches,
     screen_width_px: Math.max(screen.width, window.innerWidth),
@@ -46,6 +48,8 @@ export function findings(found: Abilities, gates: Gates): GateFinding[] {
     });
   }
   if (found.secure && found.video && !found.web_codecs) add("gate_video", false);
+  // A study's own clips may be VP9 or AV1, so the participant may try.
+  if (found.secure && found.video && !found.h264) add("gate_h264", false);
   if (!found.storage) add("gate_storage", false);
   return list.sort((a, b) => Number(b.closed) - Number(a.closed));
 }

@@ -11,6 +11,11 @@ export function recruiterQuery(search: string): Record<string, string> {
   return Object.fromEntries(entries.map(([key, value]) => [key.slice(0, LONGEST_VALUE), value.slice(0, LONGEST_VALUE)]));
 }
 
+/** What this browser keeps of one link, and of one person where the address names one. */
+export function storageKey(what: string, link_token: string, search: string): string {
+  return `${what} ${link_token} ${JSON.stringify(recruiterQuery(search))}`;
+}
+
 export class Identity {
   private readonly key: string;
   private readonly storage: Storage | null;
@@ -18,7 +23,7 @@ export class Identity {
 
   /** A preview belongs to its tab; people recruited by name share no run even on one computer. */
   constructor(link_token: string, kind: LinkDocument["kind"], private readonly search: string) {
-    this.key = `palpebra ${link_token} ${JSON.stringify(recruiterQuery(search))}`;
+    this.key = storageKey("palpebra", link_token, search);
     this.storage = storageOf(kind === "preview" ? "sessionStorage" : "localStorage");
   }
 
@@ -33,7 +38,7 @@ export class Identity {
   client_id(): string {
     const known = this.read();
     if (known) return known;
-    const fresh = crypto.randomUUID();
+    const fresh = uuid();
     this.own = fresh;
     try {
       this.storage?.setItem(this.key, fresh);
@@ -57,7 +62,15 @@ export class Identity {
   }
 }
 
-function storageOf(name: "localStorage" | "sessionStorage"): Storage | null {
+/** A random UUID; crypto.randomUUID is there in secure contexts only. */
+function uuid(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  bytes[6] = (bytes[6]! & 0x0f) | 0x40;
+  bytes[8] = (bytes[8]! & 0x3f) | 0x80;
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("").replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
+}
+
+export function storageOf(name: "localStorage" | "sessionStorage"): Storage | null {
   try {
     return window[name];
   } catch {

@@ -4,7 +4,11 @@ import { call, NetworkError, Refused, isTemporary, request } from "../../api/req
 import type { MessageKey, Translate } from "../../i18n";
 import { backoff } from "../outbox/backoff";
 import { showNotice } from "../screens/notice";
-import { abilities, type GateFinding, findings } from "./gates";
+import type { Abilities, GateFinding } from "./gates";
+import type { Kept } from "./kept-visit";
+
+/** Who has begun need not wait long for a server that does not answer. */
+const KEPT_WAIT_MS = 4_000;
 
 /** Ask until the server answers, telling the participant meanwhile. Refusals are thrown. */
 export async function persistently<Body>(root: HTMLElement, t: Translate, ask: () => Promise<Body>): Promise<Body> {
@@ -12,15 +16,20 @@ export async function persistently<Body>(root: HTMLElement, t: Translate, ask: (
     try {
       return await ask();
     } catch (error) {
-      const again = error instanceof NetworkError || (error instanceof Refused && isTemporary(error.status));
-      if (!again) throw error;
+      if (!isNoAnswer(error)) throw error;
       if (failures > 1) showNotice(root, { title: t("no_answer_title"), text: t("no_answer") });
       await new Promise((resolve) => setTimeout(resolve, backoff(failures)));
     }
   }
 }
 
-export const fetchLink = (token: string): Promise<LinkDocument> => call("GET", `/api/links/${encodeURIComponent(token)}`);
+/** True where asking again may help: no answer came, or the server is busy. */
+export function isNoAnswer(error: unknown): boolean {
+  return error instanceof NetworkError || (error instanceof Refused && isTemporary(error.status));
+}
+
+export const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkDocument> =>
+  call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
 
 /** The run as the page sees it: practice is no block. */
 export async function fetchRun(token: string): Promise<RunDocument> {
@@ -32,7 +41,7 @@ export const startRun = (link_token: string, body: object): Promise<StartedRun> 
   call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body });
 
 const REFUSALS: Record<string, MessageKey> = {
-  link_unknown: "link_unknown", study_closed: "link_closed", link_used: "link_used", run_too_old: "run_too_old",
+  link_unknown: "link_unknown", study_closed: "link_closed", run_too_old: "run_too_old", run_left: "run_left",
   study_full: "link_full", link_expired: "link_expired", study_paused: "link_paused", closed: "link_closed",
   expired: "link_expired", full: "link_full", paused: "link_paused", used: "link_used",
 };
@@ -44,21 +53,40 @@ export function showRefusal(root: HTMLElement, t: Translate, code: string, messa
   showNotice(root, { title, text: key ? t(key) : message || t("link_closed") });
 }
 
-/** Resolves true where the browser can show the study, after asking where it can only nearly. */
-export async function passGates(root: HTMLElement, t: Translate, link_token: string, link: LinkDocument, storage: boolean): Promise<GateFinding[] | null> {
-  const found = abilities(storage);
-  const list = findings(found, link.gates);
-  const first = list[0];
-  if (first?.closed) {
-    showNotice(root, { title: t("gate_title"), text: t(first.reason, first.values) });
-    // Nothing waits for this: the participant reads the page, the experimenter the count.
-    void request("POST", "/api/unsupported", { body: { link_token, reason: first.reason, data: found } }).catch(() => {});
-    return null;
+/** Tell why this browser cannot show the study, and tell the server. */
+export function showClosedGate(root: HTMLElement, t: Translate, link_token: string, closed: GateFinding, found: Abilities): void {
+  showNotice(root, { title: t("gate_title"), text: t(closed.reason, closed.values) });
+  // Nothing waits for this: the participant reads the page, the experimenter the count.
+  void request("POST", "/api/unsupported", { body: { link_token, reason: closed.reason, data: found } }).catch(() => {});
+}
+
+/** The link, or what an earlier visit kept of it and its run where the server does not answer. */
+export async function reach(root: HTMLElement, t: Translate, link_token: string, kept: Kept | null): Promise<{ link: LinkDocument; kept: Kept | null }> {
+  if (!kept) return { link: await persistently(root, t, () => fetchLink(link_token)), kept };
+  try {
+    return { link: await fetchLink(link_token, KEPT_WAIT_MS), kept: null };
+  } catch (error) {
+    if (!isNoAnswer(error)) throw error;
+    return { link: kept.link, kept };
   }
+}
+
+/** A run that ends at once, where the study screens devices: the participant then has a way back. */
+export async function screenOutDevice(link_token: string, start: object, closed: GateFinding, found: Abilities): Promise<StartedRun> {
+  const started = await startRun(link_token, start);
+  const body = { reason: closed.reason, data: found };
+  // Asked twice, where the first answer was lost, the run is closed already.
+  await call("POST", "/api/run/screen-out", { token: started.run_token, body }).catch((error: unknown) => {
+    if (!(error instanceof Refused && error.code === "run_closed")) throw error;
+  });
+  return started;
+}
+
+/** Where the browser can only nearly show the study, ask whether to go on all the same. */
+export async function passGates(root: HTMLElement, t: Translate, list: GateFinding[]): Promise<void> {
   for (const { reason, values } of list) {
     await new Promise<void>((resolve) => {
-      showNotice(root, { title: t("gate_title"), text: t(reason, values), actions: [{ label: t("gate_continue"), press: resolve }] });
+      showNotice(root, { title: t("gate_open_title"), text: t(reason, values), actions: [{ label: t("gate_continue"), press: resolve }] });
     });
   }
-  return list;
 }

@@ -10,25 +10,25 @@ import { measureRefreshRate } from "../screen/refresh-rate";
 import { RunClock } from "../screen/run-clock";
 import { ScreenState } from "../screen/screen-state";
 import { counted, RunApi, type Session } from "../session";
+import { applyWrite } from "./kept-visit";
 import { owed, Replays } from "./replays";
 
 const SEND_FIRST_MS = 8_000;
-const RATING_PATH = "/api/run/ratings/";
 
 /**
  * Send what an earlier visit left, so that the run document knows of it. Returns what could not be sent yet: it
  * must count as given, since it may arrive after the document was made and before the page reads it.
  */
-export async function flush(outbox: Outbox, started: StartedRun): Promise<OutboxItem[]> {
+export async function flush(outbox: Outbox, started: StartedRun, wait_ms = SEND_FIRST_MS): Promise<OutboxItem[]> {
   await outbox.open(started.run_id, started.run_token);
-  await outbox.drained(SEND_FIRST_MS);
+  await outbox.drained(wait_ms);
   return outbox.unsent();
 }
 
 export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocument, outbox: Outbox, unsent: OutboxItem[]): Session {
   const screen = new ScreenState();
+  unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);
-  countUnsent(run, unsent);
   const session: Session = {
     link, run, root, outbox, screen,
     language: run.language,
@@ -45,15 +45,6 @@ export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocum
   };
   owed(run.trials).forEach(({ trial, play }) => session.replays.add(trial, play));
   return session;
-}
-
-/** A rating still in the outbox counts as given, though the server does not know of it yet. */
-function countUnsent(run: RunDocument, unsent: OutboxItem[]): void {
-  for (const item of unsent.filter(({ path }) => path.startsWith(RATING_PATH))) {
-    const body = item.body as { trial_index: number; play: number };
-    const trial = run.trials.find((one) => one.trial_index === body.trial_index);
-    if (trial) Object.assign(trial, { answered: true, plays_done: Math.max(trial.plays_done, body.play) });
-  }
 }
 
 /** Measure the refresh rate, and tell the server what it deals with. */

@@ -19,7 +19,10 @@ export interface OutboxOptions {
   /** Waiting, so that tests need not wait. */
   pause?: (ms: number) => Promise<void>;
   onChange?: (state: OutboxState) => void;
-  onUnauthorized?: () => void;
+  /** A write of this run was accepted; called before it is forgotten. */
+  onAccepted?: (item: OutboxItem, body: unknown) => void;
+  /** An item of this run was refused for good. */
+  onRefused?: (refused: Refused) => void;
 }
 
 export class Outbox {
@@ -143,6 +146,8 @@ export class Outbox {
     const outcome: Outcome = accepted ? { accepted, body: answer.body } : { accepted, refused: refusalOf(answer) };
     const ids = new Set(batch.items.map((item) => item.id));
     // What cannot be removed is sent once more by the next visit, which does no harm.
+    const own = batch.items.filter((item) => item.run_id === this.run?.run_id);
+    if (outcome.accepted) own.forEach((item) => this.options.onAccepted?.(item, answer.body));
     if (outcome.accepted) await this.onDisk(this.store.remove([...ids]));
     else for (const item of batch.items) await this.onDisk(this.store.refuse(item, outcome.refused.code));
     this.queue = this.queue.filter((item) => !ids.has(item.id));
@@ -150,7 +155,7 @@ export class Outbox {
       this.waiting.get(id)?.(outcome);
       this.waiting.delete(id);
     }
-    if (answer.status === 401 && batch.items.some((item) => item.run_id === this.run?.run_id)) this.options.onUnauthorized?.();
+    if (!outcome.accepted && own.length > 0) this.options.onRefused?.(outcome.refused);
   }
 
   private async pause(ms: number): Promise<void> {

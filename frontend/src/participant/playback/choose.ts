@@ -7,6 +7,15 @@ export function hasWebCodecs(): boolean {
   return "VideoDecoder" in globalThis && "OffscreenCanvas" in globalThis && "transferControlToOffscreen" in HTMLCanvasElement.prototype;
 }
 
+/** Most clips are H.264, High profile; a browser built without licensed codecs lacks it. */
+const H264 = "avc1.640028";
+
+/** True where the browser decodes H.264 the way its clips will be played. */
+export async function playsH264(): Promise<boolean> {
+  if (!hasWebCodecs()) return document.createElement("video").canPlayType(`video/mp4; codecs="${H264}"`) !== "";
+  return VideoDecoder.isConfigSupported({ codec: H264, codedWidth: 960, codedHeight: 360 }).then(({ supported }) => supported === true, () => false);
+}
+
 /** True where any way to show clips exists. */
 export function hasVideo(): boolean {
   return hasWebCodecs() || typeof document.createElement("video").play === "function";

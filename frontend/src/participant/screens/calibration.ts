@@ -7,8 +7,8 @@ import { calibrationBody, clipWidth } from "../screen/size";
 import type { Session } from "../session";
 import { cardView } from "./card";
 import { measureDistance } from "./distance";
-import { CHECK_LINE_MM, lengthField, MEASURED_LINE_PX, rulerLine } from "./ruler";
-import { choose, saveShown, stopButton } from "./support";
+import { CHECK_LINE_MM, lengthField, measuredLinePx, rulerLine } from "./ruler";
+import { choose, noDevice, saveShown, screenOut, stopButton } from "./support";
 
 interface Parameters { eyebrow: string; changed: boolean }
 interface Data { px_per_mm: number | null; method: string }
@@ -107,14 +107,15 @@ async function checked(session: Session, display: HTMLElement, eyebrow: string, 
 async function byRuler(session: Session, display: HTMLElement, eyebrow: string): Promise<Step> {
   const { t } = session;
   const field = lengthField(t);
+  const line_px = measuredLinePx();
   const footer = h("footer", { class: "actions" });
-  page(session, display, eyebrow, "ruler_title", [h("p", {}, t("ruler_text")), rulerLine(MEASURED_LINE_PX), field.element, footer]);
+  page(session, display, eyebrow, "ruler_title", [h("p", {}, t("ruler_text")), rulerLine(line_px), field.element, footer]);
   for (;;) {
     footer.replaceChildren();
     const step = await choose(session, footer, [{ label: t("continue"), value: "measured" }, { label: t("use_card"), value: "other" }]);
     if (step === "other") return "other";
     const length_mm = field.value();
-    if (length_mm !== null) return { px_per_mm: MEASURED_LINE_PX / length_mm, method: "ruler" };
+    if (length_mm !== null) return { px_per_mm: line_px / length_mm, method: "ruler" };
   }
 }
 
@@ -129,7 +130,8 @@ async function fits(session: Session, display: HTMLElement, measured: Measured):
   page(session, display, "", "clip_too_large_title", [alert, footer]);
   alert.textContent = t("clip_too_large", values);
   session.events.add("unsupported", { reason: "clip_too_large", ...values });
-  await choose(session, footer, [{ label: t("measure_again"), value: true }]);
+  const choices = [{ label: t("measure_again"), value: true }, ...noDevice(session, false)];
+  if (!(await choose(session, footer, choices))) await screenOut(session, "clip_too_large", values);
   return false;
 }
 

@@ -6,31 +6,38 @@ import { button } from "../../ui/page";
 /** ISO/IEC 7810 ID-1. */
 export const CARD_WIDTH_MM = 85.6;
 export const CARD_HEIGHT_MM = 53.98;
+const SHAPE = CARD_HEIGHT_MM / CARD_WIDTH_MM;
 const SMALLEST_PX = 120;
+const LARGEST_PX = 1_600;
 const START_PX = (CARD_WIDTH_MM * 96) / 25.4;
+/** A narrower window (a phone) cannot hold a card lying down, so there it stands upright. */
+const UPRIGHT_BELOW_PX = 600;
 
 export interface CardView { element: HTMLElement; px_per_mm: () => number }
 
 export function cardView(t: Translate, start_px_per_mm: number | null): CardView {
-  const largest = Math.max(400, Math.min(1_600, window.innerWidth - 110));
-  let width = start_px_per_mm ? start_px_per_mm * CARD_WIDTH_MM : START_PX;
+  const upright = window.innerWidth < UPRIGHT_BELOW_PX;
+  const largest = upright ? (window.innerWidth - 60) / SHAPE : Math.min(LARGEST_PX, window.innerWidth - 110);
+  /** Of the long side. */
+  let length = start_px_per_mm ? start_px_per_mm * CARD_WIDTH_MM : START_PX;
   const id = uniqueId("card");
   const slider = h("input", { type: "range", id, min: SMALLEST_PX, max: Math.round(largest), step: 1 });
   const corner = h("span", { class: "card-corner", "aria-hidden": "true" });
-  const card = h("div", { class: "card" }, h("span", { class: "card-chip" }), h("span", { class: "card-lines" }), corner);
+  const card = h("div", { class: upright ? "card card-upright" : "card" }, h("span", { class: "card-chip" }), h("span", { class: "card-lines" }), corner);
   const set = (next: number): void => {
-    width = Math.min(largest, Math.max(SMALLEST_PX, next));
-    card.style.width = `${width}px`;
-    card.style.height = `${(width * CARD_HEIGHT_MM) / CARD_WIDTH_MM}px`;
-    slider.value = String(Math.round(width));
+    length = Math.min(largest, Math.max(SMALLEST_PX, next));
+    const sides = [length, length * SHAPE];
+    const [width = 0, height = 0] = upright ? sides.reverse() : sides;
+    Object.assign(card.style, { width: `${width}px`, height: `${height}px` });
+    slider.value = String(Math.round(length));
   };
   slider.addEventListener("input", () => set(Number(slider.value)));
-  dragCorner(corner, card, set);
-  set(width);
-  const row = h("div", { class: "row" }, button(t("card_smaller"), () => set(width - 1), "quiet"), slider, button(t("card_larger"), () => set(width + 1), "quiet"));
+  dragCorner(corner, card, (width) => set(upright ? width / SHAPE : width));
+  set(length);
+  const row = h("div", { class: "row" }, button(t("card_smaller"), () => set(length - 1), "quiet"), slider, button(t("card_larger"), () => set(length + 1), "quiet"));
   const element = h("div", { class: "card-area" }, h("div", { class: "card-space" }, card),
     h("label", { for: id, class: "help" }, t("card_slider")), row, h("p", { class: "help" }, t("card_hint")));
-  return { element, px_per_mm: () => width / CARD_WIDTH_MM };
+  return { element, px_per_mm: () => length / CARD_WIDTH_MM };
 }
 
 function dragCorner(corner: HTMLElement, card: HTMLElement, set: (width: number) => void): void {

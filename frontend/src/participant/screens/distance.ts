@@ -13,6 +13,9 @@ const ROUNDS = 5;
 const SPEED_PX_PER_MS = 0.1;
 const NEAREST_MM = 200;
 const FURTHEST_MM = 2_000;
+/** The window must let the dot vanish at least for who sits so near; a phone's does not. */
+const NEEDED_MM = 400;
+const SIDES_PX = 100;
 /** The dot starts this far from the square, well inside the blind spot's near edge. */
 const START_MM = 40;
 
@@ -20,24 +23,28 @@ export function distanceFrom(separation_px: number, px_per_mm: number): number {
   return separation_px / px_per_mm / Math.tan((BLIND_SPOT_DEGREES * Math.PI) / 180);
 }
 
-/** Distance from the eyes to the screen in mm: median of the rounds, or as typed in. */
+/** Distance from the eyes to the screen in mm: median of the rounds, or as typed in, where the window is too narrow at once. */
 export async function measureDistance(session: Session, display: HTMLElement, px_per_mm: number): Promise<number> {
+  if (distanceFrom(window.innerWidth - SIDES_PX, px_per_mm) < NEEDED_MM) return typed(session, display);
   const found: number[] = [];
-  while (found.length < ROUNDS) {
-    const separation = await oneRound(session, display, px_per_mm, found.length + 1);
+  for (let remark = ""; found.length < ROUNDS; ) {
+    const separation = await oneRound(session, display, px_per_mm, found.length + 1, remark);
     if (separation === "type") return typed(session, display);
     const distance = separation === null ? 0 : distanceFrom(separation, px_per_mm);
-    if (distance >= NEAREST_MM && distance <= FURTHEST_MM) found.push(distance);
+    const counts = distance >= NEAREST_MM && distance <= FURTHEST_MM;
+    if (counts) found.push(distance);
+    remark = counts ? "" : session.t("distance_missed");
   }
   return found.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0;
 }
 
-async function oneRound(session: Session, display: HTMLElement, px_per_mm: number, round: number): Promise<number | "type" | null> {
+async function oneRound(session: Session, display: HTMLElement, px_per_mm: number, round: number, remark: string): Promise<number | "type" | null> {
   const { t } = session;
   const dot = h("span", { class: "blind-dot" });
   const field = h("div", { class: "blind-field", dir: "ltr", "aria-hidden": "true" }, dot, h("span", { class: "blind-square" }));
   const footer = h("footer", { class: "actions" });
   const status = statusLine();
+  status.textContent = remark;
   const body = [h("p", {}, t("distance_text", { times: ROUNDS })), field, status, footer];
   const section = showPage(display, { title: t("distance_title"), eyebrow: t("distance_round", { round, times: ROUNDS }), body, wide: true });
   section.classList.add("calibration");
@@ -45,9 +52,7 @@ async function oneRound(session: Session, display: HTMLElement, px_per_mm: numbe
   const step = await choose(session, footer, [{ label: t("distance_start"), value: "go" }, { label: t("distance_type"), value: "type", kind: "plain" }], true);
   if (step === "type") return "type";
   footer.replaceChildren();
-  const separation = await moveDot(session, dot, field, footer, START_MM * px_per_mm);
-  if (separation === null) status.textContent = t("distance_missed");
-  return separation;
+  return moveDot(session, dot, field, footer, START_MM * px_per_mm);
 }
 
 /** The dot goes left until a press; resolves with its distance from the square, or null at the edge. */

@@ -1,9 +1,10 @@
 /** The end: the completion code appears only when the server has every answer. */
 import type { Completion } from "../../api/participant";
-import { call, NetworkError, Refused, isTemporary } from "../../api/request";
+import { call, Refused } from "../../api/request";
 import { h } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { button, showPage } from "../../ui/page";
+import { isNoAnswer } from "../flow/link";
 import { backoff } from "../outbox/backoff";
 import { STRING, plugin, type PluginClass } from "../jspsych";
 import { leaveFullScreen } from "../screen/full-screen";
@@ -12,10 +13,11 @@ import type { Session } from "../session";
 interface Parameters { token: string }
 interface Data { completion_code: string }
 
-/** The server still lacks answers: the run must be taken up again. */
-export class RatingsMissing extends Error {
-  override name = "RatingsMissing";
+/** The server still lacks ratings or a form: the run must be taken up again, and leads to them. */
+export class AnswersMissing extends Error {
+  override name = "AnswersMissing";
 }
+const MISSING = ["ratings_missing", "forms_missing"];
 
 export function finish(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
@@ -55,21 +57,22 @@ export async function completed(token: string): Promise<Completion> {
     try {
       return await call<Completion>("POST", "/api/run/complete", { token });
     } catch (error) {
-      if (error instanceof Refused && error.code === "ratings_missing") throw new RatingsMissing(error.message);
-      const again = error instanceof NetworkError || (error instanceof Refused && isTemporary(error.status));
-      if (!again) throw error;
+      if (error instanceof Refused && MISSING.includes(error.code)) throw new AnswersMissing(error.message);
+      if (!isNoAnswer(error)) throw error;
       await new Promise((resolve) => setTimeout(resolve, backoff(failures)));
     }
   }
 }
 
-/** The last page. It lies outside the timeline, which clears what its screens have shown. */
-export function showCompletion(session: Pick<Session, "t" | "run">, display: HTMLElement, done: Completion, extra: HTMLElement[] = []): void {
+/** The last page, also of who is screened out. It lies outside the timeline, which clears what its screens have shown. */
+export function showCompletion(session: Pick<Session, "t" | "run">, display: HTMLElement, done: Completion, extra: HTMLElement[] = [], why = ""): void {
   const { t, run } = session;
-  const code = done.completion_code && h("div", { class: "code" }, h("p", { class: "help" }, t("done_code")), codeRow(t("done_copy"), t("done_copied"), done.completion_code));
+  const out = done.status === "screened_out";
+  const code = done.completion_code && h("div", { class: "code" }, h("p", { class: "help" }, t(out ? "out_code" : "done_code")), codeRow(t("done_copy"), t("done_copied"), done.completion_code));
   const back = done.redirect_url && h("a", { class: "button primary", href: done.redirect_url, rel: "noreferrer" }, t("done_return"));
-  const prose = h("div", { class: "prose" }, ...markdown(run.texts.debrief));
-  showPage(display, { body: [prose, code, h("p", { class: "status", role: "status" }, t("done_close"))], actions: [back, ...extra] });
+  const text = out ? run.texts.screened_out || `# ${t("screened_out_title")}\n\n${t("screened_out")}` : run.texts.debrief;
+  const prose = h("div", { class: "prose" }, ...markdown(text));
+  showPage(display, { body: [why && h("p", { role: "alert" }, why), prose, code, h("p", { class: "status", role: "status" }, t(out ? "close" : "done_close"))], actions: [back, ...extra] });
 }
 
 function codeRow(copy: string, copied: string, code: string): HTMLElement {

@@ -2,10 +2,15 @@
 import type { Translate } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
 
-export const MEASURED_LINE_PX = 378;
+const MEASURED_LINE_PX = 378;
 export const CHECK_LINE_MM = 100;
 const SHORTEST_MM = 20;
 const LONGEST_MM = 400;
+
+/** Length of the line to be measured: with its end marks inside the window, also on a phone. */
+export function measuredLinePx(): number {
+  return Math.min(MEASURED_LINE_PX, window.innerWidth - 80);
+}
 
 export function rulerLine(length_px: number): HTMLElement {
   const line = h("div", { class: "ruler-line", role: "img", "aria-label": "|—|" });

@@ -4,7 +4,7 @@ import { showPage, statusLine } from "../../ui/page";
 import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
 import { canFullScreen, enterFullScreen, isFullScreen } from "../screen/full-screen";
 import type { Session } from "../session";
-import { choose, stopButton } from "./support";
+import { choose, noDevice, screenOut, stopButton } from "./support";
 
 interface Parameters { eyebrow: string; again: boolean }
 interface Data { full_screen: boolean }
@@ -71,5 +71,6 @@ async function askRoom(session: Session, display: HTMLElement, eyebrow: string):
   const footer = h("footer", { class: "actions" });
   showPage(display, { title: t("window_small_title"), eyebrow, body: [h("p", {}, t("window_small", values)), status, footer] })
     .append(stopButton(session));
-  await choose(session, footer, [{ label: t("try_again"), value: true }]);
+  const choices = [{ label: t("try_again"), value: true }, ...noDevice(session, false)];
+  if (!(await choose(session, footer, choices))) await screenOut(session, "window_small", values);
 }

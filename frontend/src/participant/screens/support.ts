@@ -42,6 +42,17 @@ export async function saveShown(session: Session, status: HTMLElement, saving: P
   return outcome;
 }
 
+/** Where the study screens devices: the choice of who has no larger window or screen. */
+export function noDevice<Value>(session: Session, value: Value): Choice<Value>[] {
+  return session.link.screens_devices ? [{ label: session.t("no_device"), value, kind: "plain" }] : [];
+}
+
+/** Ask the server to end the run; its answer changes the page. Never resolves. */
+export async function screenOut(session: Session, reason: string, data: object): Promise<never> {
+  await session.outbox.put("POST", "/api/run/screen-out", { reason, data });
+  return new Promise(() => {});
+}
+
 /** The quiet way out, in the corner of pages between the trials. */
 export function stopButton(session: Session): HTMLElement {
   return h("div", { class: "corner" }, button(session.t("stop"), () => void session.root.dispatchEvent(new CustomEvent("stop")), "plain"));

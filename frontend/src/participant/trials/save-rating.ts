@@ -13,7 +13,7 @@ export async function saveRating(session: Session, trial: AssignedTrial, body: R
   if (shift_ms !== 0) session.events.add("clock_changed", { shift_ms });
   const handled = receipt.then((outcome) => {
     if (receiptOf(outcome)?.again) session.replays.add(trial, body.play + 1);
-    if (!outcome.accepted && outcome.refused.status === 409) session.root.dispatchEvent(new CustomEvent("taken-over"));
+    if (!outcome.accepted && outcome.refused.code === "rating_differs") session.root.dispatchEvent(new CustomEvent("taken-over"));
   });
   if (!session.outbox.durable) await handled;
 }

@@ -85,8 +85,9 @@ async function watch(session: Session, place: Stage, { number, total, play, tria
   const showings: Shown[] = [];
   const key = trial.kind === "practice" ? "practice_note" : "trial_of";
   for (let view = 1; view <= views; view += 1) {
-    const first = matchMedia("(pointer: coarse)").matches ? t("ready_touch") : t("ready");
-    const prompt = view > 1 ? t("ready_again", { view, views }) : first;
+    const touch = matchMedia("(pointer: coarse)").matches;
+    const first = t(touch ? "ready_touch" : "ready");
+    const prompt = view > 1 ? t(touch ? "ready_again_touch" : "ready_again", { view, views }) : first;
     const note = play > 1 ? t("ready_replay") : t(key, { number, total });
     const key_at_ms = await waitForStart(session, place, prompt, note);
     showings.push(await showOnce(session, place, sha256, key_at_ms));

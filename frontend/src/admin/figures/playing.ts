@@ -1,0 +1,24 @@
+/** From a curve at its own sampling rate to what is shown frame by frame. */
+
+/** Closure at each frame of `shownFps`, open before and after; by straight lines between samples. */
+export function framesAt(closure: readonly number[], fps: number, shownFps: number): number[] {
+  const length = Math.ceil(((closure.length - 1) / fps) * shownFps) + 1;
+  const inside = Array.from({ length }, (_, frame) => valueAt(closure, (frame * fps) / shownFps));
+  return [0, ...inside, 0];
+}
+
+function valueAt(values: readonly number[], place: number): number {
+  const last = values.length - 1;
+  const before = Math.min(last, Math.floor(place));
+  const [left = 0, right = 0] = [values[before], values[Math.min(last, before + 1)]];
+  return left + Math.min(1, place - before) * (right - left);
+}
+
+/** Place of the ascending `steps` value that lies nearest. */
+export function nearest(steps: readonly number[], value: number): number {
+  let best = 0;
+  for (let place = 1; place < steps.length; place += 1) {
+    if (Math.abs((steps[place] ?? 0) - value) < Math.abs((steps[best] ?? 0) - value)) best = place;
+  }
+  return best;
+}

@@ -1,0 +1,44 @@
+/** How the clips were shown so far, over all runs; at the same time the heat map's legend. */
+
+import { Card, Group, Stack, Text, Title } from "@mantine/core";
+import type { Schemas } from "../api";
+import { TRIAL_COLOURS } from "./colours";
+
+export function Quality({ runs }: { runs: Schemas["MonitoredRun"][] }) {
+  const total = (count: (run: Schemas["MonitoredRun"]) => number) => runs.reduce((sum, run) => sum + count(run), 0);
+  const flagged = total((run) => run.flagged);
+  const failed = total((run) => run.failed);
+  const answered = total((run) => run.answered);
+  const counts = { g: answered - flagged - failed, f: flagged, x: failed, ".": total((run) => run.trials) - answered };
+  const doubtful = runs.filter((run) => run.answered >= 10 && run.flagged + run.failed > 0.1 * run.answered);
+  return (
+    <Card withBorder>
+      <Stack gap={6}>
+        <Title order={2} size="h4">
+          How trials went
+        </Title>
+        {(Object.keys(counts) as (keyof typeof counts)[]).map((letter) => (
+          <Group key={letter} gap="sm">
+            <svg width={14} height={14} aria-hidden="true">
+              <rect width={14} height={14} rx={2} fill={TRIAL_COLOURS[letter][0]} />
+            </svg>
+            <Text size="sm" w={70}>
+              {TRIAL_COLOURS[letter][1]}
+            </Text>
+            <Text size="sm" className="number">
+              {counts[letter].toLocaleString()}
+            </Text>
+          </Group>
+        ))}
+        <Text size="sm" c="dimmed" mt={4}>
+          {doubtful.length === 0
+            ? "No run has more than a tenth of its clips not shown well."
+            : `${doubtful.length} ${doubtful.length === 1 ? "run has" : "runs have"} more than a tenth of the clips not shown well: ${doubtful
+                .slice(0, 3)
+                .map((run) => run.participant)
+                .join(", ")}${doubtful.length > 3 ? " …" : ""}`}
+        </Text>
+      </Stack>
+    </Card>
+  );
+}

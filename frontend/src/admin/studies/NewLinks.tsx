@@ -1,0 +1,85 @@
+/** Make links: one for everybody, one a person, or to look at the study oneself. */
+
+import { Button, Card, Group, NumberInput, SegmentedControl, Select, Stack, Text, Textarea, TextInput, Title } from "@mantine/core";
+import { useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { useChange } from "../ui/useChange";
+
+const MEANS: Record<Schemas["NewLinks"]["kind"], string> = {
+  general: "Any number of people begin by the same link.",
+  personal: "Each link is for one person, who may go on from another device.",
+  preview: "For yourself: works on drafts too, and its answers are not kept.",
+};
+const RECRUITERS = ["none", "prolific", "sona", "mturk", "generic"] as const;
+
+export function NewLinks({ study }: { study: string }) {
+  const [kind, setKind] = useState<Schemas["NewLinks"]["kind"]>("general");
+  const [label, setLabel] = useState("");
+  const [names, setNames] = useState("");
+  const [count, setCount] = useState<number | string>(20);
+  const [recruiter, setRecruiter] = useState<(typeof RECRUITERS)[number]>("none");
+  const [code, setCode] = useState("");
+  const make = useChange(
+    () => {
+      const labels = names.split("\n").map((name) => name.trim()).filter((name) => name !== "");
+      const sent =
+        recruiter === "none"
+          ? null
+          : { kind: recruiter, code_complete: code, id_parameter: "", redirect_url: "", code_failed_check: "", code_screened_out: "" };
+      const body = { kind, label, labels: kind === "personal" ? labels : [], count: Number(count) || 1, recruiter: sent };
+      return unwrap(api.POST("/api/admin/studies/{study}/links", { params: { path: { study } }, body }));
+    },
+    { touches: [["links", study]], done: "The links are made." },
+  );
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4" mb="sm">
+        New links
+      </Title>
+      <Stack>
+        <SegmentedControl
+          aria-label="Kind of link"
+          value={kind}
+          onChange={(word) => setKind(word === "personal" || word === "preview" ? word : "general")}
+          data={[
+            { value: "general", label: "Everybody" },
+            { value: "personal", label: "One person each" },
+            { value: "preview", label: "Preview" },
+          ]}
+        />
+        <Text size="sm">{MEANS[kind]}</Text>
+        <Group align="end">
+          <TextInput label="Label" value={label} onChange={(event) => setLabel(event.currentTarget.value)} />
+          {kind === "personal" && <NumberInput label="How many" min={1} max={5000} value={count} onChange={setCount} w={110} />}
+          {kind === "general" && (
+            <>
+              <Select
+                label="Recruited through"
+                data={[...RECRUITERS]}
+                value={recruiter}
+                allowDeselect={false}
+                onChange={(word) => setRecruiter(RECRUITERS.find((one) => one === word) ?? "none")}
+              />
+              {recruiter !== "none" && (
+                <TextInput label="Completion code" value={code} onChange={(event) => setCode(event.currentTarget.value)} />
+              )}
+            </>
+          )}
+          <Button disabled={kind === "personal" && names.trim() === "" && count === ""} onClick={() => make.mutate(undefined)} loading={make.isPending}>
+            Make
+          </Button>
+        </Group>
+        {kind === "personal" && (
+          <Textarea
+            label="Or one name a line"
+            autosize
+            minRows={2}
+            maxRows={8}
+            value={names}
+            onChange={(event) => setNames(event.currentTarget.value)}
+          />
+        )}
+      </Stack>
+    </Card>
+  );
+}

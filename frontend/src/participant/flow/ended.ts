@@ -1,0 +1,17 @@
+/** A run that is over: withdrawn, screened out or complete, with its code as often as it is asked for. */
+import type { RunDocument, StartedRun } from "../../api/participant";
+import type { Translate } from "../../i18n";
+import { button } from "../../ui/page";
+import { completed, showCompletion } from "../screens/finish";
+import { emptied, showNotice } from "../screens/notice";
+import type { Identity } from "./identity";
+import { persistently } from "./link";
+
+/** `why` is said first where the participant does not know yet what ended the run. */
+export async function ended(root: HTMLElement, t: Translate, run: RunDocument, started: StartedRun, identity: Identity, why = ""): Promise<void> {
+  if (run.status === "withdrawn") return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn") });
+  const done = await persistently(root, t, () => completed(started.run_token));
+  // On a laboratory's computer the next person comes by the same link.
+  const next = identity.isNamed ? [] : [button(t("new_visit"), () => (identity.forget(), location.reload()), "plain")];
+  showCompletion({ t, run }, emptied(root), done, next, why);
+}
