@@ -19,13 +19,14 @@ test: setup-test ## set everything up and run all tests: Python, TypeScript, bro
 	@cd frontend && npm run --silent test
 	@$(BIN)/python -m pytest $(TESTS)
 
-check: setup-test ## lint and type-check everything, import rules, lock files
+check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check -q .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 	@cd frontend && npm run --silent typecheck && npm run --silent api -- --check
 	@$(BIN)/python tools/check_lock_files.py
+	@$(BIN)/python tools/audit.py
 
 setup:
 	@$(PYTHON) tools/setup.py run
@@ -39,16 +40,22 @@ format: ## rewrite the Python in the house format
 lock: ## resolve the Python dependencies again, with hashes
 	@$(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o requirements.lock
 	@$(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 --all-extras --group dev pyproject.toml -o requirements-dev.lock
+	@$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --no-annotate --python-version 3.11 --extra s3 -c requirements-dev.lock pyproject.toml -o deploy/requirements.lock
 	@$(BIN)/python tools/check_lock_files.py
 
 bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' --benchmark-only --benchmark-columns=min,median,rounds -s
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_tracking.py
+	@for size in 960x360 1920x720; do PYTHONPATH=. $(BIN)/python tests/bench/clip_memory.py $$size; done
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_server.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_workers.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_labels.py
 	@test ! -d build/bake || PYTHONPATH=. $(BIN)/python tests/bench/photorealistic_quality.py build/bake/*/
 
 screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
 	@$(BIN)/python tools/screenshots.py
 	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
+	@$(BIN)/python tools/screenshots_admin.py
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python tools/load.py $(LOAD)
@@ -56,9 +63,8 @@ load: setup-test ## real servers under load and kill -9, a table at the end (LOA
 docs: setup-test ## write docs/data-dictionary.md and docs/settings.md from the code
 	@$(BIN)/python tools/reference.py
 
-audit: setup-test ## ask the advisory databases about every locked package (needs the internet)
-	@$(BIN)/python -m pip_audit --disable-pip --require-hashes -r deploy/requirements.lock --progress-spinner off
-	@cd frontend && npm audit --omit=dev
+audit: setup-test ## ask the advisory databases about every locked package; says where none answered
+	@$(BIN)/python tools/audit.py
 
 clean: ## remove what the build made (never the data folder)
 	@rm -rf frontend/dist frontend/node_modules .mypy_cache .ruff_cache .import_linter_cache build *.egg-info

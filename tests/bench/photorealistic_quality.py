@@ -1,8 +1,9 @@
 """How true the shipped photorealistic atlas is, against renders that it was not made from.
 
 Run: python tests/bench/photorealistic_quality.py [WORK]. WORK is the bake's folder under build/bake; renders
-missing there are made, one to three minutes each (needs Blender's environment, .venv-bake). Prints PSNR at
-closures between the rendered levels, PSNR of a moved lower lid, and the opening in rendered pixels.
+missing there are made, one to three minutes each (needs Blender's environment, .venv-bake). Prints PSNR
+halfway between rendered levels and halfway between the atlas's levels, PSNR of a moved lower lid, and the
+opening in rendered pixels.
 """
 
 import sys
@@ -20,9 +21,22 @@ from stimuli_builder.characters.photorealistic.framing import Frame
 from stimuli_builder.characters.photorealistic.parameters import Face
 from stimuli_builder.characters.photorealistic.renderer import Renderer, Shot
 
-MIDPOINTS = (3 / 32, 13 / 32, 23 / 32)
-MOVED = LidPose(0.5, plan.VERTICAL_MM, plan.HORIZONTAL_MM)
+PLACES = (0.1, 0.4, 0.7)
+# Half-way through the widest blink, further down, and both extremes at once (never so early in a blink).
+MOVED = (
+    LidPose(0.5, plan.VERTICAL_MM[-1] / 2, plan.HORIZONTAL_MM[-1] / 2),
+    LidPose(0.75, plan.VERTICAL_MM[-1] * 0.75, plan.HORIZONTAL_MM[-1] * 0.75),
+    LidPose(0.5, plan.VERTICAL_MM[-1], plan.HORIZONTAL_MM[-1]),
+)
+# Lashes are thinner than a pixel: a reference rendered as coarsely as the atlas would bring noise of its own.
+REFERENCE_SAMPLES = 160
 OPENINGS = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)
+
+
+def midpoints(closures: list[float]) -> list[float]:
+    """The middles of the steps at three PLACES of the closing, where a picture between levels errs most."""
+    steps = [(len(closures) - 1) * place for place in PLACES]
+    return [(closures[int(step)] + closures[int(step) + 1]) / 2 for step in steps]
 
 
 def picture(character: Character, closure: float) -> np.ndarray:
@@ -45,18 +59,39 @@ def main() -> None:
     quality = plan.Quality(made["samples"], made["frame_samples"])
     frame = Frame(*character.size_px)
     work = Path(sys.argv[1]) if len(sys.argv) > 1 else next(Path("build/bake").glob("northern-*"))
-    middles = [plan.level_shot(work, frame, quality, closure) for closure in MIDPOINTS]
-    moved = Shot(work / "true_moved.npz", MOVED, frame.eye_boxes(), quality.crop_samples)
+    closures = [level.closure for level in character.declaration.levels]
+    rendered, between = midpoints(made["rendered_closures"]), midpoints(closures)
+    middles = [
+        Shot(work / f"true_{w:.6f}_{samples}.npz", LidPose(w), frame.eye_boxes(), samples)
+        for w in sorted({*rendered, *between})
+        for samples in (quality.crop_samples, REFERENCE_SAMPLES)
+    ]
+    moved = [
+        Shot(
+            work / f"true_{p.closure}_{p.vertical_mm}_{p.horizontal_mm}.npz",
+            p,
+            frame.eye_boxes(),
+            quality.crop_samples,
+        )
+        for p in MOVED
+    ]
     masks = [Shot(work / f"mask_{w:.3f}.npz", LidPose(w), frame.eye_boxes(), 4, "eye_mask") for w in OPENINGS]
-    missing = [shot for shot in (*middles, moved, *masks) if not shot.file.exists()]
+    missing = [shot for shot in (*middles, *moved, *masks) if not shot.file.exists()]
     if missing:
         blender = Path(".venv-bake/bin/python")
         with Renderer(blender, face, frame, work / "textures", work / "blender.log", 2) as renderer:
             for shot in missing:
                 renderer.render(shot)
     assembly = Assembly(work, face, frame, quality)
-    report_midpoints(character, assembly)
-    report_lower_lid(character, assembly, moved)
+    report_midpoints(
+        character, assembly, "rendered levels", [m for m in middles if m.pose.closure in rendered]
+    )
+    report_midpoints(
+        character, assembly, "the atlas's levels", [m for m in middles if m.pose.closure in between]
+    )
+    say("lower lid: closure, mm up, mm nasal, PSNR in dB (left as it was)")
+    for shot in moved:
+        report_lower_lid(character, assembly, shot)
     say("closure  wanted mm   left  right")
     for closure, mask in zip(OPENINGS, masks, strict=True):
         heights = [eye[..., 0].astype(float).clip(0, 1).sum(0).max() for eye in mask.read().values()]
@@ -64,21 +99,22 @@ def main() -> None:
         say(f"{closure:7.2f} {11 * (1 - closure):10.2f} {left:6.2f} {right:6.2f}")
 
 
-def report_midpoints(character: Character, assembly: Assembly) -> None:
-    say("closure  PSNR in dB (crop)")
-    for closure in MIDPOINTS:
-        truth = to_8_bit(assembly.level(closure))
-        say(f"{closure:.5f} {psnr_db(linear_to_srgb(picture(character, closure)), truth):6.1f}")
+def report_midpoints(character: Character, assembly: Assembly, what: str, shots: list[Shot]) -> None:
+    say(f"closure  reference's samples  PSNR in dB (crop), halfway between {what}")
+    for shot in shots:
+        truth = to_8_bit(assembly.lay(assembly.still, shot))[character.crop]
+        made = linear_to_srgb(picture(character, shot.pose.closure))
+        say(f"{shot.pose.closure:.5f} {shot.samples:10d} {psnr_db(made, truth):16.1f}")
 
 
 def report_lower_lid(character: Character, assembly: Assembly, shot: Shot) -> None:
-    window = character.lower_lid_layer.window
-    still = picture(character, MOVED.closure)
-    made = still + character.lower_lid_delta(MOVED.closure, MOVED.vertical_mm, MOVED.horizontal_mm)
+    window, pose = character.lower_lid_layer.window, shot.pose
+    still = picture(character, pose.closure)
+    made = still + character.lower_lid_delta(pose.closure, pose.vertical_mm, pose.horizontal_mm)
     truth = to_8_bit(assembly.lay(assembly.still, shot))[character.crop][window]
     figures = [psnr_db(linear_to_srgb(image)[window], truth) for image in (made, still)]
-    say(f"lower lid moved {MOVED.vertical_mm} mm up and {MOVED.horizontal_mm} mm nasally at closure 0.5:")
-    say(f"{figures[0]:.1f} dB (left as it was: {figures[1]:.1f} dB)")
+    place = f"{pose.closure:7.2f} {pose.vertical_mm:5.2f} {pose.horizontal_mm:5.2f}"
+    say(f"{place} {figures[0]:6.1f} ({figures[1]:.1f})")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
-"""docker-compose.yml against the compose specification (the parts it uses), and our promises.
+"""docker-compose.yml against the compose specification's own schema, and our promises.
 
-The models forbid every key that the specification does not have at that place; `docker compose config` checks
-the whole where there is one.
+The schema is the one that check-jsonschema carries (compose-spec, Apache-2.0). The models below are narrower:
+they say what this project's file may hold. `docker compose config` checks the whole where there is one.
 """
 
 import re
 import shutil
 import subprocess
+import sys
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
@@ -79,6 +81,21 @@ class Compose(Strict):
 def compose() -> Compose:
     content = yaml.safe_load(PATH.read_text(encoding="utf-8"))
     return Compose.model_validate({key: value for key, value in content.items() if not key.startswith("x-")})
+
+
+def specification_accepts(path: Path) -> tuple[bool, str]:
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    return done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_specification_accepts_the_file_and_would_not_accept_another(tmp_path: Path) -> None:
+    accepted, said = specification_accepts(PATH)
+    assert accepted, said
+    for sound, spoiled in (("cap_drop:", "cap_dropp:"), ("retries: 12", "retries: [12]")):
+        wrong = tmp_path / "docker-compose.yml"
+        wrong.write_text(PATH.read_text(encoding="utf-8").replace(sound, spoiled), encoding="utf-8")
+        assert not specification_accepts(wrong)[0], spoiled
 
 
 def test_every_reference_is_to_something_declared(compose: Compose) -> None:

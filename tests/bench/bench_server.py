@@ -1,0 +1,184 @@
+"""The experimenter's side under much data: export of a million rows, the monitor with 500 runs x 400 trials.
+
+    python tests/bench/bench_server.py [rows, default 1000000]
+
+Real servers on SQLite. Prints one table; the monitor's page is opened in Chromium where there is one.
+"""
+
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+from sqlalchemy import text
+
+from server.accounts import service as accounts
+from server.cli_common import migrated_services
+from tests.bench.server_data import add_runs
+from tests.browser.conftest import CHROMIUM_FLAGS, CHROMIUM_NAMES
+from tests.browser.server_process import ServerProcess
+from tests.helpers.admins import PASSWORD
+from tests.helpers.studies import SHORT
+
+TRIALS = 400
+RUNS = 500
+UPDATES = 10
+CHANGED = 100
+STUDY = "/api/admin/studies/short"
+
+
+def print_line(name: str, value: str, must: str = "") -> None:
+    sys.stdout.write(f"{name:<58} {value:>16} {must:>12}\n")
+    sys.stdout.flush()
+
+
+def filled(folder: Path, runs: int) -> ServerProcess:
+    """A server's data folder with the short study and that many complete runs."""
+    process = ServerProcess(folder / "data")
+    study = process.add_study(folder / "clips", SHORT)
+    begun = time.monotonic()
+    with migrated_services(process.settings) as services:
+        add_runs(services, study, runs, TRIALS)
+    print_line(f"filling the database with {runs * TRIALS:,} ratings", f"{time.monotonic() - begun:.1f} s")
+    return process
+
+
+def owner_link(process: ServerProcess) -> str:
+    with migrated_services(process.settings) as services:
+        return accounts.invite(services.database, "owner", "", None)[1]
+
+
+class Owner:
+    """A signed-in owner without a browser."""
+
+    def __init__(self, process: ServerProcess) -> None:
+        self.address = process.address
+        self.cookie = ""
+        body = f'{{"name": "ada", "password": "{PASSWORD}"}}'.encode()
+        answer = self.open(f"/api/admin/invitations/{owner_link(process)}/account", body)
+        self.cookie = answer.headers["set-cookie"].partition(";")[0]
+
+    def open(self, path: str, body: bytes | None = None):  # type: ignore[no-untyped-def]
+        headers = {"cookie": self.cookie, "origin": self.address, "content-type": "application/json"}
+        return urllib.request.urlopen(urllib.request.Request(self.address + path, body, headers))
+
+    def time_of(self, path: str) -> tuple[float, int]:
+        """Seconds and lines of a download; nothing of it is kept."""
+        begun, lines = time.monotonic(), 0
+        with self.open(path) as answer:
+            while piece := answer.read(1 << 20):
+                lines += piece.count(b"\n")
+        return time.monotonic() - begun, lines
+
+
+def peak_mb(pid: int) -> float:
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) / 1024
+
+
+def export(folder: Path, rows: int) -> None:
+    process = filled(folder, max(1, rows // TRIALS)).start()
+    try:
+        owner = Owner(process)
+        assert process.process is not None
+        before = peak_mb(process.process.pid)
+        for file, must in (("ratings.csv", "> 50,000"), ("psych-ds.zip", "")):
+            seconds, _ = owner.time_of(f"{STUDY}/data/{file}")
+            print_line(f"{file} over HTTP, rows a second", f"{rows / seconds:,.0f}", must)
+        print_line(
+            "peak memory of the server, before and after",
+            f"{before:.0f}, {peak_mb(process.process.pid):.0f} MB",
+        )
+    finally:
+        process.stop()
+    command_line(process, folder, rows)
+
+
+def command_line(process: ServerProcess, folder: Path, rows: int) -> None:
+    environment = {"PALPEBRA_DATA_FOLDER": str(process.settings.data_folder), "PALPEBRA_SECRET_KEY": "bench"}
+    begun, out = time.monotonic(), folder / "short.csv"
+    command = [sys.executable, "-m", "server", "export", "short", "--out", str(out)]
+    running = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(running.pid, 0)
+    seconds, peak = time.monotonic() - begun, used.ru_maxrss / 1024
+    assert status == 0
+    with out.open(encoding="utf-8") as stream:
+        assert sum(1 for _ in stream) == rows + 1
+    print_line("`server export`, rows a second, start included", f"{rows / seconds:,.0f}", "> 50,000")
+    print_line("its peak memory", f"{peak:.0f} MB")
+
+
+def monitor(folder: Path) -> None:
+    process = filled(folder, RUNS).start()
+    try:
+        owner = Owner(process)
+        first, _ = owner.time_of(f"{STUDY}/monitor")
+        later = [owner.time_of(f"{STUDY}/monitor")[0] for _ in range(20)]
+        print_line(f"monitor, {RUNS} runs x {TRIALS} trials: first answer", f"{1000 * first:.0f} ms")
+        print_line("every later one, median of 20", f"{1000 * statistics.median(later):.0f} ms", "< 200 ms")
+        page(process)
+    finally:
+        process.stop()
+
+
+def page(process: ServerProcess) -> None:
+    """Chromium's work for one update, while a fifth of the runs change."""
+    found = next((path for name in CHROMIUM_NAMES if (path := shutil.which(name))), None)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=CHROMIUM_FLAGS)
+        shown = browser.new_page(viewport={"width": 1280, "height": 800})
+        shown.goto(f"{process.address}/admin/invitation#{owner_link(process)}")
+        shown.get_by_label("Name to sign in with").fill("grace")
+        shown.locator("input[autocomplete=new-password]").fill(PASSWORD)
+        shown.get_by_role("button", name="Make the account").click()
+        shown.get_by_role("heading", name="Studies").wait_for()
+        shown.goto(f"{process.address}/admin/studies/short/monitor")
+        shown.locator("canvas").nth(RUNS - 1).wait_for(timeout=60_000)
+        work = shown.context.new_cdp_session(shown)
+        work.send("Performance.enable")
+        shown.evaluate(
+            "window.long = []; new PerformanceObserver((all) => window.long.push(...all.getEntries()"
+            ".map((one) => one.duration))).observe({ entryTypes: ['longtask'] })"
+        )
+        before = metrics(work)
+        for number in range(UPDATES):
+            change(process, number)
+            shown.wait_for_timeout(2000)
+        after = metrics(work)
+        for name in ("ScriptDuration", "TaskDuration"):
+            print_line(f"page, {name} an update", f"{1000 * (after[name] - before[name]) / UPDATES:.0f} ms")
+        longest = max(shown.evaluate("window.long"), default=0)
+        print_line("page, longest task (frames are late above 50 ms)", f"{longest:.0f} ms")
+        browser.close()
+
+
+def metrics(work) -> dict[str, float]:  # type: ignore[no-untyped-def]
+    return {one["name"]: one["value"] for one in work.send("Performance.getMetrics")["metrics"]}
+
+
+def change(process: ServerProcess, number: int) -> None:
+    """As if a fifth of the people had just been seen, in another stage than before."""
+    stage = ("trials", "practice")[number % 2]
+    with migrated_services(process.settings) as services, services.database.write() as session:
+        statement = (
+            "UPDATE study_runs SET status = 'active', stage = :stage, last_seen_at = :now WHERE id <= :most"
+        )
+        moment = time.strftime("%Y-%m-%d %H:%M:%S.000000", time.gmtime())
+        session.execute(text(statement), {"stage": stage, "now": moment, "most": CHANGED})
+
+
+def main() -> None:
+    rows = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    for measure in (monitor, lambda folder: export(folder, rows)):
+        with tempfile.TemporaryDirectory() as folder:
+            measure(Path(folder))
+
+
+if __name__ == "__main__":
+    main()
