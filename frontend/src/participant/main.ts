@@ -60,19 +60,32 @@ async function visit(entry: Entry): Promise<void> {
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
   const found = await abilities(store.durable);
   const list = findings(found, link.gates);
-  const start = { language, client_id: identity.client_id(), query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
-  if (list[0]?.closed) return turnedAway(entry, identity, returns ? null : start, list[0], found);
+  if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], found);
   await passGates(root, t, list);
   if (!(await oneTab(root, t, link_token))) return;
-  if (!returns) start.language = await startPage(root, link, language);
-  const started = kept?.started ?? (await persistently(root, t, () => startRun(link_token, start)));
+  const chosen = returns ? language : await startPage(root, link, language);
+  const started = kept?.started ?? (await begun(entry, identity, chosen));
   await enter(entry, identity, store, started, list);
 }
 
-/** A closed gate: explained; where the study screens devices, a new visit ends here with a way back. */
-async function turnedAway({ root, t, link_token, link }: Entry, identity: Identity, start: object | null, closed: GateFinding, found: Abilities): Promise<void> {
-  if (!start || !link.screens_devices) return showClosedGate(root, t, link_token, closed, found);
-  const started = await persistently(root, t, () => screenOutDevice(link_token, start, closed, found));
+/** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
+function begun({ root, t, link_token }: Entry, identity: Identity, language: string): Promise<StartedRun> {
+  const client_id = identity.client_id();
+  const start = { language, client_id, query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
+  return persistently(root, t, () => startRun(link_token, start));
+}
+
+/** A closed gate: explained; where the study screens devices, a visit that has not got further ends here with a way back. */
+async function turnedAway(entry: Entry, identity: Identity, returns: boolean, closed: GateFinding, found: Abilities): Promise<void> {
+  const { root, t, link_token, link, language, kept } = entry;
+  const explain = (): void => showClosedGate(root, t, link_token, closed, found);
+  // A run begun in another browser is left to that one: starting it here would take it over.
+  const elsewhere = returns && !identity.isKnown;
+  if (!link.screens_devices || kept || elsewhere) return explain();
+  const started = await begun(entry, identity, language);
+  const before = await persistently(root, t, () => fetchRun(started.run_token));
+  if (before.status === "active" && before.consented_at) return explain();
+  if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, found));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
   await ended(root, t, run, started, identity, t(closed.reason, closed.values));
 }
@@ -151,7 +164,7 @@ async function play(session: Session, started: StartedRun, durable: boolean): Pr
   root.replaceChildren();
   await runTimeline(root, timeline(session, started.run_token), simulation(run));
   if (!session.completion) return;
-  sessionStorage.removeItem(RETURNED);
+  storageOf("sessionStorage")?.removeItem(RETURNED);
   showCompletion(session, emptied(root), session.completion);
 }
 
@@ -163,9 +176,11 @@ function simulation(run: RunDocument): SimulationMode | null {
 
 function showProblem(root: HTMLElement, t: Translate, error: unknown): void {
   console.error(error);
-  const returns = Number(sessionStorage.getItem(RETURNED) ?? 0);
-  if (error instanceof AnswersMissing && returns < RETURNS) {
-    sessionStorage.setItem(RETURNED, String(returns + 1));
+  // Where nothing can be counted, leading back might never end.
+  const counted = storageOf("sessionStorage");
+  const returns = Number(counted?.getItem(RETURNED) ?? 0);
+  if (error instanceof AnswersMissing && counted && returns < RETURNS) {
+    counted.setItem(RETURNED, String(returns + 1));
     return location.reload();
   }
   const reload = { label: t("reload"), press: () => location.reload() };

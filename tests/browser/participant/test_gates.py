@@ -107,9 +107,12 @@ def test_without_storage_each_answer_waits_for_the_server(
 ) -> None:
     study = server.add_study(tmp_path / "clips", PLAIN)
     server.start()
-    page.add_init_script(
-        "IDBFactory.prototype.open = () => { throw new DOMException('denied', 'SecurityError') }"
-    )
+    page.add_init_script("""
+        const denied = () => { throw new DOMException('denied', 'SecurityError') };
+        IDBFactory.prototype.open = denied;
+        for (const name of ['localStorage', 'sessionStorage'])
+            Object.defineProperty(window, name, {get: denied});
+    """)
     visit = Visit(page, server.address).open(study.link_token)
     page.wait_for_selector("text=each answer must reach the server")
     page.click(".primary")
@@ -118,6 +121,24 @@ def test_without_storage_each_answer_waits_for_the_server(
     page.wait_for_selector(".ready")
     assert len(server.rows("SELECT 1 FROM ratings WHERE kind = 'main'")) == 1
     assert "storage_blocked" in reasons(server)
+    visit.trials()
+    assert visit.code()
+    assert visit.problems == []
+
+
+def test_a_start_page_that_is_reloaded_has_begun_nothing(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    visit = Visit(page, server.address)
+    for _ in range(2):
+        visit.open(study.link_token)
+        page.wait_for_selector("text=About")
+    assert server.rows("SELECT 1 FROM study_runs") == []
+    study.change(status="closed")
+    visit.open(study.link_token)
+    page.wait_for_selector("text=not open at the moment")
 
 
 def test_a_clip_that_is_corrupt_once_is_fetched_again(

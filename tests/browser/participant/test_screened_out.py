@@ -82,6 +82,10 @@ def test_a_small_screen_is_screened_out_where_declared(
     assert "800 by 300" in page.inner_text("main")
     assert axe_violations(page) == []
     assert visit.code() == "OUT"
+    visit.open(link)  # coming back shows the same, and begins nothing
+    page.wait_for_selector(".code")
+    assert "800 by 300" in page.inner_text("main")
+    assert visit.code() == "OUT"
     context.close()
     assert [row["status"] for row in server.rows(STATUS)] == ["screened_out"]
     assert "gate_screen" in str(server.rows(REASON))

@@ -71,15 +71,13 @@ export async function reach(root: HTMLElement, t: Translate, link_token: string,
   }
 }
 
-/** A run that ends at once, where the study screens devices: the participant then has a way back. */
-export async function screenOutDevice(link_token: string, start: object, closed: GateFinding, found: Abilities): Promise<StartedRun> {
-  const started = await startRun(link_token, start);
+/** End a run because this browser cannot show the study, where the study screens devices. */
+export async function screenOutDevice(run_token: string, closed: GateFinding, found: Abilities): Promise<void> {
   const body = { reason: closed.reason, data: found };
   // Asked twice, where the first answer was lost, the run is closed already.
-  await call("POST", "/api/run/screen-out", { token: started.run_token, body }).catch((error: unknown) => {
+  await call("POST", "/api/run/screen-out", { token: run_token, body }).catch((error: unknown) => {
     if (!(error instanceof Refused && error.code === "run_closed")) throw error;
   });
-  return started;
 }
 
 /** Where the browser can only nearly show the study, ask whether to go on all the same. */
