@@ -71,15 +71,16 @@ def insert_once(session: Session, table: type[DeclarativeBase], rows: Sequence[d
 
 
 def is_away(error: BaseException) -> bool:
-    """True where the database could not be reached, was restarted or had no connection left: try again."""
+    """True where the database was away, had no connection left or put another first: try again."""
     if isinstance(error, PoolTimeout):
         return True
     if not isinstance(error, DBAPIError):
         return False
     if isinstance(error.orig, psycopg.OperationalError):
-        # No code: no connection. Classes 08, 53, 57: connection broken, no resources, server shutting down.
+        # No code: no connection. Classes 08, 53, 57: connection broken, no resources, server shutting down;
+        # 40: rolled back for the sake of another transaction.
         code = error.orig.sqlstate
-        return code is None or code[:2] in ("08", "53", "57")
+        return code is None or code[:2] in ("08", "40", "53", "57")
     # Extended codes, such as SQLITE_BUSY_SNAPSHOT, have the primary one in their lowest byte.
     return error.connection_invalidated or getattr(error.orig, "sqlite_errorcode", -1) & 0xFF in SQLITE_AWAY
 

@@ -5,6 +5,7 @@ One letter a trial: `.` not answered, `g` good, `f` flagged, `x` failed and not 
 
 import threading
 from collections.abc import Iterable
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -22,23 +23,35 @@ class HeatMap:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._last_id = 0
-        self._rows: dict[int, list[str]] = {}
+        self._last: tuple[int, str] | None = None
+        self._rows: dict[str, list[str]] = {}
 
-    def update(self, session: Session, study_id: int) -> set[int]:
-        """Read new ratings; return the run numbers whose row changed."""
+    def update(self, session: Session, study_id: int) -> set[str]:
+        """Read new ratings; return the runs (their public ids) whose row changed."""
         with self._lock:
+            if not self._is_up_to_date(session):
+                self._last = None
+                self._rows.clear()
             query = (
-                select(Rating.id, Rating.study_run_id, Rating.trial_index, Rating.verdict)
+                select(Rating.id, Rating.rating_id, StudyRun.public_id, Rating.trial_index, Rating.verdict)
                 .join(StudyRun, StudyRun.id == Rating.study_run_id)
-                .where(StudyRun.study_id == study_id, Rating.id > self._last_id - _READ_AGAIN)
+                .where(StudyRun.study_id == study_id)
                 .order_by(Rating.id)
             )
+            if self._last is not None:
+                query = query.where(Rating.id > self._last[0] - _READ_AGAIN)
             return self._take(session.execute(query))
 
-    def _take(self, rows: Iterable[tuple[int, int, int, str]]) -> set[int]:
+    def _is_up_to_date(self, session: Session) -> bool:
+        """False where the last rating read is gone: SQLite then gives its number to another one."""
+        if self._last is None:
+            return True
+        number, rating_id = self._last
+        return session.scalar(select(Rating.rating_id).where(Rating.id == number)) == rating_id
+
+    def _take(self, rows: Iterable[Any]) -> set[str]:
         changed = set()
-        for number, run, trial, verdict in rows:
+        for number, rating_id, run, trial, verdict in rows:
             cells = self._rows.setdefault(run, [])
             if len(cells) <= trial:
                 cells.extend("." * (trial + 1 - len(cells)))
@@ -46,11 +59,11 @@ class HeatMap:
             if _BETTER[letter] > _BETTER[cells[trial]]:
                 cells[trial] = letter
                 changed.add(run)
-            self._last_id = max(self._last_id, number)
+            self._last = (number, rating_id)
         return changed
 
-    def row(self, run: int, trials: int) -> str:
-        """The letters of one run, one for each of its trials."""
+    def row(self, run: str, trials: int) -> str:
+        """The letters of one run (its public id), one for each of its trials."""
         return "".join(self._rows.get(run, [])).ljust(trials, ".")[:trials]
 
 

@@ -17,7 +17,6 @@ HERE_WITHIN = timedelta(minutes=1)
 PACE_OVER = timedelta(days=1)
 # Whole objects would take several times as long: this is asked every two seconds, of hundreds of runs.
 SHOWN = (
-    StudyRun.id,
     StudyRun.public_id,
     StudyRun.participant,
     StudyRun.phase,
@@ -58,7 +57,7 @@ def snapshot(session: Session, study: Study, heat: HeatMap, lease: timedelta) ->
 
 def monitored(run: Any, heat: HeatMap, moment: datetime, lease: timedelta) -> MonitoredRun:
     """One line of the monitor's table."""
-    letters = heat.row(run.id, run.trials_total)
+    letters = heat.row(run.public_id, run.trials_total)
     silent = moment - run.last_seen_at
     if run.status != "active":
         presence = "finished"

@@ -8,7 +8,7 @@ from experiments.definition import Experiment
 from experiments.rules import ExcludeAttention
 from server.clock import now
 from server.context import Services
-from server.models import StudyRun
+from server.models import Study, StudyRun
 from server.participants import repository
 from server.participants.links import recruiter_of
 from server.participants.lookup import find_run
@@ -20,13 +20,15 @@ from server.versions import LoadedVersion
 
 def complete_run(services: Services, session: Session, token: str) -> Completion:
     """Close the run once everything is answered, and give the code; asking again gives the same."""
+    # The study first, as in a start: two requests that lock in two orders would wait for each other.
+    study = repository.lock_study_of_run(session, token)
     run = find_run(session, token, lock=True)
     loaded = services.versions.get(session, run.version_id)
     if run.status == "active":
         _need_everything(session, run, loaded)
         run.status, run.stage, run.completed_at = "complete", "debrief", now()
         run.last_seen_at = run.completed_at
-        _close_when_full(session, run)
+        _close_when_full(session, study, run)
     if run.status == "screened_out":
         return _screened_out(run)
     if run.status != "complete":
@@ -68,9 +70,8 @@ def _screened_out(run: StudyRun) -> Completion:
     return Completion(status="screened_out", completion_code=code, redirect_url=address)
 
 
-def _close_when_full(session: Session, run: StudyRun) -> None:
-    study = repository.lock_study(session, run.study_id)
-    if study.quota is None or study.status not in ("pilot", "live") or run.preview:
+def _close_when_full(session: Session, study: Study | None, run: StudyRun) -> None:
+    if study is None or study.quota is None or study.status not in ("pilot", "live") or run.preview:
         return
     session.flush()
     if repository.complete_runs(session, study, run.phase) >= study.quota:

@@ -47,6 +47,12 @@ def lock_study(session: Session, study_id: int) -> Study:
     return session.scalars(query.execution_options(populate_existing=True)).one()
 
 
+def lock_study_of_run(session: Session, token: str) -> Study | None:
+    """The study of the run with this token, held as by `lock_study`; the run itself is not held."""
+    study_id = session.scalar(select(StudyRun.study_id).where(StudyRun.token_hash == hash_token(token)))
+    return None if study_id is None else lock_study(session, study_id)
+
+
 def active_version(session: Session, study: Study) -> StudyVersion:
     """The version new runs are made with."""
     query = select(StudyVersion).where(StudyVersion.study_id == study.id)

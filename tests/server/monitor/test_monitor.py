@@ -1,3 +1,9 @@
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import delete
+
+from server.context import Services
+from server.models import StudyRun
 from server.monitor import endpoints
 from server.monitor.schemas import MonitorSnapshot
 from tests.helpers.admins import Admin
@@ -30,3 +36,25 @@ def test_only_changed_runs_are_sent_again(viewer: Admin, client, study: StudyInD
 def test_previews_are_not_monitored(viewer: Admin, client, study: StudyInDatabase) -> None:  # type: ignore[no-untyped-def]
     Participant(client, study.link("preview")).start()
     assert viewer.get("/studies/short/monitor").json()["runs"] == []
+
+
+def test_who_takes_the_place_of_a_deleted_preview_gets_a_row_of_her_own(
+    viewer: Admin,
+    client: TestClient,
+    services: Services,
+    study: StudyInDatabase,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """SQLite gives the numbers of deleted runs and ratings to the next ones."""
+    monkeypatch.setattr("server.monitor.heat._READ_AGAIN", 0)
+    preview = Participant(client, study.link("preview")).agree()
+    for trial in preview.state()["trials"][:3]:
+        preview.rate(trial)
+    viewer.get("/studies/short/monitor")
+    with services.database.write() as session:
+        session.execute(delete(StudyRun))
+    person = Participant(client, study.link_token).agree()
+    trials = person.state()["trials"]
+    person.rate(trials[1])
+    [run] = viewer.get("/studies/short/monitor").json()["runs"]
+    assert run["heat"] == ".g" + "." * 10

@@ -1,5 +1,6 @@
 """Many visits begun at once share transactions; what one of them is refused touches no other."""
 
+import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -9,7 +10,8 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from server.context import Services
-from server.models import AssignedTrial, StudyRun
+from server.models import AssignedTrial, Study, StudyRun
+from server.participants.repository import lock_study
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
 AT_ONCE = 24
@@ -76,3 +78,24 @@ def test_the_next_run_gets_the_smallest_slot_that_nobody_holds(
     with services.database.read() as session:
         run = session.query(StudyRun).filter_by(public_id=late.run_id).one()
         assert run.slot == min(left, default=6)
+
+
+@pytest.mark.parametrize(
+    "database_url", [pytest.param("postgres", marks=pytest.mark.postgres)], indirect=True
+)
+def test_a_completion_waits_for_a_start_without_holding_its_run(
+    services: Services, participant: Participant
+) -> None:
+    """A start holds the study, then may touch a run; a completion that held the run first would deadlock."""
+    participant.agree().answer_all()
+    with ThreadPoolExecutor(1) as pool, services.database.write() as session:
+        study = session.query(Study).one()
+        lock_study(session, study.id)
+        completion = pool.submit(participant.request, "POST", "/complete")
+        waits = "SELECT count(*) FROM pg_locks WHERE NOT granted"
+        while not session.scalar(text(waits)):
+            assert not completion.done()
+            time.sleep(0.02)
+        session.execute(text("SELECT 1 FROM study_runs FOR UPDATE NOWAIT"))
+        session.commit()
+        assert completion.result(30).json()["status"] == "complete"
