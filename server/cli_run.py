@@ -98,7 +98,8 @@ def _check_free(host: str, port: int) -> None:
         except OSError as error:
             reason = error.strerror or str(error)
             raise InputError(
-                f"cannot listen on {host}:{port} ({reason}); choose another by --port"
+                f"cannot listen on {host}:{port} ({reason}); "
+                "choose another by --port (with make: PORT=8001 make run)"
             ) from error
 
 

@@ -21,7 +21,9 @@ ACCEPTED: dict[str, str] = {}
 """Advisories that are known and harmless here: their id, and why."""
 LONGEST_S = 300
 NO_ANSWER = "skipped: the advisory database did not answer (no internet, or a mirror without it)"
-PIP_AUDIT = f"-m pip_audit --disable-pip --require-hashes -r {LOCK} --format json --progress-spinner off"
+PIP_AUDIT = (
+    f"-m pip_audit --disable-pip --require-hashes -r {LOCK} --format json --progress-spinner off --timeout 15"
+)
 
 
 @dataclass(frozen=True)
@@ -38,9 +40,7 @@ def python_outcome(answer: str) -> Outcome:
     packages = report.get("dependencies", []) if report else []
     asked = [package for package in packages if "skip_reason" not in package]
     if not asked:
-        return Outcome(
-            "Python: skipped: the advisory database did not answer (no internet, or a mirror without it)"
-        )
+        return Outcome(f"Python: {NO_ANSWER}")
     found = list(_weaknesses(asked))
     unknown = len(packages) - len(asked)
     rest = f", {unknown} unknown to it" if unknown else ""
@@ -62,9 +62,7 @@ def npm_outcome(answer: str) -> Outcome:
     """From what `npm audit --json` prints."""
     report = _json(answer)
     if report is None or "vulnerabilities" not in report:
-        return Outcome(
-            "npm: skipped: the advisory database did not answer (no internet, or a mirror without it)"
-        )
+        return Outcome(f"npm: {NO_ANSWER}")
     found = [
         f"  {name}: {weakness['severity']}" for name, weakness in sorted(report["vulnerabilities"].items())
     ]
@@ -92,10 +90,7 @@ def _answer(command: list[str], folder: Path) -> str:
 
 
 def main() -> int:
-    pip_audit = (
-        "-m pip_audit --disable-pip --require-hashes --format json --progress-spinner off --timeout 15"
-    )
-    outcomes = [python_outcome(_answer([sys.executable, *pip_audit.split(), "-r", LOCK], ROOT))]
+    outcomes = [python_outcome(_answer([sys.executable, *PIP_AUDIT.split()], ROOT))]
     if npm := shutil.which("npm"):
         outcomes.append(npm_outcome(_answer([npm, "audit", "--omit=dev", "--json"], ROOT / "frontend")))
     else:

@@ -37,6 +37,7 @@ def fail(text: str) -> None:
 def call(*command: str | Path, cwd: Path = ROOT) -> None:
     """Run a command with the environment's programs first on the path; stop where it fails."""
     environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}", "VIRTUAL_ENV": str(VENV)}
+    environment["npm_config_update_notifier"] = "false"  # the version of npm is pinned with that of node
     done = subprocess.run([str(part) for part in command], cwd=cwd, env=environment, check=False)
     if done.returncode:
         fail(f"`{' '.join(str(part) for part in command)}` ended with code {done.returncode}; see above")

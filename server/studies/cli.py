@@ -72,7 +72,8 @@ def add(
                 )
             if open_:
                 _set_status(session, study, "live")
-                out.print(_url(services, session, study))
+                link = _url(services, session, study)
+                out.print(f"link for participants, once the server runs: {link}", soft_wrap=True)
 
 
 def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:
