@@ -28,6 +28,7 @@ SHOWN = (
     StudyRun.completed_at,
     StudyRun.trials_total,
     StudyRun.excluded,
+    StudyRun.erased_at,
 )
 
 
@@ -57,7 +58,8 @@ def snapshot(session: Session, study: Study, heat: HeatMap, lease: timedelta) ->
 
 def monitored(run: Any, heat: HeatMap, moment: datetime, lease: timedelta) -> MonitoredRun:
     """One line of the monitor's table."""
-    letters = heat.row(run.public_id, run.trials_total)
+    # What a map has read of a run before it was erased stays in memory, not on the page.
+    letters = "." * run.trials_total if run.erased_at else heat.row(run.public_id, run.trials_total)
     silent = moment - run.last_seen_at
     if run.status != "active":
         presence = "finished"

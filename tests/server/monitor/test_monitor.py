@@ -38,6 +38,17 @@ def test_previews_are_not_monitored(viewer: Admin, client, study: StudyInDatabas
     assert viewer.get("/studies/short/monitor").json()["runs"] == []
 
 
+def test_an_erased_run_shows_no_answers(experimenter: Admin, participant: Participant) -> None:
+    participant.agree().rate(participant.state()["trials"][0])
+    assert experimenter.get("/studies/short/monitor").json()["runs"][0]["answered"] == 1
+    erased = experimenter.send(
+        "POST", f"/studies/short/runs/{participant.run_id}/erase", {"confirm": participant.run_id}
+    )
+    assert erased.status_code < 300, erased.text
+    [run] = experimenter.get("/studies/short/monitor").json()["runs"]
+    assert (run["answered"], run["heat"]) == (0, "." * 12)
+
+
 def test_who_takes_the_place_of_a_deleted_preview_gets_a_row_of_her_own(
     viewer: Admin,
     client: TestClient,
