@@ -59,9 +59,10 @@ async def rate(raters: list[LoadRater], seconds: float, fire: Callable[[int], No
     """Let them rate for so long; `fire` is called WORKER_KILLS times, evenly spread."""
     end = time.monotonic() + seconds
     work = [asyncio.create_task(rater.rate_until(end, EVERY_S)) for rater in raters]
-    for number in range(WORKER_KILLS if fire else 0):
-        await asyncio.sleep(seconds / (WORKER_KILLS + 1))
-        await asyncio.to_thread(fire, number)
+    if fire is not None:
+        for number in range(WORKER_KILLS):
+            await asyncio.sleep(seconds / (WORKER_KILLS + 1))
+            await asyncio.to_thread(fire, number)
     await asyncio.gather(*work)
 
 

