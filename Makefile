@@ -23,7 +23,7 @@ check: setup-test ## lint and type-check everything, import rules, lock files, k
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check -q .
 	@$(BIN)/mypy
-	@$(BIN)/mypy --explicit-package-bases tools
+	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools
 	@$(BIN)/lint-imports
 	@cd frontend && npm run --silent typecheck && npm run --silent api -- --check
 	@$(BIN)/python tools/check_lock_files.py
