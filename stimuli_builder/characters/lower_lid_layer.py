@@ -1,0 +1,126 @@
+"""The lower lid of a baked character: poses of the open eye, laid under the upper lid of any closure."""
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.characters.colour import srgb_to_linear
+from stimuli_builder.characters.reading import check_closures, decode_picture, slices
+
+if TYPE_CHECKING:
+    from stimuli_builder.characters.atlas import Character
+
+SHADE_LIMITS = (0.2, 1.1)
+SHADE_BLUR_MM = 0.4
+DARKEST = np.float32(2e-3)
+
+
+class LowerLidLayer:
+    """Poses of the open eye's lower lid, laid under the upper lid of any closure.
+
+    I(w, v, h) = I(w) + (1 - matte(w)) (pose(v, h) - pose(0, 0)) R(w), where R is the blurred brightness of
+    I(w) over that of I(0), clipped: the shade that the upper lid throws on the moved skin.
+    """
+
+    def __init__(self, character: "Character") -> None:
+        lower = character.declaration.lower_lid
+        if lower is None:
+            raise InputError(f"character '{character.name}' has no lower-lid layer: use lower lid 'none'")
+        self._character, self._lower = character, lower
+        self.vertical_mm, self.horizontal_mm = np.array(lower.vertical_mm), np.array(lower.horizontal_mm)
+        crop = character.declaration.crop
+        rows, columns = slices(lower.crop)
+        self.window = (
+            slice(rows.start - crop[1], rows.stop - crop[1]),
+            slice(columns.start - crop[0], columns.stop - crop[0]),
+        )
+        self.changes = self._decode_poses()
+        self.matte_closures = np.array([matte.closure for matte in lower.mattes])
+        self._factors: dict[int, NDArray[np.float32]] = {}
+
+    @property
+    def vertical_range_mm(self) -> tuple[float, float]:
+        """Lowest and highest vertical displacement that was baked."""
+        return float(self.vertical_mm[0]), float(self.vertical_mm[-1])
+
+    @property
+    def horizontal_range_mm(self) -> tuple[float, float]:
+        """Lowest and highest horizontal displacement that was baked."""
+        return float(self.horizontal_mm[0]), float(self.horizontal_mm[-1])
+
+    def delta(self, closure: float, vertical_mm: float, horizontal_mm: float) -> NDArray[np.float32]:
+        """(h, w, 3) linear light to add to `window` of the crop. See Character.lower_lid_delta."""
+        closure = float(check_closures([closure])[0])
+        row, row_share = _neighbours(self.vertical_mm, vertical_mm, "vertical")
+        column, column_share = _neighbours(self.horizontal_mm, horizontal_mm, "horizontal")
+        change = np.zeros(self.changes.shape[2:], np.float32)
+        for i, across in ((row, 1 - row_share), (row + 1, row_share)):
+            for j, along in ((column, 1 - column_share), (column + 1, column_share)):
+                if across * along > 0:
+                    change += np.float32(across * along) * self.changes[i, j]
+        return change * self._factor(closure)
+
+    def _factor(self, closure: float) -> NDArray[np.float32]:
+        """(h, w, 1 or 3) of visible share times shade at a closure, interpolated between mattes."""
+        if len(self.matte_closures) == 1:
+            return self.factor_at(0)
+        inside = float(np.clip(closure, self.matte_closures[0], self.matte_closures[-1]))
+        index, share = _neighbours(self.matte_closures, inside, "closure")
+        if share == 0.0:
+            return self.factor_at(index)
+        low, high = self.factor_at(index), self.factor_at(index + 1)
+        return (1 - np.float32(share)) * low + np.float32(share) * high
+
+    def factor_at(self, index: int) -> NDArray[np.float32]:
+        """(h, w, 1 or 3) of visible share times shade at the closure of one matte."""
+        if index not in self._factors:
+            matte = self._lower.mattes[index]
+            what = f"lower-lid matte at closure {matte.closure:g}"
+            code = decode_picture(self._character.folder, matte, self._lower.crop[2:], what)[..., :1]
+            visible = np.float32(1) - code.astype(np.float32) / np.float32(255)
+            self._factors[index] = (visible * self._shade(matte.closure)).astype(np.float32)
+        return self._factors[index]
+
+    def _shade(self, closure: float) -> NDArray[np.float32]:
+        character = self._character
+        weights = character.level_weights([closure])[0]
+        image = np.zeros((self._lower.crop[3], self._lower.crop[2], 3), np.float32)
+        for index in np.flatnonzero(weights):
+            image += weights[index] * srgb_to_linear(character.level_srgb(int(index)))[self.window]
+        open_eye = srgb_to_linear(character.level_srgb(0))[self.window]
+        sigma = SHADE_BLUR_MM * character.declaration.px_per_mm
+        ratio = _blur(image, sigma) / np.maximum(_blur(open_eye, sigma), 1e-3)
+        # Never take more light from a pixel than it has: lashes over the lid would turn into red flecks.
+        left = (image + DARKEST) / (open_eye + DARKEST)
+        bounded = np.minimum(np.clip(ratio, *SHADE_LIMITS), left.min(axis=2, keepdims=True))
+        return np.asarray(bounded, dtype=np.float32)
+
+    def _decode_poses(self) -> NDArray[np.float32]:
+        """(vertical, horizontal, h, w, 3) change of each pose against the resting one."""
+        size = self._lower.crop[2:]
+        images = {}
+        for pose in self._lower.poses:
+            at = (pose.vertical_mm, pose.horizontal_mm)
+            what = f"lower-lid pose ({at[0]:g}, {at[1]:g}) mm"
+            images[at] = srgb_to_linear(decode_picture(self._character.folder, pose, size, what))
+        rest = images[(0.0, 0.0)]
+        return np.stack(
+            [np.stack([images[(v, h)] - rest for h in self.horizontal_mm]) for v in self.vertical_mm]
+        )
+
+
+def _neighbours(grid: NDArray[np.float64], value: float, axis: str) -> tuple[int, float]:
+    """Index of the grid point at or below `value` (never the last) and the share of the next one."""
+    if not (grid[0] - 1e-9 <= value <= grid[-1] + 1e-9):
+        raise InputError(
+            f"lower lid {axis} displacement must lie between {grid[0]:g} and {grid[-1]:g} mm; it is {value:g}"
+        )
+    index = int(np.clip(np.searchsorted(grid, value, side="right") - 1, 0, len(grid) - 2))
+    return index, float(np.clip((value - grid[index]) / (grid[index + 1] - grid[index]), 0.0, 1.0))
+
+
+def _blur(image: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), dtype=np.float32)

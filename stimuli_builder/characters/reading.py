@@ -1,0 +1,50 @@
+"""What reading a character checks: pictures as declared, closures between 0 and 1."""
+
+import hashlib
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image, UnidentifiedImageError
+
+from experiments.errors import InputError
+from stimuli_builder.characters.declaration import Picture
+
+
+def check_closures(closures: ArrayLike) -> NDArray[np.float64]:
+    """(m,) closures as floats; InputError where one is NaN or outside 0-1 (1e-9 of rounding is clipped)."""
+    values = np.atleast_1d(np.asarray(closures, dtype=float)).ravel()
+    wrong = ~((values >= -1e-9) & (values <= 1 + 1e-9))
+    if wrong.any():
+        at = int(np.flatnonzero(wrong)[0])
+        raise InputError(f"closure must lie between 0 (open) and 1 (closed); sample {at} is {values[at]:g}")
+    return np.asarray(np.clip(values, 0.0, 1.0), dtype=np.float64)
+
+
+def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: str) -> NDArray[np.uint8]:
+    """(h, w, 3) sRGB code values of one picture; InputError where missing, damaged or the wrong size."""
+    try:
+        content = (folder / picture.file).read_bytes()
+        if picture.sha256 is not None and hashlib.sha256(content).hexdigest() != picture.sha256:
+            raise InputError(
+                f"{what} is damaged: {picture.file} does not match its declared sha256; bake it again"
+            )
+        image = Image.open(BytesIO(content)).convert("RGB")
+    except FileNotFoundError as error:
+        raise InputError(f"{what} is missing: no {picture.file} in {folder}; bake it again") from error
+    except (OSError, UnidentifiedImageError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{what} is damaged: cannot decode {picture.file}; bake it again") from error
+    if image.size != tuple(size):
+        found, wanted = f"{image.width} x {image.height}", " x ".join(str(n) for n in size)
+        raise InputError(f"{what}: {picture.file} is {found} px, the declaration asks for {wanted} px")
+    return np.asarray(image, dtype=np.uint8)
+
+
+def slices(crop: tuple[int, int, int, int]) -> tuple[slice, slice]:
+    """Rows and columns of an (x, y, width, height) box."""
+    x, y, width, height = crop
+    return slice(y, y + height), slice(x, x + width)
