@@ -1,5 +1,6 @@
 """What every exported column means, from its declaration: as Markdown, and as schema.org variables."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from experiments.definition import Experiment
@@ -31,29 +32,27 @@ RUN_COLUMNS: tuple[Column, ...] = (
 )
 
 
-def factor_columns(definition: Experiment) -> list[Column]:
-    """The CSV's factor columns, which stand in the place of the view's `levels`."""
-    return [
-        Column(
-            factor.name,
-            "text",
-            f"Level of the factor {factor.label}.",
-            values=tuple(level.name for level in factor.levels),
-        )
-        for factor in definition.factors
-    ]
+def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
+    """The CSV's factor columns, which stand in the place of the view's `levels`: those of all versions."""
+    found: dict[str, Column] = {}
+    for factor in (factor for definition in definitions for factor in definition.factors):
+        before = found[factor.name].values if factor.name in found else ()
+        levels = dict.fromkeys((*before, *(level.name for level in factor.levels)))
+        meaning = f"Level of the factor {factor.label}."
+        found[factor.name] = Column(factor.name, "text", meaning, values=tuple(levels))
+    return list(found.values())
 
 
-def rating_columns(definition: Experiment) -> list[Column]:
-    """Every column of the ratings CSV of a study, in order."""
+def rating_columns(definitions: Iterable[Experiment]) -> list[Column]:
+    """Every column of the ratings CSV of a study with these versions, in order."""
     columns: list[Column] = []
     for column in RATING_COLUMNS:
-        columns.extend(factor_columns(definition) if column.name == "levels" else [column])
+        columns.extend(factor_columns(definitions) if column.name == "levels" else [column])
     return columns
 
 
-def markdown(definition: Experiment) -> str:
-    """The codebook as Markdown."""
+def markdown(definition: Experiment, columns: Iterable[Column]) -> str:
+    """The codebook as Markdown: `columns` are those of the ratings."""
     scale = definition.trial.scale
     language = definition.languages[0]
     lines = [
@@ -63,12 +62,12 @@ def markdown(definition: Experiment) -> str:
         f"({scale.high.get(language, '')}). Question: {scale.question.get(language, '')}",
         "",
     ]
-    for title, columns in (
-        ("Ratings: one row a play", rating_columns(definition)),
+    for title, table in (
+        ("Ratings: one row a play", columns),
         ("Runs: one row a visit", RUN_COLUMNS),
     ):
         lines += [f"## {title}", "", "| column | type | unit | meaning | values |", "|---|---|---|---|---|"]
-        lines += [_line(column) for column in columns]
+        lines += [_line(column) for column in table]
         lines.append("")
     return "\n".join(lines)
 

@@ -9,9 +9,8 @@ from server.accounts.audit import record
 from server.accounts.identity import Exporter, Identity, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.export import codebook
 from server.export.formats import FORMATS, Format
-from server.studies.lookup import active_definition, find_study
+from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/data", tags=["data"], responses=ERROR_RESPONSES)
 
@@ -59,6 +58,6 @@ def download_psych_ds(services: ServicesDep, who: Exporter, study: str) -> Strea
 def download_codebook(services: ServicesDep, _who: Viewer, study: str) -> Response:
     """What every column means."""
     with services.database.read() as session:
-        text = codebook.markdown(active_definition(session, find_study(session, study)))
+        text = b"".join(FORMATS["codebook"](session, find_study(session, study)))
     headers = {"content-disposition": f'attachment; filename="{study}-codebook.md"'}
     return Response(text, media_type="text/markdown; charset=utf-8", headers=headers)

@@ -9,7 +9,7 @@ from server.clock import now
 from server.export import codebook, psych_ds, runs
 from server.export.pieces import csv_pieces, rating_table
 from server.models import Study
-from server.studies.lookup import active_definition, active_version
+from server.studies.lookup import active_definition, all_definitions
 
 Format = Literal["csv", "runs", "raw", "codebook", "psych-ds"]
 Pieces = Callable[[Session, Study], Iterator[bytes]]
@@ -33,13 +33,13 @@ def raw_json(session: Session, study: Study) -> Iterator[bytes]:
 
 def codebook_markdown(session: Session, study: Study) -> Iterator[bytes]:
     """What every column means."""
-    yield codebook.markdown(active_definition(session, study)).encode("utf-8")
+    columns = codebook.rating_columns(all_definitions(session, study))
+    yield codebook.markdown(active_definition(session, study), columns).encode("utf-8")
 
 
 def psych_ds_zip(session: Session, study: Study) -> Iterator[bytes]:
     """A Psych-DS dataset as a zip."""
-    version, definition = active_version(session, study), active_definition(session, study)
-    yield from psych_ds.dataset(session, study, version, definition, now().date().isoformat())
+    yield from psych_ds.dataset(session, study, now().date().isoformat())
 
 
 FORMATS: dict[Format, Pieces] = {

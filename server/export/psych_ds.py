@@ -4,15 +4,24 @@ import io
 import json
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
-from server.export.codebook import RUN_COLUMNS, markdown, rating_columns, variables_measured
+from experiments.ratings import Column
+from server.export.codebook import (
+    RUN_COLUMNS,
+    factor_columns,
+    markdown,
+    rating_columns,
+    variables_measured,
+)
 from server.export.pieces import csv_pieces, rating_table
 from server.export.runs import run_rows
-from server.models import Study, StudyVersion
+from server.models import Study
+from server.studies.lookup import active_definition, active_version, all_definitions
 
 
 class _Sink(io.RawIOBase):
@@ -37,19 +46,30 @@ class _Sink(io.RawIOBase):
         return taken
 
 
-def dataset(
-    session: Session, study: Study, version: StudyVersion, definition: Experiment, made: str
-) -> Iterator[bytes]:
+# What factors cannot be called here: a variable has one meaning in the whole folder, so no
+# column of the runs; and the official validator stumbles at the members of its table of columns and at
+# the number it gives each row.
+_STUMBLES_AT = "clear constructor delete entries forEach get has keys row_id set size values"
+_TAKEN = frozenset((*(column.name for column in RUN_COLUMNS), *_STUMBLES_AT.split()))
+
+
+def _own_name(column: str) -> str:
+    return f"factor_{column}" if column in _TAKEN else column
+
+
+def dataset(session: Session, study: Study, made: str) -> Iterator[bytes]:
     """The pieces of the zip: `dataset_description.json`, README, CHANGES, `data/`, codebook, definition."""
     sink = _Sink()
+    version, definition = active_version(session, study), active_definition(session, study)
+    columns = _columns(all_definitions(session, study))
     keyword = _keyword(study.name)
     texts = {
         "dataset_description.json": json.dumps(
-            description(study, definition, made), indent=2, ensure_ascii=False
+            description(study, definition, columns, made), indent=2, ensure_ascii=False
         ),
         "README.md": _readme(study, definition, made),
         "CHANGES.md": f"{made} Exported from version {version.number} of the study.\n",
-        "documentation/codebook.md": markdown(definition),
+        "documentation/codebook.md": markdown(definition, columns),
         f"materials/{definition.name}.toml": version.definition_toml,
     }
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -57,7 +77,7 @@ def dataset(
             archive.writestr(f"{study.name}/{name}", text)
             yield sink.take()
         tables: tuple[tuple[str, Iterable[Sequence[Any]]], ...] = (
-            ("ratings", rating_table(session, study)),
+            ("ratings", _with_header(columns, rating_table(session, study))),
             ("runs", run_rows(session, study)),
         )
         for table, rows in tables:
@@ -70,14 +90,29 @@ def dataset(
     yield sink.take()
 
 
+def _columns(definitions: list[Experiment]) -> list[Column]:
+    """Columns of the ratings, under the names that they have in this folder."""
+    factors = {column.name for column in factor_columns(definitions)}
+    return [
+        replace(column, name=_own_name(column.name)) if column.name in factors else column
+        for column in rating_columns(definitions)
+    ]
+
+
+def _with_header(columns: list[Column], rows: Iterator[Sequence[Any]]) -> Iterator[Sequence[Any]]:
+    next(rows)
+    yield [column.name for column in columns]
+    yield from rows
+
+
 def _keyword(name: str) -> str:
     # Psych-DS file names are keyword-value pairs; values hold letters and digits only.
-    return "".join(letter for letter in name if letter.isalnum()) or "study"
+    return "".join(letter for letter in name if letter.isascii() and letter.isalnum()) or "study"
 
 
-def description(study: Study, definition: Experiment, made: str) -> dict[str, Any]:
+def description(study: Study, definition: Experiment, columns: list[Column], made: str) -> dict[str, Any]:
     """The metadata file: schema.org JSON-LD with every column of every table."""
-    columns = {column.name: column for column in (*rating_columns(definition), *RUN_COLUMNS)}
+    variables = {column.name: column for column in (*columns, *RUN_COLUMNS)}
     return {
         "@context": "https://schema.org/",
         "@type": "Dataset",
@@ -88,7 +123,7 @@ def description(study: Study, definition: Experiment, made: str) -> dict[str, An
         "citation": definition.source or "",
         "measurementTechnique": "Rating of single clips in a web browser",
         "keywords": ["rating study", "video clips", *(factor.label for factor in definition.factors)],
-        "variableMeasured": variables_measured(list(columns.values())),
+        "variableMeasured": variables_measured(list(variables.values())),
     }
 
 

@@ -31,7 +31,16 @@ def active_version(session: Session, study: Study) -> StudyVersion:
 
 def active_definition(session: Session, study: Study) -> Experiment:
     """The declaration new runs of a study use."""
-    version = active_version(session, study)
+    return _definition(active_version(session, study))
+
+
+def all_definitions(session: Session, study: Study) -> list[Experiment]:
+    """The declarations of all versions of a study, oldest first."""
+    query = select(StudyVersion).where(StudyVersion.study_id == study.id).order_by(StudyVersion.number)
+    return [_definition(version) for version in session.scalars(query)]
+
+
+def _definition(version: StudyVersion) -> Experiment:
     # A definition with this hash never changes, so it is parsed once.
     if version.definition_sha256 not in _parsed:
         _parsed[version.definition_sha256] = Experiment.model_validate(version.definition)
