@@ -127,7 +127,7 @@ def opened_at_last(visit: Visit, link: str) -> Visit:
     """Where the page itself or its scripts are lost on the way, a person loads it again."""
     for _ in range(120):
         try:
-            visit.page.goto(f"{visit.address}/run/{link}")
+            visit.page.goto(f"{visit.address}/run/{link}", timeout=30_000)
             visit.page.wait_for_selector("h1:not(:has-text('too old')), .trial", timeout=15_000)
         except Error:
             time.sleep(1)
@@ -141,6 +141,8 @@ def test_a_browser_goes_through_the_same(server: ServerProcess, tmp_path: Path, 
     server.start()
     proxy = FaultProxy(server.port, SHARE, seed=3).start()
     over, kills = threading.Event(), list[float]()
+    # A form waits for the server, up to 15 s between two tries, and each may meet a server that is down.
+    page.set_default_timeout(180_000)
     visit = opened_at_last(Visit(page, proxy.address), study.link_token).begin().instructions().practice()
     killer = threading.Thread(target=kill_again_and_again, args=(server, over, kills))
     killer.start()
