@@ -21,12 +21,12 @@ from stimuli_builder.characters.photorealistic.framing import Frame
 from stimuli_builder.characters.photorealistic.parameters import Face
 from stimuli_builder.characters.photorealistic.renderer import Renderer, Shot
 
-PLACES = (0.1, 0.4, 0.7)
-# Half-way through the widest blink, further down, and both extremes at once (never so early in a blink).
-MOVED = (
-    LidPose(0.5, plan.VERTICAL_MM[-1] / 2, plan.HORIZONTAL_MM[-1] / 2),
-    LidPose(0.75, plan.VERTICAL_MM[-1] * 0.75, plan.HORIZONTAL_MM[-1] * 0.75),
-    LidPose(0.5, plan.VERTICAL_MM[-1], plan.HORIZONTAL_MM[-1]),
+# The last one is where the lids almost meet.
+PLACES = (0.1, 0.4, 0.7, 0.93)
+# The widest blink on its way down, and both extremes at its end and, earlier than any blink, at half.
+MOVED = tuple(
+    LidPose(closure, plan.VERTICAL_MM[-1] * share, plan.HORIZONTAL_MM[-1] * share)
+    for closure, share in ((0.5, 0.5), (0.75, 0.75), (0.875, 0.875), (1.0, 1.0), (0.5, 1.0))
 )
 # Lashes are thinner than a pixel: a reference rendered as coarsely as the atlas would bring noise of its own.
 REFERENCE_SAMPLES = 160
@@ -34,7 +34,7 @@ OPENINGS = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)
 
 
 def midpoints(closures: list[float]) -> list[float]:
-    """The middles of the steps at three PLACES of the closing, where a picture between levels errs most."""
+    """The middles of the steps at PLACES of the closing, where a picture between levels errs most."""
     steps = [(len(closures) - 1) * place for place in PLACES]
     return [(closures[int(step)] + closures[int(step) + 1]) / 2 for step in steps]
 
