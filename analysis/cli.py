@@ -14,9 +14,9 @@ app = typer.Typer(
 
 
 def _gather() -> None:
-    from analysis.cli_check_paper import register as register_check_paper
-    from analysis.cli_models import register as register_models
-    from analysis.cli_run import register as register_run
+    from analysis.commands.check_paper import register as register_check_paper
+    from analysis.commands.models import register as register_models
+    from analysis.commands.run import register as register_run
 
     register_run(app)
     register_check_paper(app)

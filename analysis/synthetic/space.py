@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.contrasts import effect_members, effect_name, orthonormal_basis
+from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 

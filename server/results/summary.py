@@ -1,10 +1,11 @@
 """Pure functions behind the results page: marginal means with within-participant error bars."""
 
-import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
+
+from experiments.error_bars import within_participant_errors
 
 
 @dataclass(frozen=True)
@@ -24,9 +25,7 @@ CellMeans = Mapping[str, Mapping[tuple[str, ...], float]]
 def margin(cell_means: CellMeans, factors: Sequence[str], keep: Sequence[str]) -> list[MarginMean]:
     """Marginal means of the factors in `keep`, over the participants who have every one of those levels.
 
-    Cells of a participant are averaged without weights. Error bars follow Cousineau (2005) with Morey's
-    (2008) correction: each participant's scores are centred on the grand mean, and the standard error is
-    multiplied by sqrt(k / (k - 1)) for k conditions.
+    Cells of a participant are averaged without weights. Error bars: `within_participant_errors`.
     """
     places = [factors.index(name) for name in keep]
     by_participant = {who: _collapse(cells, places) for who, cells in cell_means.items()}
@@ -36,7 +35,7 @@ def margin(cell_means: CellMeans, factors: Sequence[str], keep: Sequence[str]) -
     ]
     if not rows:
         return []
-    errors = _within_errors(rows)
+    errors = within_participant_errors(rows)
     return [
         MarginMean(
             levels=dict(zip(keep, key, strict=True)),
@@ -53,23 +52,6 @@ def _collapse(cells: Mapping[tuple[str, ...], float], places: Sequence[int]) -> 
     for levels, mean in cells.items():
         groups[tuple(levels[place] for place in places)].append(mean)
     return {key: fmean(values) for key, values in groups.items()}
-
-
-def _within_errors(rows: Sequence[Sequence[float]]) -> list[float] | None:
-    people, conditions = len(rows), len(rows[0])
-    if people < 2:
-        return None
-    grand = fmean(value for row in rows for value in row)
-    centred = [[value - fmean(row) + grand for value in row] for row in rows]
-    correction = math.sqrt(conditions / (conditions - 1)) if conditions > 1 else 1.0
-    return [
-        _sd([row[place] for row in centred]) / math.sqrt(people) * correction for place in range(conditions)
-    ]
-
-
-def _sd(values: Sequence[float]) -> float:
-    mean = fmean(values)
-    return math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))
 
 
 def histogram(values: Iterable[float], edges: Sequence[float]) -> list[int]:

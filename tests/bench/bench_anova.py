@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.anova import within_anova
-from analysis.load import load_csv, load_database
-from analysis.longtable import cell_table
-from analysis.study import analyse_study
-from analysis.tables import all_tables
+from analysis.plans.study import analyse_study
+from analysis.read.study_ratings import load_csv, load_database
+from analysis.report.tables import all_tables
+from analysis.within.anova import within_anova
+from analysis.within.cell_means import cell_table
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.study_database import make_database

@@ -1,0 +1,129 @@
+"""`analysis mixed` and `analysis ordinal`."""
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from analysis.commands.output import JsonOption, save_json, show_tables, working
+
+if TYPE_CHECKING:
+    from analysis.read.model_csv import ModelInput
+
+FileArgument = Annotated[Path, typer.Argument(help="CSV file, one row a trial, such as the server's export.")]
+ParticipantOption = Annotated[str, typer.Option(help="Column that names the participant.")]
+RatingOption = Annotated[str, typer.Option(help="Column with the rating.")]
+WithinOption = Annotated[
+    str,
+    typer.Option(
+        help="Columns of the within factors, separated by commas; an export's factors if not given."
+    ),
+]
+ItemOption = Annotated[
+    str,
+    typer.Option(
+        help="Column that names the clip (or what clips share, like the blink shown); several columns, "
+        "separated by commas, together name it. An export's profile_id if not given."
+    ),
+]
+
+
+class SlopesChoice(StrEnum):
+    """By-participant slopes of the linear mixed model."""
+
+    ALL = "all"
+    MAIN = "main"
+    CORRELATED = "correlated"
+    NONE = "none"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`, those on synthetic participants too."""
+    from analysis.commands.synthetic import register as register_synthetic
+
+    app.command(name="mixed")(mixed)
+    app.command(name="ordinal")(ordinal)
+    register_synthetic(app)
+
+
+def mixed(
+    file: FileArgument,
+    participant: ParticipantOption = "participant",
+    rating: RatingOption = "response",
+    within: WithinOption = "",
+    item: ItemOption = "",
+    slopes: Annotated[
+        SlopesChoice,
+        typer.Option(
+            help="all: an own variance for every effect; main: for main effects; correlated: main effects "
+            "and intercept with all correlations; none: intercepts only (anti-conservative)."
+        ),
+    ] = SlopesChoice.ALL,
+    json: JsonOption = None,
+) -> None:
+    """Linear mixed model: participants crossed with clips, slopes, Satterthwaite tests.
+
+    Examples:
+
+      analysis mixed ratings.csv
+
+      analysis mixed table.csv --participant id --rating score --within face,blur --item clip --slopes main
+    """
+    from analysis.models.mixed import fit_mixed
+    from analysis.report.model_tables import mixed_components_table, mixed_effects_table, mixed_text
+
+    data = _read(file, participant, rating, within, item)
+    with working("fitting"):
+        result = fit_mixed(data.rows, participant, rating, data.within, data.item, slopes.value)
+    _show(file, data, mixed_text(result))
+    show_tables(mixed_effects_table(result, file.stem), mixed_components_table(result, file.stem))
+    save_json(json, asdict(result), data.synthetic)
+
+
+def ordinal(
+    file: FileArgument,
+    participant: ParticipantOption = "participant",
+    rating: RatingOption = "response",
+    within: WithinOption = "",
+    item: ItemOption = "",
+    json: JsonOption = None,
+) -> None:
+    """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed intercepts, Laplace.
+
+    Examples:
+
+      analysis ordinal ratings.csv
+
+      analysis ordinal table.csv --participant id --rating score --within face,blur --item clip
+    """
+    from analysis.models.ordinal import fit_ordinal
+    from analysis.report.model_tables import ordinal_coefficients_table, ordinal_effects_table, ordinal_text
+
+    data = _read(file, participant, rating, within, item)
+    with working("fitting"):
+        result = fit_ordinal(data.rows, participant, rating, data.within, data.item)
+    _show(file, data, ordinal_text(result))
+    show_tables(ordinal_effects_table(result, file.stem), ordinal_coefficients_table(result, file.stem))
+    save_json(json, asdict(result), data.synthetic)
+
+
+def _read(file: Path, participant: str, rating: str, within: str, item: str) -> "ModelInput":
+    from analysis.read.model_csv import read_model_input
+
+    with working("reading ratings"):
+        return read_model_input(file, participant, rating, _names(within), _names(item))
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _show(file: Path, data: "ModelInput", text: str) -> None:
+    from analysis.report.formats import wrap
+
+    if data.synthetic:
+        typer.echo("SYNTHETIC DATA: no person gave these ratings")
+    for said in (f"{file.name}: {text}", *(f"- {decision}" for decision in data.decisions)):
+        typer.echo("\n".join(wrap(said)))

@@ -1,0 +1,160 @@
+"""`analysis power` and `analysis synthesise`: what is made from synthetic participants."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from analysis.commands.output import JsonOption, save_json, show_tables, working
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from analysis.power.simulate import PowerResult
+    from analysis.synthetic.synthesise import Synthetic
+
+MeanOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Another mean: profile.real=4.80 or blur.MB,amplitude.FC=4.9. Repeatable."),
+]
+EffectOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Another effect size, as its F: blur:amplitude=12.5; =0 for none. Repeatable."),
+]
+
+
+class StatisticChoice(StrEnum):
+    """Which test the power is that of."""
+
+    MULTIVARIATE = "multivariate"
+    GREENHOUSE_GEISSER = "greenhouse-geisser"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
+    app.command(name="power")(power)
+    app.command(name="synthesise")(synthesise_command)
+
+
+def power(
+    experiment: Annotated[str, typer.Argument(help="exp1, exp2 or exp3.")],
+    n: Annotated[str, typer.Option("--n", help="Sample sizes: first:last:step, or 20,30,43.")] = "10:60:5",
+    simulations: Annotated[int, typer.Option(help="Data sets a sample size.")] = 1000,
+    alpha: Annotated[float, typer.Option(help="Level of the tests.")] = 0.05,
+    statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = StatisticChoice.MULTIVARIATE,
+    wanted: Annotated[float, typer.Option(help="Power to look for.")] = 0.8,
+    seed: Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)] = 1,
+    mean: MeanOption = None,
+    effect: EffectOption = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="PNG, SVG or PDF; default out/analysis/NAME/power.png.", show_default=False),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Power of every effect of known size, by simulation from synthetic participants.
+
+    Examples:
+
+      analysis power exp1 --n 10:60:5
+
+      analysis power exp2 --n 20,30,43 --effect profile=6.5 --plot power.svg
+    """
+    from analysis.power.figure import save_power_figure
+    from analysis.power.simulate import sample_sizes, simulate_power
+    from analysis.synthetic.synthesise import make_plan
+
+    sizes = sample_sizes(n)
+    plan = make_plan(experiment, means=mean or (), effects=effect or ())
+    target = plot or Path("out") / "analysis" / experiment / "power.png"
+    if plot is None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    with _bar("simulating", len(sizes) * simulations) as advance:
+        result = simulate_power(plan, sizes, simulations, alpha, seed, statistic.value, advance)
+    _say_power(result, wanted)
+    save_power_figure(result, target, wanted)
+    typer.echo(f"\nwritten: {target}")
+    numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
+    save_json(json, numbers | {"smallest_n": result.smallest_n(wanted)}, True)
+
+
+def synthesise_command(
+    experiment: Annotated[str, typer.Argument(help="exp1, exp2 or exp3.")],
+    seed: Annotated[int, typer.Option(help="Same seed, same file.", min=0)] = 1,
+    out: Annotated[
+        Path, typer.Option(help="CSV file to write, with the columns of the server's export.")
+    ] = Path("ratings.csv"),
+    n: Annotated[
+        int | None, typer.Option("--n", help="Participants; the paper's number if not given.")
+    ] = None,
+    mean: MeanOption = None,
+    effect: EffectOption = None,
+) -> None:
+    """Make ratings of synthetic participants whose analysis gives the published figures.
+
+    They are synthetic: every row says so, and nothing made from them is a replication. Figures that cannot
+    hold together are named. Exit code 1 where a figure was missed.
+
+    Examples:
+
+      analysis synthesise exp1 --seed 7 --out ratings.csv
+
+      analysis synthesise exp3 --effect lower_lid=6 --mean lower_lid.both=4.90 --out larger.csv
+    """
+    from analysis.synthetic.synthesise import make_plan, synthesise, write_ratings
+
+    if not out.parent.is_dir():
+        raise InputError(f"{out}: the folder {out.parent} does not exist; make it first")
+    plan = make_plan(experiment, n, mean or (), effect or ())
+    with working("searching"):
+        made = synthesise(plan, seed)
+    rows = write_ratings(made, out)
+    _say_synthetic(made)
+    typer.echo(f"written: {out} ({rows} synthetic ratings of {len(made.sums)} synthetic participants)")
+    if made.missed:
+        raise typer.Exit(1)
+
+
+def _say_power(result: "PowerResult", wanted: float) -> None:
+    from analysis.report.formats import Table
+    from analysis.report.numbers import fixed
+
+    smallest = result.smallest_n(wanted)
+    shown = list(range(0, len(result.n), max(1, -(-len(result.n) // 6))))
+    rows = tuple(
+        (effect, *(fixed(float(row[i])) for i in shown), str(smallest[effect] or f">{result.n[-1]}"))
+        for effect, row in zip(result.effects, result.power, strict=True)
+    )
+    header = ("Effect", *(f"n={result.n[i]}" for i in shown), f"n for {wanted:g}")
+    title = f"Power, {result.experiment}, {result.statistic}, {result.simulations} synthetic data sets a size"
+    show_tables(Table("power", title, header, rows, 1))
+
+
+def _say_synthetic(made: "Synthetic") -> None:
+    from analysis.report.formats import wrap
+
+    hit = sum(r.hit for r in made.reached)
+    typer.echo(
+        f"SYNTHETIC {made.experiment.name}, seed {made.seed}: {hit} of {len(made.reached)} figures reached"
+    )
+    for given in made.given_way:
+        typer.echo("\n".join(wrap(f"- {given}")))
+    for missed in made.missed:
+        window = f"{missed.low:.4f} to {missed.high:.4f}"
+        said = f"- missed: {missed.name}: wanted {window}, reached {missed.value:.4f}"
+        typer.echo("\n".join(wrap(said)))
+
+
+@contextmanager
+def _bar(what: str, total: int) -> Iterator[Any]:
+    """A progress bar with the time left on a terminal, silence elsewhere."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda count: progress.advance(task, count)

@@ -1,0 +1,86 @@
+"""Satterthwaite's degrees of freedom for tests of fixed effects (as lmerTest: doi:10.18637/jss.v082.i13)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from analysis.models.reml import CrossProducts, criterion, unscaled_gradient
+
+Floats = NDArray[np.float64]
+
+EIGENVALUE_FLOOR = 1e-8
+STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Covariance of beta (f, f), its derivative by (theta, sigma), and the covariance of (theta, sigma)."""
+
+    covariance: Floats = field(repr=False)
+    gradient: Floats = field(repr=False)
+    parameters: Floats = field(repr=False)
+
+
+def uncertainty(c: CrossProducts, theta: Floats) -> Uncertainty:
+    """From the Hessian of the deviance in (theta, sigma) at the REML estimate.
+
+    A theta at its bound of zero is left out: neither deviance nor covariance changes there to first order.
+    """
+    at = criterion(c, theta)
+    sigma, nu = at.sigma, c.n - c.f
+    free = np.flatnonzero(np.abs(theta) > 0)
+    m = len(free)
+    hessian = np.empty((m + 1, m + 1))
+    for row, k in enumerate(free):
+        hessian[row, :m] = _derivative(c, theta, int(k), sigma)[free]
+    hessian[:m, :m] = (hessian[:m, :m] + hessian[:m, :m].T) / 2
+    hessian[m, :m] = hessian[:m, m] = -2 * at.grad_r2[free] / sigma**3
+    hessian[m, m] = 4 * nu / sigma**2
+    values, vectors = np.linalg.eigh(hessian)
+    good = values > EIGENVALUE_FLOOR
+    parameters = 2 * (vectors[:, good] / values[good]) @ vectors[:, good].T
+    gradient = np.concatenate(
+        [sigma**2 * unscaled_gradient(c, theta, at)[free], 2 * sigma * at.unscaled[None]]
+    )
+    return Uncertainty(sigma**2 * at.unscaled, gradient, parameters)
+
+
+def _derivative(c: CrossProducts, theta: Floats, k: int, sigma: float) -> Floats:
+    """Derivative by theta_k of the gradient of h + r2 / sigma^2: central differences, extrapolated once."""
+
+    def slope(step: float) -> Floats:
+        up, down = theta.copy(), theta.copy()
+        up[k] += step
+        down[k] -= step
+        a, b = criterion(c, up), criterion(c, down)
+        return ((a.grad_h - b.grad_h) + (a.grad_r2 - b.grad_r2) / sigma**2) / (2 * step)
+
+    step = STEP * max(abs(float(theta[k])), 0.05)
+    return (4 * slope(step / 2) - slope(step)) / 3
+
+
+def f_test(beta: Floats, found: Uncertainty, contrasts: Floats) -> tuple[float, int, float, float]:
+    """F, its two df and p of `contrasts` (q, f) @ beta = 0.
+
+    One df per eigenvector of the contrasts' covariance, pooled by the mean of F (Fai & Cornelius 1996).
+    """
+    covariance = contrasts @ found.covariance @ contrasts.T
+    values, vectors = np.linalg.eigh(covariance)
+    rotated = vectors.T @ contrasts
+    t2 = (rotated @ beta) ** 2 / values
+    f_value, q = float(t2.mean()), len(values)
+    slopes = np.einsum("qa,kab,qb->qk", rotated, found.gradient, rotated, optimize=True)
+    each = 2 * values**2 / np.einsum("qk,kl,ql->q", slopes, found.parameters, slopes, optimize=True)
+    df = _pooled(each)
+    return f_value, q, df, float(stats.f.sf(f_value, q, df))
+
+
+def _pooled(each: Floats) -> float:
+    if len(each) == 1 or np.ptp(each) < 1e-8:
+        return float(each.mean())
+    if (each <= 2).any():
+        return 2.0
+    expected = float((each / (each - 2)).sum())
+    return 2 * expected / (expected - len(each))

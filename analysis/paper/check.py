@@ -1,0 +1,208 @@
+"""What a paper's printed figures say about themselves: df, p, errors, and whether all can hold at once."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from itertools import combinations
+from typing import Literal
+
+from scipy import special
+
+from analysis.paper.joint_means import joint_findings
+from analysis.paper.printed import PrintedMean, PrintedPaper, PrintedStudy, PrintedTest, Rounded
+from analysis.report.numbers import fixed, p_value
+
+Kind = Literal["impossible", "contradiction", "doubt", "note"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found: which study, how grave, in which check, about what, and why."""
+
+    study: str
+    kind: Kind
+    check: str
+    about: str
+    why: str
+
+
+def check_paper(paper: PrintedPaper) -> tuple[Finding, ...]:
+    """Run every check on every study; notes say what was found right where that tells something."""
+    return tuple(finding for study in paper.study for finding in check_study(study))
+
+
+def check_study(study: PrintedStudy) -> Iterator[Finding]:
+    """Every check on one study."""
+    yield from _degrees_of_freedom(study)
+    yield from _p_values(study)
+    yield from _printed_twice(study)
+    yield from _errors(study)
+    for kind, about, why in joint_findings(study):
+        yield Finding(study.name, kind, "joint means", about, why)
+    yield from _correlations(study)
+    yield from _correction(study)
+
+
+def forms(study: PrintedStudy, effect: str) -> dict[str, tuple[int, int]]:
+    """The df an effect has as a multivariate and as a univariate test."""
+    q, n = study.contrasts(effect), study.participants
+    return {"multivariate": (q, n - q), "univariate": (q, q * (n - 1))}
+
+
+def _degrees_of_freedom(study: PrintedStudy) -> Iterator[Finding]:
+    """Multivariate (q, N - q) or univariate (q, q (N - 1)); with one contrast the two are one."""
+    found: dict[str, list[PrintedTest]] = {"multivariate": [], "univariate": []}
+    for test in study.test:
+        if test.df is None:
+            continue
+        both = forms(study, test.effect)
+        if test.df not in both.values():
+            why = (
+                f"N = {study.participants} gives {both['multivariate']} (multivariate) or "
+                f"{both['univariate']} (univariate), not {test.df}"
+            )
+            yield Finding(study.name, "contradiction", "df", test.name, why)
+        elif both["multivariate"] != both["univariate"]:
+            found["multivariate" if test.df == both["multivariate"] else "univariate"].append(test)
+    for form, tests in found.items():
+        if tests:
+            yield _form(study, form, tests)
+    if all(found.values()):
+        names = ", ".join(test.name for test in found["univariate"])
+        yield Finding(study.name, "doubt", "df", names, "univariate among multivariate tests")
+
+
+def _form(study: PrintedStudy, form: str, tests: list[PrintedTest]) -> Finding:
+    other = "univariate" if form == "multivariate" else "multivariate"
+    would = "; ".join(f"{test.effect} {forms(study, test.effect)[other]}" for test in tests)
+    rule = "(q, N - q)" if form == "multivariate" else "(q, q (N - 1))"
+    why = f"all df are {rule}: the tests are {form}. {other.capitalize()} df would be {would}"
+    return Finding(study.name, "note", "df", ", ".join(test.effect for test in tests), why)
+
+
+def _p_values(study: PrintedStudy) -> Iterator[Finding]:
+    for test in study.test:
+        if test.p is None:
+            continue
+        given = [test.df] if test.df else sorted(set(forms(study, test.effect).values()))
+        if not any(_p_fits(test, df) for df in given):
+            truth = ", ".join(f"{p_value(_p(float(test.f), df))} on {df}" for df in given)
+            why = f"printed p {_said(test.p)}, but this F gives p = {truth}"
+            yield Finding(study.name, "contradiction", "p", test.name, why)
+
+
+def _p(f: float, df: tuple[int, int]) -> float:
+    return float(special.fdtrc(df[0], df[1], max(f, 0.0)))
+
+
+def _said(p: str) -> str:
+    return p if p[0] in "<>" else f"= {p}"
+
+
+def _p_fits(test: PrintedTest, df: tuple[int, int]) -> bool:
+    """Whether some F that rounds to the printed one has a p that rounds (or is cut) to the printed one."""
+    f = Rounded.of(test.f)
+    least, most = _p(float(f.high), df), _p(float(f.low), df)
+    p = test.p or ""
+    if p.startswith("<"):
+        return least < float(p[1:])
+    if p.startswith(">"):
+        return most > float(p[1:])
+    printed = Rounded.of(p)
+    return least < float(printed.high) and most >= float(printed.low)
+
+
+def _printed_twice(study: PrintedStudy) -> Iterator[Finding]:
+    """The same F in two places: equal after rounding, cut instead of rounded, or different."""
+    for one, other in combinations(study.test, 2):
+        if one.effect != other.effect or one.f == other.f:
+            continue
+        coarse, fine = sorted((Rounded.of(one.f), Rounded.of(other.f)), key=lambda r: -r.unit)
+        if coarse.low < fine.high and fine.low < coarse.high:
+            continue
+        about = f"{one.name} and {other.name}"
+        right = fine.printed.quantize(coarse.unit)
+        if coarse.cut(fine.printed) == coarse.printed:
+            why = f"{fine.printed} rounds to {right}; {coarse.printed} is cut off, not rounded"
+            yield Finding(study.name, "contradiction", "printed twice", about, why)
+        else:
+            yield Finding(study.name, "contradiction", "printed twice", about, "two different values")
+
+
+def _errors(study: PrintedStudy) -> Iterator[Finding]:
+    """Whether an error called SE can be one: participants' means of ratings have a largest possible SD."""
+    if study.scale is None:
+        return
+    wrong = [mean for mean in study.mean if mean.error_name == "SE" and _too_large(study, mean)]
+    for mean in wrong:
+        spread = float(Decimal(mean.error or "0")) * math.sqrt(study.participants)
+        largest = _largest_sd(study, float(mean.mean))
+        true = float(Decimal(mean.error or "0")) / math.sqrt(study.participants)
+        why = (
+            f"as an SE, {mean.error} means an SD of {fixed(spread)} over {study.participants} participants; "
+            f"ratings from {study.scale[0]:g} to {study.scale[1]:g} with mean {mean.mean} allow at most "
+            f"{fixed(largest)}. It is an SD; the SE is {fixed(true)}"
+        )
+        about = f"{mean.name} {mean.mean} ({mean.error})" + (f" [{mean.where}]" if mean.where else "")
+        yield Finding(study.name, "impossible", "SE or SD", about, why)
+
+
+def _too_large(study: PrintedStudy, mean: PrintedMean) -> bool:
+    if mean.error is None:
+        return False
+    least = float(Rounded.of(mean.error).low) * math.sqrt(study.participants)
+    return least > _largest_sd(study, float(mean.mean))
+
+
+def _largest_sd(study: PrintedStudy, mean: float) -> float:
+    """SD of N values on a scale with this mean, if all sat at its ends (Bhatia & Davis 2000)."""
+    low, high = study.scale or (mean, mean)
+    n = study.participants
+    return math.sqrt(max(0.0, (mean - low) * (high - mean)) * n / (n - 1))
+
+
+def _correlations(study: PrintedStudy) -> Iterator[Finding]:
+    """Correlation of a two-level factor's conditions, implied by their means, SEs and F."""
+    for factor, levels in study.factors.items():
+        means = [m for level in levels for m in study.mean if m.at == {factor: level} and m.error]
+        test = next((t for t in study.test if t.effect == factor), None)
+        if len(levels) != 2 or len(means) != 2 or test is None or float(test.f) <= 0:
+            continue
+        first, second = (float(m.error or 0) for m in means)
+        difference = (float(means[0].mean) - float(means[1].mean)) / math.sqrt(float(test.f))
+        if not first * second:
+            continue
+        r = (first**2 + second**2 - difference**2) / (2 * first * second)
+        about = f"{factor} F = {test.f}"
+        if abs(r) > 1 + _slack(means, test):
+            why = f"means, SEs and F imply a correlation of {fixed(r)} between the conditions"
+            yield Finding(study.name, "impossible", "correlation", about, why)
+        else:
+            why = f"means, SEs and F imply a correlation of {fixed(r)} between the two conditions"
+            yield Finding(study.name, "note", "correlation", about, why)
+
+
+def _slack(means: list[PrintedMean], test: PrintedTest) -> float:
+    """How far rounding of SEs and means may carry the implied correlation, to first order."""
+    a, b = (float(m.error or 0) for m in means)
+    unit = max(float(Rounded.of(m.error or "0").unit) for m in means)
+    rough = float(Rounded.of(means[0].mean).unit) / math.sqrt(float(test.f))
+    difference = abs(float(means[0].mean) - float(means[1].mean)) / math.sqrt(float(test.f))
+    return unit * (a + b) / (a * b) + 2 * rough * (difference + rough) / (a * b)
+
+
+def _correction(study: PrintedStudy) -> Iterator[Finding]:
+    """Which printed F tests a Bonferroni correction over all of them would not leave significant."""
+    if study.corrected is None:
+        return
+    m = study.corrected.tests
+    for test in {t.effect: t for t in study.test}.values():
+        df = test.df or forms(study, test.effect)["multivariate"]
+        p = _p(float(test.f), df)
+        if p < 0.05 <= min(1.0, m * p):
+            why = (
+                f"p = {p_value(p)}; corrected over {m} tests it would be {p_value(min(1.0, m * p))}, so the "
+                "correction named concerns the pairs, not the F tests"
+            )
+            yield Finding(study.name, "note", "correction", test.name, why)

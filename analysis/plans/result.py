@@ -1,0 +1,108 @@
+"""One analysis, complete: what tables, figures and report are made from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from analysis.plans.exclusions import Exclusions
+from analysis.within.anova import AnovaResult, within_anova
+from analysis.within.cell_means import CellTable, name_cells
+from analysis.within.marginal_means import MarginalMean, marginal_means
+from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of
+from experiments.definition import Experiment
+
+
+@dataclass(frozen=True)
+class Labels:
+    """What tables call factors and levels; a name without a label is called by its name."""
+
+    factors: Mapping[str, str] = field(default_factory=dict)
+    levels: Mapping[tuple[str, str], str] = field(default_factory=dict)
+
+    def factor(self, name: str) -> str:
+        """Label of a factor."""
+        return self.factors.get(name, name)
+
+    def level(self, factor: str, name: str) -> str:
+        """Label of a factor's level."""
+        return self.levels.get((factor, name), name)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Cell means, tests, means and pairs of one data set, with every decision taken on the way.
+
+    `experiment` and `exclusions` are None for a table of which no declaration is known.
+    """
+
+    name: str
+    title: str
+    source: str
+    rating: str
+    synthetic: bool
+    cells: CellTable
+    anova: AnovaResult
+    means: tuple[MarginalMean, ...]
+    pairs: tuple[Pair, ...]
+    decisions: tuple[str, ...]
+    labels: Labels = Labels()
+    experiment: Experiment | None = None
+    exclusions: Exclusions | None = None
+
+    @property
+    def n_participants(self) -> int:
+        """Participants in the tests."""
+        return self.anova.n_participants
+
+    def pairs_within(self, effect: str) -> list[Pair]:
+        """The pairs of one margin."""
+        return [pair for pair in self.pairs if pair.effect == effect]
+
+
+def analyse_cells(
+    cells: CellTable,
+    *,
+    name: str,
+    title: str,
+    source: str,
+    rating: str,
+    synthetic: bool = False,
+    two_factor_pairs: bool = False,
+    decisions: tuple[str, ...] = (),
+    labels: Labels | None = None,
+    experiment: Experiment | None = None,
+    exclusions: Exclusions | None = None,
+) -> Analysis:
+    """Run every test on a table of cell means."""
+    anova = within_anova(cells.y, cells.factors, cells.levels)
+    pairs = one_factor_pairs(anova)
+    if two_factor_pairs:
+        doubles = [e.factors for e in anova.effects if len(e.factors) == 2]
+        pairs += tuple(pair for factors in doubles for pair in pairs_of(anova, factors))
+    return Analysis(
+        name=name,
+        title=title,
+        source=source,
+        rating=rating,
+        synthetic=synthetic,
+        cells=cells,
+        anova=anova,
+        means=marginal_means(anova),
+        pairs=pairs,
+        decisions=(*decisions, *cell_decisions(cells)),
+        labels=labels or Labels(),
+        experiment=experiment,
+        exclusions=exclusions,
+    )
+
+
+def cell_decisions(cells: CellTable) -> tuple[str, ...]:
+    """What the table of cell means did: who was dropped for empty cells, uneven counts, constant ratings."""
+    said = [
+        f"participant {d.participant} dropped: no rating in {name_cells(d.missing_cells)}"
+        for d in cells.dropped
+    ]
+    low, high = int(cells.counts.min()), int(cells.counts.max())
+    if low != high:
+        said.append(f"cells hold {low} to {high} ratings; every cell mean weighs the same")
+    said += [f"participant {who} gave one and the same rating throughout; kept" for who in cells.constant]
+    return tuple(said)

@@ -1,0 +1,174 @@
+"""Sensitivity analyses beside the ANOVA: Bayes factors of pairs, the mixed and the ordinal model."""
+
+from collections.abc import Callable, Sequence
+from math import isfinite
+from typing import Any
+
+from analysis.plans.result import Analysis
+from analysis.report.formats import Table
+from analysis.report.numbers import DASH, fixed, p_value
+from analysis.report.write import Section
+from experiments.errors import InputError
+
+PRIOR_SCALE = 2**0.5 / 2
+"""Scale r of the Cauchy prior on effect sizes."""
+
+
+MOST_RATINGS = 50_000
+"""Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
+
+MOST_CELLS = 16
+"""Above this the mixed model of the report has slopes for main effects only, which is said there."""
+
+
+def sensitivity_sections(
+    analysis: Analysis, progress: Callable[[str], None] = lambda _: None
+) -> tuple[Section, ...]:
+    """Every sensitivity analysis the data allow, as sections; what they do not allow says why."""
+    progress("Bayes factors")
+    sections = [bayes_factors(analysis)]
+    reason = _no_models(analysis)
+    if reason is not None:
+        return (*sections, Section("Mixed and ordinal models", f"Not fitted: {reason}."))
+    for title, fit in (("Linear mixed model", mixed_model), ("Ordinal mixed model", ordinal_model)):
+        progress(title)
+        try:
+            sections.append(fit(analysis))
+        except InputError as error:
+            sections.append(Section(title, f"Not fitted: {error}."))
+    return tuple(sections)
+
+
+def _no_models(analysis: Analysis) -> str | None:
+    if analysis.exclusions is None or analysis.experiment is None:
+        return "no experiment is declared, so what was rated is unknown"
+    rows = analysis.exclusions.rows
+    if "exemplar" not in rows.columns or rows["exemplar"].isna().any():
+        return "the data do not say which exemplar was rated"
+    if len(rows) > MOST_RATINGS:
+        return f"{len(rows)} ratings are more than {MOST_RATINGS}; use analysis mixed and analysis ordinal"
+    return None
+
+
+def _model_arguments(analysis: Analysis) -> dict[str, Any]:
+    """Rows of the participants in the ANOVA, and the columns that name the blink shown."""
+    if analysis.exclusions is None or analysis.experiment is None:
+        raise InputError("models need a declared experiment")
+    rows = analysis.exclusions.rows
+    rows = rows[rows["participant"].isin(list(analysis.cells.participants)).to_numpy()]
+    return {
+        "rows": rows,
+        "participant": "participant",
+        "rating": "response",
+        "within": list(analysis.anova.factors),
+        "item": [*analysis.experiment.exemplars.own_per, "exemplar"],
+    }
+
+
+def mixed_model(analysis: Analysis) -> Section:
+    """The linear mixed model's tests beside those of the ANOVA."""
+    from analysis.models.mixed import fit_mixed
+
+    every = len(analysis.cells.cells) <= MOST_CELLS
+    result = fit_mixed(**_model_arguments(analysis), slopes="all" if every else "main")
+    rows = []
+    for effect in result.effects:
+        ours = analysis.anova.effect(effect.effect)
+        df = f"{effect.df_effect}, {fixed(effect.df_error, 1)}"
+        cells = (fixed(effect.f_value, 3), df, p_value(effect.p_value), p_value(ours.univariate.p_gg))
+        rows.append((ours.effect, *cells))
+    header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)")
+    notes = (result.formula, *_parts(result.components), *result.notes)
+    table = Table("mixed", f"Linear mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    slopes = "every effect" if every else "the main effects"
+    text = (
+        f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
+        f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
+        f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
+    )
+    if not every:
+        text += (
+            f" With more than {MOST_CELLS} cells slopes for every effect take minutes (analysis mixed fits "
+            "them); without them the p of interactions are too small where people differ in them."
+        )
+    return Section("Linear mixed model", text, (table,))
+
+
+def _parts(components: Sequence[Any]) -> tuple[str, ...]:
+    said = ", ".join(f"{c.group} {c.term} {fixed(c.sd, 3)}" for c in components)
+    return (f"Standard deviations: {said}.",) if said else ()
+
+
+def ordinal_model(analysis: Analysis) -> Section:
+    """The cumulative-link mixed model's tests beside those of the ANOVA."""
+    from analysis.models.ordinal import fit_ordinal
+
+    result = fit_ordinal(**_model_arguments(analysis))
+    rows = []
+    for effect in result.effects:
+        ours = analysis.anova.effect(effect.effect)
+        cells = (
+            fixed(effect.chi2, 3),
+            str(effect.df),
+            p_value(effect.p_value),
+            p_value(ours.univariate.p_gg),
+        )
+        rows.append((ours.effect, *cells))
+    header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
+    thresholds = ", ".join(fixed(value) for value in result.thresholds)
+    spreads = f"SD of participants {fixed(result.sd_participant, 3)}, of blinks {fixed(result.sd_item, 3)}."
+    notes = (result.formula, f"Thresholds: {thresholds}. {spreads}", *result.notes)
+    table = Table("ordinal", f"Ordinal mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    text = (
+        "Ratings as ordered categories: cumulative logit with free thresholds, crossed random intercepts of "
+        "participants and blinks, Laplace approximation, joint Wald tests. Without by-participant slopes its "
+        "p are too small where people differ in an effect; read it for direction and shape."
+    )
+    return Section("Ordinal mixed model", text, (table,))
+
+
+def bayes_factors(analysis: Analysis) -> Section:
+    """JZS Bayes factors of the planned pairs (all one-factor pairs where none are planned).
+
+    Source: Rouder et al. (2009), doi:10.3758/PBR.16.2.225; computed by pingouin.
+    """
+    # pingouin takes seconds to import, which only the report pays
+    from pingouin import bayesfactor_ttest
+
+    planned = analysis.experiment.analysis.pairs if analysis.experiment else ()
+    pairs = [p for p in analysis.pairs if p.effect in (planned or analysis.anova.factors)]
+    rows = []
+    for pair in pairs:
+        bf = float("nan")
+        if isfinite(pair.t):
+            bf = float(bayesfactor_ttest(pair.t, analysis.n_participants, paired=True, r=PRIOR_SCALE))
+        name = f"{pair.effect}: {pair.level_a} - {pair.level_b}"
+        rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
+    header = ("Margin: pair", "t", "BF10", "BF01", "evidence")
+    table = Table("bayes", f"Bayes factors of pairs, {analysis.name}", header, tuple(rows), 1)
+    text = (
+        "BF10 says how much better a difference predicts the data than none, BF01 the reverse. JZS prior, "
+        "Cauchy scale r = √2/2. Between 1/3 and 3 the data do not tell."
+    )
+    return Section("Bayes factors", text, (table,))
+
+
+def _factor(value: float) -> str:
+    if not isfinite(value):
+        return DASH
+    if value >= 1000:
+        return f"{value:.1e}"
+    if value < 0.001:
+        return "<0.001"
+    return fixed(value, 2 if value >= 0.1 else 3)
+
+
+def _in_words(bf: float) -> str:
+    """Jeffreys' words for the strength of evidence."""
+    if not isfinite(bf):
+        return DASH
+    side, size = ("a difference", bf) if bf >= 1 else ("no difference", 1 / bf if bf > 0 else float("inf"))
+    for limit, word in ((3, "weak"), (10, "moderate"), (30, "strong"), (100, "very strong")):
+        if size < limit:
+            return f"{word}, for {side}"
+    return f"extreme, for {side}"

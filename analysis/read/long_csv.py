@@ -1,0 +1,114 @@
+"""Anyone's long table for `analysis anova`: read, check, and turn into cell means."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.read.text_table import TextTable, name_lines, numbers, read_text_table, texts_required
+from experiments.errors import InputError
+
+
+@dataclass(frozen=True)
+class LongData:
+    """Rows with columns of text and a numeric rating, and every decision taken while reading."""
+
+    rows: pd.DataFrame
+    source: str
+    decisions: tuple[str, ...]
+    synthetic: bool = False
+
+
+def read_long_table(
+    path: Path,
+    participant: str,
+    rating: str,
+    within: Sequence[str],
+    trial: str | None = None,
+    scale: tuple[float, float] | None = None,
+) -> LongData:
+    """Read one row a trial. `trial` names a column that tells a participant's trials apart.
+
+    Raises
+    ------
+    InputError
+        As `read_text_table`; a column in two roles; ratings that are text or outside `scale`; one trial
+        with two ratings.
+    """
+    _refuse_shared_roles([participant, rating, *within, *([trial] if trial else [])])
+    wanted = [participant, rating, *within, *([trial] if trial else [])]
+    table = read_text_table(path, wanted, ("synthetic",))
+    for name in (participant, *within):
+        texts_required(table, name)
+    values = numbers(table, rating)
+    refuse_out_of_scale(table, rating, values, scale)
+    keep = ~np.isnan(values)
+    if not keep.all():
+        table.decisions.append(f"{(~keep).sum()} rows without a rating left out ({name_lines(table, ~keep)})")
+    if not keep.any():
+        raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
+    if trial is not None:
+        keep &= ~_repeats(table, [participant, trial], values, within)
+    else:
+        _report_copies(table, wanted, values)
+    rows = table.columns.assign(**{rating: values})[keep].reset_index(drop=True)
+    synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
+    return LongData(rows, path.name, tuple(table.decisions), synthetic)
+
+
+def _refuse_shared_roles(names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+
+
+def refuse_out_of_scale(
+    table: TextTable, rating: str, values: NDArray[np.float64], scale: tuple[float, float] | None
+) -> None:
+    """Refuse the first rating outside `scale`, naming its line."""
+    if scale is None:
+        return
+    low, high = scale
+    outside = (values < low) | (values > high)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise InputError(
+            f"{table.source}: '{rating}' is {values[row]:g} in line {table.line(row)}, "
+            f"outside the scale {low:g} to {high:g}"
+        )
+
+
+def _repeats(
+    table: TextTable, keys: list[str], values: NDArray[np.float64], within: Sequence[str]
+) -> NDArray[np.bool_]:
+    """Rows that repeat a trial already there with the same levels and rating; another rating is refused."""
+    frame = table.columns[[*keys, *within]].assign(_rating=values)
+    again = frame.duplicated(keys).to_numpy()
+    same = frame.duplicated().to_numpy()
+    if (again & ~same).any():
+        row = int(np.argmax(again & ~same))
+        which = ", ".join(f"{key} {table.columns[key].iloc[row]}" for key in keys)
+        raise InputError(
+            f"{table.source}: {which} stands twice with different data, again in line {table.line(row)}"
+        )
+    if again.any():
+        table.decisions.append(
+            f"{again.sum()} repeated rows of one trial counted once ({name_lines(table, again)})"
+        )
+    return np.asarray(again, dtype=bool)
+
+
+def _report_copies(table: TextTable, names: list[str], values: NDArray[np.float64]) -> None:
+    """Say it where every cell has one trial but a few rows are there twice: probably a copied row."""
+    cells = table.columns[[n for n in names if n in table.columns]].drop(columns=names[1])
+    counts = cells.groupby(list(cells.columns), observed=True).size()
+    if counts.median() == 1 and counts.max() > 1:
+        copies = cells.assign(_rating=values).duplicated().to_numpy()
+        more = f", {copies.sum()} of them with the same rating" if copies.any() else ""
+        table.decisions.append(
+            f"most cells hold one row, but {int((counts > 1).sum())} hold more{more}; all rows count "
+            "(name the column of trials with --trial to have repeats found)"
+        )

@@ -1,0 +1,71 @@
+"""The long table behind `analysis mixed` and `analysis ordinal`: anyone's, or the server's export."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.read.text_table import numbers, read_text_table, texts_required
+from experiments.errors import InputError
+from experiments.ratings import factors_in_header
+
+EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
+
+
+@dataclass(frozen=True)
+class ModelInput:
+    """Rows with text columns and a numeric rating, which columns are what, and every decision taken."""
+
+    rows: pd.DataFrame
+    within: tuple[str, ...]
+    item: tuple[str, ...]
+    decisions: tuple[str, ...]
+    synthetic: bool
+
+
+def read_model_input(
+    path: Path, participant: str, rating: str, within: Sequence[str], item: Sequence[str]
+) -> ModelInput:
+    """Read one row a trial.
+
+    Of an export (it has the column `kind`) only main trials count, without failed plays and runs excluded by
+    hand; its factor columns are the default of `within`, its `profile_id` (the blink shown) that of `item`.
+    Raises InputError for unknown columns, ratings that are no numbers, or where defaults are lacking.
+    """
+    header = read_text_table(path, [participant, rating]).header
+    exported = "kind" in header and "profile_id" in header
+    if not within and exported:
+        within = factors_in_header(header)
+    if not item and exported:
+        item = ["profile_id"]
+    if not within:
+        raise InputError("--within names no column; expected e.g. --within face,blur")
+    if not item:
+        raise InputError("--item names no column; expected the column of clips, e.g. --item clip")
+    table = read_text_table(path, [participant, rating, *within, *item], EXPORT_COLUMNS)
+    for name in (participant, *within, *item):
+        texts_required(table, name)
+    values = numbers(table, rating)
+    rows = table.columns.assign(**{rating: values})
+    keep = ~np.isnan(values)
+    decisions = list(table.decisions)
+    for column, good, why in (
+        ("kind", ("main", ""), "practice and attention trials"),
+        ("verdict", ("good", "flagged", ""), "failed plays"),
+        ("excluded", ("0", "False", "false", ""), "rows of runs excluded by hand"),
+    ):
+        if exported and column in rows.columns:
+            out = keep & ~rows[column].astype(str).isin(good).to_numpy()
+            if out.any():
+                decisions.append(f"{out.sum()} {why} left out")
+            keep &= ~out
+    if np.isnan(values).any():
+        decisions.append(f"{np.isnan(values).sum()} rows without a rating left out")
+    if not keep.any():
+        raise InputError(f"{path.name}: no row has a rating that counts")
+    synthetic = "synthetic" in rows.columns and bool(rows["synthetic"].astype(str).isin(("1", "True")).any())
+    return ModelInput(
+        rows[keep].reset_index(drop=True), tuple(within), tuple(item), tuple(decisions), synthetic
+    )

@@ -1,0 +1,152 @@
+"""The ratings of a study, from a CSV export or from the database's view `ratings`, in one shape."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.errors import NoRatingsError
+from analysis.read.database import RUN_FLAGS, RUN_TEXTS, RatingsQuery
+from analysis.read.text_table import numbers, read_text_table
+from experiments.definition import Experiment
+from experiments.errors import InputError
+
+ROW_TEXTS = ("run", "kind", "verdict")
+ROW_NUMBERS = ("response", "expected_response", "rt")
+CSV_NUMBERS = ("trial_index", "play", "exemplar", *ROW_NUMBERS)
+"""What the analysis reads of the columns that experiments/ratings.py declares, besides the factors.
+
+`trial_index` and `play` only find repeated rows, which the database's unique index rules out.
+"""
+
+
+@dataclass(frozen=True)
+class StudyRatings:
+    """Every row of one study, in columns of text (categorical), numbers (float) and flags (bool).
+
+    A column the source does not have is absent here. `first_seen` is when each run's first row was stored.
+    """
+
+    rows: pd.DataFrame
+    source: str
+    decisions: tuple[str, ...]
+    first_seen: Mapping[str, str]
+
+    @property
+    def synthetic(self) -> bool:
+        """True where any row was given by no person."""
+        return "synthetic" in self.rows.columns and bool(self.rows["synthetic"].any())
+
+
+def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> StudyRatings:
+    """Read a CSV export, or any table with columns `participant`, `response` and one a factor.
+
+    Raises
+    ------
+    NoRatingsError
+        A header and no rows.
+    InputError
+        As `read_text_table`; ratings that are text; another experiment's data.
+    """
+    factors = list(experiment.factor_names)
+    optional = [*ROW_TEXTS, *RUN_TEXTS, *CSV_NUMBERS, *RUN_FLAGS, "saved_at"]
+    if _has_no_rows(path):
+        raise NoRatingsError(f"{path.name} has a header but no ratings yet")
+    table = read_text_table(path, ["participant", "response", *factors], optional)
+    rows = table.columns
+    for name in CSV_NUMBERS:
+        if name in rows.columns:
+            rows[name] = numbers(table, name)
+    for name in RUN_FLAGS:
+        if name in rows.columns:
+            rows[name] = _flags(rows[name])
+    seen = _first_seen(rows)
+    rows = rows.drop(columns="saved_at", errors="ignore")
+    rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
+    return StudyRatings(rows, path.name, (*table.decisions, *chosen), seen)
+
+
+def load_database(
+    url: str, experiment: Experiment, study: str | None = None, exemplars: bool = False
+) -> StudyRatings:
+    """Read the study's rows from the SQL view `ratings`; `exemplars` adds which exemplar was rated.
+
+    Raises
+    ------
+    NoRatingsError
+        No database there, no such view yet, or no row of this experiment.
+    InputError
+        A URL that cannot be used, or several studies and no `study` to choose one.
+    """
+    query = RatingsQuery(url, experiment.name, study)
+    try:
+        numbers = (*ROW_NUMBERS, "exemplar") if exemplars else ROW_NUMBERS
+        rows = query.rows(ROW_TEXTS, numbers, experiment.factor_names)
+        if rows.empty:
+            named = f"study '{study}'" if study else f"experiment '{experiment.name}'"
+            raise NoRatingsError(f"{named} has no ratings yet in {query.name}")
+        rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
+        return StudyRatings(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
+    finally:
+        query.close()
+
+
+def _has_no_rows(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return bool(file.readline().strip()) and not file.read(64).strip()
+
+
+def _flags(column: pd.Series) -> NDArray[np.bool_]:
+    yes = [text for text in column.cat.categories if str(text).casefold() in {"1", "true", "yes"}]
+    return column.isin(yes).to_numpy()
+
+
+def _first_seen(rows: pd.DataFrame) -> dict[str, str]:
+    if not {"run", "saved_at"} <= set(rows.columns) or not _runs_again(rows):
+        return {}
+    first = rows[["run", "saved_at"]].astype(str).groupby("run", observed=True)["saved_at"].min()
+    return {str(run): str(moment) for run, moment in first.items()}
+
+
+def _runs_again(rows: pd.DataFrame) -> bool:
+    if "run" not in rows.columns:
+        return False
+    return bool(rows.groupby("participant", observed=True)["run"].nunique().max() > 1)
+
+
+def _of_one_study(
+    rows: pd.DataFrame, experiment: str, study: str | None, source: str
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    decisions: list[str] = []
+    if "experiment" in rows.columns:
+        rows = _only(rows, "experiment", experiment, source, decisions)
+    if study is not None:
+        if "study" not in rows.columns:
+            raise InputError(f"{source} has no column 'study'; leave --study out")
+        rows = _only(rows, "study", study, source, decisions)
+    elif "study" in rows.columns and len(names := _names(rows["study"])) > 1:
+        raise InputError(f"{source} holds {len(names)} studies; choose one with --study: {', '.join(names)}")
+    if "definition_sha256" in rows.columns and len(_names(rows["definition_sha256"])) > 1:
+        count = len(_names(rows["definition_sha256"]))
+        decisions.append(f"{count} versions of the experiment's declaration were used; analysed together")
+    return rows, tuple(decisions)
+
+
+def _only(rows: pd.DataFrame, column: str, name: str, source: str, decisions: list[str]) -> pd.DataFrame:
+    names = _names(rows[column])
+    if name not in names:
+        raise InputError(f"{source} holds {column} {', '.join(names) or 'nothing'}, not '{name}'")
+    if len(names) == 1:
+        return rows
+    mine = (rows[column] == name).to_numpy()
+    decisions.append(f"{(~mine).sum()} rows of other {column} values left aside")
+    return rows[mine]
+
+
+def _names(column: Iterable[object]) -> list[str]:
+    return sorted({str(name) for name in pd.unique(pd.Series(column))})

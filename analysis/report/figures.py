@@ -1,0 +1,193 @@
+"""Figures of an analysis, after the paper's 9, 10 and 11: means with within-participant error bars, and
+every participant visible behind them. The same data give the same bytes."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from itertools import combinations
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy import special
+
+from analysis.plans.result import Analysis
+from analysis.within.marginal_means import level_combinations, margin
+from experiments.error_bars import within_participant_errors
+
+Floats = NDArray[np.float64]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#444444")
+"""Okabe and Ito's palette, told apart with every common colour vision; markers tell levels apart as well."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.hashsalt": "palpebra",
+    "svg.fonttype": "path",
+    "axes.linewidth": 0.8,
+}
+_BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+_SPREAD = 0.62
+"""Width of a group of conditions on an axis where groups are 1 apart."""
+
+
+@dataclass(frozen=True)
+class FigureSpec:
+    """What to draw: the factors along the axis (several are combined), and the factor shown by colour."""
+
+    key: str
+    title: str
+    along: tuple[str, ...]
+    colour: str | None = None
+    style: Literal["points", "lines"] = "points"
+
+
+_OF_EXPERIMENT: dict[str, tuple[FigureSpec, ...]] = {
+    "exp1": (
+        FigureSpec(
+            "figure-9",
+            "Real and model blinks, by closing amplitude and motion blur",
+            ("amplitude", "blur"),
+            "profile",
+        ),
+        FigureSpec("figure-10", "Closing amplitude on both characters", ("amplitude",), "character"),
+    ),
+    "exp2": (
+        FigureSpec("figure-11", "Blink profiles by duration", ("duration",), "profile", "lines"),
+        FigureSpec(
+            "figure-11-character", "Durations on both characters", ("duration",), "character", "lines"
+        ),
+    ),
+    "exp3": (FigureSpec("figure-lower-lid", "Motion of the lower lid", ("lower_lid",)),),
+}
+
+
+def figures_of(analysis: Analysis) -> tuple[FigureSpec, ...]:
+    """The figures of the paper for its experiments; for others each factor, and pairs of factors."""
+    known = _OF_EXPERIMENT.get(analysis.name, ())
+    factors = set(analysis.anova.factors)
+    if known and all({*spec.along, *([spec.colour] if spec.colour else [])} <= factors for spec in known):
+        return known
+    names = analysis.anova.factors
+    if len(names) == 1:
+        return (FigureSpec(f"figure-{names[0]}", analysis.labels.factor(names[0]), names),)
+    return tuple(
+        FigureSpec(f"figure-{a}-{b}", f"{analysis.labels.factor(a)} and {analysis.labels.factor(b)}", (a,), b)
+        for a, b in list(combinations(names, 2))[:6]
+    )
+
+
+def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
+    """Draw one figure."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(7.2, 4.4), dpi=150, layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        _conditions(axes, analysis, spec)
+        _dress(axes, analysis, spec)
+        bars = "Small points: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        note = f"N = {analysis.n_participants}. {bars}"
+        if analysis.synthetic:
+            note = "SYNTHETIC DATA: no person gave these ratings.\n" + note
+        figure.supxlabel(note, fontsize=7, color="#8a1c1c" if analysis.synthetic else "#555555")
+    return figure
+
+
+def as_bytes(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
+    """The figure as PNG or SVG without anything that differs from run to run."""
+    buffer = BytesIO()
+    metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+    with mpl.rc_context(_STYLE):
+        figure.savefig(buffer, format=kind, metadata=metadata)
+    return buffer.getvalue()
+
+
+def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
+    values, groups, shades = _arranged(analysis, spec)
+    n_groups, n_shades = len(groups), len(shades)
+    reach = float(special.stdtrit(len(values) - 1, 0.975))
+    flat = values.reshape(len(values), -1)
+    errors = reach * np.array(within_participant_errors(flat.tolist())).reshape(n_groups, n_shades)
+    offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
+    jitter = _jitter(len(values)) * 0.34 * _SPREAD / n_shades
+    for shade in range(n_shades):
+        at = np.arange(n_groups) + offsets[shade]
+        colour = COLOURS[shade % len(COLOURS)]
+        for group in range(n_groups):
+            axes.plot(
+                at[group] + jitter,
+                values[:, group, shade],
+                linestyle="none",
+                marker="o",
+                markersize=2.6,
+                markeredgewidth=0,
+                color=colour,
+                alpha=0.25,
+            )
+        axes.errorbar(
+            at,
+            values[:, :, shade].mean(axis=0),
+            yerr=errors[:, shade],
+            color=colour,
+            marker=MARKERS[shade % len(MARKERS)],
+            linestyle="-" if spec.style == "lines" else "none",
+            linewidth=1.2,
+            markersize=4.6,
+            markeredgecolor="white",
+            markeredgewidth=0.5,
+            capsize=3.2,
+            elinewidth=1.3,
+            label=shades[shade],
+            zorder=3,
+        )
+    axes.set_xticks(range(n_groups), groups)
+
+
+def _arranged(analysis: Analysis, spec: FigureSpec) -> tuple[Floats, list[str], list[str]]:
+    """Participants' means (N, groups, shades) of the figure's margin, and the names of both."""
+    factors = analysis.anova.factors
+    wanted = [*spec.along, *([spec.colour] if spec.colour else [])]
+    members = tuple(sorted(factors.index(name) for name in wanted))
+    sizes = [len(analysis.anova.levels[m]) for m in members]
+    values: Floats = margin(analysis.anova, members).reshape(-1, *sizes)
+    order = [[factors[m] for m in members].index(name) for name in wanted]
+    values = np.moveaxis(values, [i + 1 for i in order], range(1, len(order) + 1))
+    along = tuple(factors.index(name) for name in spec.along)
+    groups = [_name(analysis, levels) for levels in level_combinations(analysis.anova, along)]
+    shades = [""]
+    if spec.colour:
+        levels = analysis.anova.levels[factors.index(spec.colour)]
+        shades = [analysis.labels.level(spec.colour, level) for level in levels]
+    return values.reshape(len(values), len(groups), len(shades)), groups, shades
+
+
+def _name(analysis: Analysis, levels: dict[str, str]) -> str:
+    return "\n".join(analysis.labels.level(factor, level) for factor, level in levels.items())
+
+
+def _jitter(n: int) -> Floats:
+    """Evenly spread offsets in [-1, 1] in an order that looks random and is not."""
+    golden = np.arange(1, n + 1) * 0.6180339887498949
+    spread: Floats = 2 * (golden - np.floor(golden)) - 1
+    return spread
+
+
+def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
+    axes.set_title(spec.title, fontsize=10, loc="left")
+    axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
+    axes.set_ylabel("Naturalness rating" if analysis.experiment else analysis.rating)
+    if analysis.experiment is not None:
+        scale = analysis.experiment.trial.scale
+        axes.set_ylim(scale.minimum - 0.2, scale.maximum + 0.2)
+        axes.set_yticks(range(scale.minimum, scale.maximum + 1))
+    axes.grid(axis="y", linewidth=0.4, alpha=0.5)
+    axes.set_axisbelow(True)
+    if spec.colour:
+        title = analysis.labels.factor(spec.colour)
+        axes.legend(title=title, frameon=False, fontsize=8, title_fontsize=8, **_BESIDE)

@@ -1,0 +1,77 @@
+"""An analysis as JSON: the keys that `analysis anova --json` promises."""
+
+from dataclasses import asdict
+from typing import Any
+
+from analysis.files import json_text
+from analysis.plans.exclusions import Exclusions
+from analysis.plans.result import Analysis
+from analysis.within.effect_tests import Effect
+
+
+def as_json(analysis: Analysis) -> str:
+    """Indented JSON text, the same bytes for the same analysis; what does not exist is null."""
+    return json_text(as_data(analysis))
+
+
+def as_data(analysis: Analysis) -> dict[str, Any]:
+    """The JSON document as plain data.
+
+    Keys: name, title, source, synthetic, rating, factors, levels, n_participants, participants, effects,
+    marginal_means, pairwise, dropped, decisions, and exclusions (null for a table without a declaration).
+    Beside `multivariate`, `mauchly` and `univariate` stands `..._reason`: why a test is null, else null.
+    """
+    cells = analysis.cells
+    return {
+        "name": analysis.name,
+        "title": analysis.title,
+        "source": analysis.source,
+        "synthetic": analysis.synthetic,
+        "rating": analysis.rating,
+        "factors": list(analysis.anova.factors),
+        "levels": {f: list(names) for f, names in zip(cells.factors, cells.levels, strict=True)},
+        "labels": {
+            "factors": {f: analysis.labels.factor(f) for f in cells.factors},
+            "levels": {
+                f: {name: analysis.labels.level(f, name) for name in names}
+                for f, names in zip(cells.factors, cells.levels, strict=True)
+            },
+        },
+        "n_participants": analysis.n_participants,
+        "participants": list(cells.participants),
+        "confidence": analysis.anova.confidence,
+        "effects": [_effect(effect) for effect in analysis.anova.effects],
+        "marginal_means": [asdict(mean) for mean in analysis.means],
+        "pairwise": [asdict(pair) for pair in analysis.pairs],
+        "dropped": [
+            {"participant": d.participant, "missing_cells": list(d.missing_cells)} for d in cells.dropped
+        ],
+        "constant_participants": list(cells.constant),
+        "decisions": list(analysis.decisions),
+        "exclusions": None if analysis.exclusions is None else _exclusions(analysis.exclusions),
+    }
+
+
+def _effect(effect: Effect) -> dict[str, Any]:
+    return {
+        "effect": effect.effect,
+        "univariate": asdict(effect.univariate),
+        "univariate_reason": effect.univariate_reason,
+        "multivariate": None if effect.multivariate is None else asdict(effect.multivariate),
+        "multivariate_reason": effect.multivariate_reason,
+        "mauchly": None if effect.mauchly is None else asdict(effect.mauchly),
+        "mauchly_reason": effect.mauchly_reason,
+        "eta_sq_partial": effect.eta_sq_partial,
+        "eta_sq_partial_ci": list(effect.eta_sq_partial_ci),
+        "eta_sq_generalized": effect.eta_sq_generalized,
+    }
+
+
+def _exclusions(exclusions: Exclusions) -> dict[str, Any]:
+    return {
+        "runs": [asdict(run) for run in exclusions.runs],
+        "trials": [asdict(dropped) for dropped in exclusions.trials],
+        "set_aside": list(exclusions.set_aside),
+        "not_applied": list(exclusions.not_applied),
+        "n_runs": exclusions.n_runs,
+    }

@@ -1,0 +1,60 @@
+"""Mixed and ordinal models as tables."""
+
+from analysis.models.mixed import MixedResult
+from analysis.models.ordinal import OrdinalResult
+from analysis.report.formats import Table
+from analysis.report.numbers import fixed, p_value
+
+
+def mixed_effects_table(result: MixedResult, name: str) -> Table:
+    """Type III tests with Satterthwaite's df."""
+    rows = tuple(
+        (e.effect, fixed(e.f_value), str(e.df_effect), fixed(e.df_error, 1), p_value(e.p_value))
+        for e in result.effects
+    )
+    return Table("mixed", f"Linear mixed model, {name}", ("Effect", "F", "df1", "df2", "p"), rows, 1)
+
+
+def mixed_components_table(result: MixedResult, name: str) -> Table:
+    """Standard deviations of the random terms."""
+    rows = tuple((c.group, c.term or "residual", fixed(c.sd, 3)) for c in result.components)
+    return Table("mixed-random", f"Random effects, {name}", ("Group", "Term", "SD"), rows, 2)
+
+
+def ordinal_effects_table(result: OrdinalResult, name: str) -> Table:
+    """Joint Wald tests of the effects on the logit scale."""
+    rows = tuple((e.effect, fixed(e.chi2), str(e.df), p_value(e.p_value)) for e in result.effects)
+    return Table("ordinal", f"Ordinal mixed model, {name}", ("Effect", "chi2", "df", "p"), rows, 1)
+
+
+def ordinal_coefficients_table(result: OrdinalResult, name: str) -> Table:
+    """Sum-coded coefficients on the logit scale."""
+    rows = tuple(
+        (c.name, fixed(c.estimate, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_value))
+        for c in result.coefficients
+    )
+    header = ("Coefficient", "b", "SE", "z", "p")
+    return Table("ordinal-coefficients", f"Ordinal coefficients, {name}", header, rows, 1)
+
+
+def mixed_text(result: MixedResult) -> str:
+    """What was fitted, in words."""
+    said = [
+        f"{result.formula}, fitted by REML (criterion {result.reml_criterion:.2f}) to {result.n_ratings} "
+        f"ratings of {result.n_items} items by {result.n_participants} participants. Type III tests with "
+        "Satterthwaite's degrees of freedom."
+    ]
+    if result.singular:
+        said.append("Some variances are estimated as zero.")
+    return " ".join([*said, *(f"{note}." for note in result.notes)])
+
+
+def ordinal_text(result: OrdinalResult) -> str:
+    """What was fitted, in words."""
+    said = [
+        f"{result.formula} link, flexible thresholds, Laplace approximation (log-likelihood "
+        f"{result.log_likelihood:.2f}, AIC {result.aic:.2f}); SD of participants "
+        f"{result.sd_participant:.2f}, of items {result.sd_item:.2f}. Wald tests. Random intercepts only: "
+        "where people differ in the size of an effect its p is too small."
+    ]
+    return " ".join([*said, *(f"{note}." for note in result.notes)])

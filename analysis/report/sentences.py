@@ -1,0 +1,70 @@
+"""Sentences in APA style, one an effect."""
+
+import math
+
+from analysis.plans.result import Analysis
+from analysis.report.numbers import apa_p, fixed, share, share_interval
+from analysis.report.tables import effect_label, uses_multivariate
+from analysis.within.effect_tests import Effect
+
+SIGNIFICANCE = 0.05
+
+
+def sentences(analysis: Analysis) -> tuple[str, ...]:
+    """One sentence an effect: direction of two-level factors, test, effect size with its interval."""
+    multivariate = uses_multivariate(analysis)
+    return tuple(_sentence(analysis, effect, multivariate) for effect in analysis.anova.effects)
+
+
+def _sentence(analysis: Analysis, effect: Effect, multivariate: bool) -> str:
+    kind = "main effect of" if len(effect.factors) == 1 else "interaction of"
+    name = effect_label(analysis, effect.factors)
+    p = _p(effect, multivariate)
+    if not math.isfinite(p):
+        return f"The {kind} {name} could not be tested: {effect.univariate_reason}."
+    verdict = "was significant" if p < SIGNIFICANCE else "was not significant"
+    sentence = f"The {kind} {name} {verdict}, {_statistics(effect, multivariate)}."
+    return sentence + (_direction(analysis, effect, p < SIGNIFICANCE) if len(effect.factors) == 1 else "")
+
+
+def _p(effect: Effect, multivariate: bool) -> float:
+    if multivariate and effect.multivariate is not None:
+        return effect.multivariate.p_value
+    return effect.univariate.p_gg
+
+
+def _statistics(effect: Effect, multivariate: bool) -> str:
+    u, m = effect.univariate, effect.multivariate
+    size = (
+        f"partial η² = {share(effect.eta_sq_partial, 2)}, 95% CI {share_interval(effect.eta_sq_partial_ci)}"
+    )
+    if multivariate and m is not None:
+        trace = f", Pillai's trace = {share(m.pillai, 2)}" if m.df_effect > 1 else ""
+        test = f"F({m.df_effect}, {m.df_error}) = {fixed(m.f_value)}, {apa_p(m.p_value)}{trace}"
+        corrected = f" (univariate {_corrected(effect)})" if m.df_effect > 1 else ""
+        return f"{test}, {size}{corrected}"
+    if u.df_effect > 1:
+        return f"{_corrected(effect)}, {size}"
+    return f"F({u.df_effect}, {u.df_error}) = {fixed(u.f_value)}, {apa_p(u.p_value)}, {size}"
+
+
+def _corrected(effect: Effect) -> str:
+    u = effect.univariate
+    df = f"{fixed(u.df_effect * u.epsilon_gg)}, {fixed(u.df_error * u.epsilon_gg)}"
+    return f"F({df}) = {fixed(u.f_value)}, {apa_p(u.p_gg)}, Greenhouse-Geisser ε = {share(u.epsilon_gg, 2)}"
+
+
+def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:
+    factor = effect.factors[0]
+    means = sorted((m for m in analysis.means if m.effect == factor), key=lambda m: -m.mean)
+    said = [
+        f"{analysis.labels.level(factor, m.levels[factor])} (M = {fixed(m.mean)}, SE = {fixed(m.se)})"
+        for m in means
+    ]
+    if not differs:
+        return f" Means: {', '.join(said)}."
+    if len(said) == 2:
+        return (
+            f" Ratings were {fixed(means[0].mean - means[1].mean)} higher for {said[0]} than for {said[1]}."
+        )
+    return f" From highest to lowest: {', '.join(said)}."

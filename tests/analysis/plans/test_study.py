@@ -1,0 +1,191 @@
+"""A declared experiment from its export and its database: exclusions by name, checks, the same numbers."""
+
+import numpy as np
+import pytest
+
+from analysis.errors import NoRatingsError
+from analysis.plans.study import analyse_study
+from analysis.read.study_ratings import load_csv, load_database
+from analysis.report.json_output import as_data
+from analysis.report.write import left_out
+from experiments import rules
+from experiments.errors import InputError
+from experiments.load import load_experiment
+from tests.analysis.ratings_file import change, rows_of, simulate, write_export
+from tests.analysis.study_database import make_database
+
+EXP3 = load_experiment("exp3")
+
+
+@pytest.fixture
+def rows() -> list[dict]:
+    return rows_of(EXP3, simulate(EXP3, 8, trials=5))
+
+
+def analyse(path, rows, experiment=EXP3, phase="live"):
+    return analyse_study(experiment, load_csv(write_export(path / "r.csv", EXP3, rows), experiment), phase)
+
+
+def with_rules(*chosen):
+    return EXP3.model_copy(update={"exclusions": chosen})
+
+
+def test_means_are_the_ratings_own(tmp_path, rows) -> None:
+    ratings = simulate(EXP3, 8, trials=5)
+    analysis = analyse(tmp_path, rows)
+    assert analysis.anova.y == pytest.approx(ratings.mean(axis=-1))
+    assert analysis.anova.factors == ("lower_lid",)
+    assert analysis.synthetic
+    assert left_out(analysis.exclusions) == ("no participant and no trial excluded (of 8 participants)",)
+
+
+def test_export_and_database_give_the_same_numbers(tmp_path, rows) -> None:
+    ratings = simulate(EXP3, 8, trials=5)
+    url = make_database(tmp_path / "d.sqlite", EXP3, ratings, participants=[f"P{i:02d}" for i in range(8)])
+    stored = as_data(analyse_study(EXP3, load_database(url, EXP3)))
+    exported = as_data(analyse(tmp_path, rows))
+    for key in ("effects", "marginal_means", "pairwise", "n_participants", "participants", "synthetic"):
+        assert stored[key] == exported[key], key
+
+
+@pytest.mark.parametrize(
+    ("rule", "values", "reason"),
+    [
+        (rules.ExcludeIncomplete(), {"run_status": "active"}, "incomplete: run is active"),
+        (rules.ExcludePlayback(more_than=0.2), {"verdict": "flagged"}, "poor_playback_share: 100% of plays"),
+        (rules.ExcludeStraightLining(), {"response": 4}, "same_response_share: 100% of answers are the same"),
+        (rules.ExcludeFast(below_ms=200), {"rt": 150}, "median_response_time: median 150 ms"),
+    ],
+)
+def test_a_participant_rule_excludes_by_name_with_its_reason(tmp_path, rows, rule, values, reason) -> None:
+    rows = change(rows, lambda row: row["run"] == "run3", **values)
+    analysis = analyse(tmp_path, rows, with_rules(rule))
+    assert analysis.n_participants == 7
+    (excluded,) = analysis.exclusions.runs
+    assert excluded.participant == "P03"
+    assert excluded.reasons[0].startswith(reason)
+    assert any("participant P03 (run run3) excluded" in line for line in left_out(analysis.exclusions))
+
+
+def test_failed_attention_checks_exclude(tmp_path, rows) -> None:
+    checks = [
+        rows[0] | {"run": f"run{i}", "participant": f"P{i:02d}", "kind": "attention", "trial_index": 99}
+        | {"expected_response": 2, "response": 2 if i else 5, "lower_lid": ""}
+        for i in range(8)
+    ]  # fmt: skip
+    analysis = analyse(tmp_path, rows + checks, with_rules(rules.ExcludeAttention(more_than=0)))
+    assert [run.participant for run in analysis.exclusions.runs] == ["P00"]
+    assert analysis.anova.y.shape == (7, 4)
+
+
+def test_exclusion_by_hand_and_later_runs_are_named(tmp_path, rows) -> None:
+    rows = change(rows, lambda row: row["run"] == "run1", excluded=1, exclusion_reason="fell asleep")
+    rows = change(rows, lambda row: row["run"] == "run5", participant="P02", saved_at="2026-01-02T00:00:00Z")
+    rows = change(rows, lambda row: row["run"] == "run2", saved_at="2026-01-01T00:00:00Z")
+    analysis = analyse(tmp_path, rows, with_rules())
+    reasons = {run.run: run.reasons for run in analysis.exclusions.runs}
+    assert reasons["run1"] == ("by hand: fell asleep",)
+    assert reasons["run5"] == ("a later run of the same participant",)
+
+
+@pytest.mark.parametrize(
+    ("rule", "values"),
+    [
+        (rules.DropFailedPlays(), {"verdict": "failed"}),
+        (rules.DropSlowTrials(above_ms=60_000), {"rt": 70_000}),
+    ],
+)
+def test_a_trial_rule_drops_trials_and_counts_them(tmp_path, rows, rule, values) -> None:
+    rows = change(rows, lambda row: row["exemplar"] == 2 and row["run"] in {"run0", "run1"}, **values)
+    analysis = analyse(tmp_path, rows, with_rules(rule))
+    (dropped,) = analysis.exclusions.trials
+    assert (dropped.trials, dropped.participants) == (8, 2)
+    assert analysis.cells.counts.min() == 4
+    assert any("4 to 5 ratings" in text for text in analysis.decisions)
+
+
+def test_practice_pilot_and_unrated_rows_are_set_aside_and_said(tmp_path, rows) -> None:
+    extra = [
+        rows[0] | {"kind": "practice", "trial_index": 90},
+        rows[1] | {"phase": "pilot", "trial_index": 91},
+    ]
+    extra += [rows[2] | {"response": "", "trial_index": 92}]
+    analysis = analyse(tmp_path, rows + extra)
+    assert set(analysis.exclusions.set_aside) == {
+        "1 practice trials",
+        "1 rows of another phase than 'live'",
+        "1 plays without a rating",
+    }
+
+
+def test_a_rule_whose_column_is_missing_is_said_not_skipped(tmp_path, rows) -> None:
+    path = tmp_path / "few.csv"
+    lines = [f"{row['participant']},{row['response']},{row['lower_lid']}" for row in rows]
+    path.write_text("participant,response,lower_lid\n" + "\n".join(lines))
+    analysis = analyse_study(EXP3, load_csv(path, EXP3))
+    assert analysis.n_participants == 8
+    assert "incomplete: the data have no column 'run_status'" in analysis.exclusions.not_applied
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"response": 9}, "participant P00, trial 0: expected a whole rating from 1 to 7, got 9"),
+        ({"response": 2.5}, "expected a whole rating from 1 to 7, got 2.5"),
+        ({"response": "five"}, "'response' should be a number, got 'five'"),
+        ({"lower_lid": "bothh"}, "'bothh' is no level of 'lower_lid'; did you mean 'both'"),
+        ({"participant": ""}, "'participant' is empty"),
+    ],
+)
+def test_wrong_rows_are_refused_by_participant_and_trial(tmp_path, rows, values, message) -> None:
+    rows = change(rows, lambda row: row["run"] == "run0" and row["trial_index"] == 0, **values)
+    with pytest.raises(InputError, match=message):
+        analyse(tmp_path, rows)
+
+
+def test_repeated_rows_count_once_and_contradictions_are_refused(tmp_path, rows) -> None:
+    analysis = analyse(tmp_path, [*rows, rows[0]])
+    assert "1 repeated rows of trials already there, counted once" in analysis.decisions
+    with pytest.raises(InputError, match="participant P00, trial 0 stands there twice"):
+        analyse(
+            tmp_path, [*rows, rows[0] | {"response": 8 - int(rows[0]["response"])}, rows[0] | {"response": 1}]
+        )
+
+
+def test_other_studies_and_experiments_are_told_apart(tmp_path, rows) -> None:
+    two = rows + change(rows, lambda row: True, study="t", run="z")
+    path = write_export(tmp_path / "two.csv", EXP3, two)
+    with pytest.raises(InputError, match="holds 2 studies; choose one with --study: s, t"):
+        load_csv(path, EXP3)
+    ratings = load_csv(path, EXP3, "s")
+    assert len(ratings.rows) == len(rows)
+    assert "left aside" in ratings.decisions[0]
+    other = write_export(tmp_path / "o.csv", EXP3, change(rows, lambda row: True, experiment="exp1"))
+    with pytest.raises(InputError, match="holds experiment exp1, not 'exp3'"):
+        load_csv(other, EXP3)
+
+
+def test_nothing_to_analyse_is_told_from_bad_input(tmp_path, rows) -> None:
+    with pytest.raises(NoRatingsError, match="no ratings yet"):
+        load_csv(write_export(tmp_path / "e.csv", EXP3, []), EXP3)
+    with pytest.raises(NoRatingsError, match="no ratings of phase 'live'"):
+        analyse(tmp_path, change(rows, lambda row: True, phase="pilot"))
+    with pytest.raises(NoRatingsError, match="no participant remains"):
+        analyse(tmp_path, change(rows, lambda row: True, run_status="withdrawn"))
+    with pytest.raises(NoRatingsError, match="there is no database"):
+        load_database(f"sqlite:///{tmp_path}/none.sqlite", EXP3)
+    empty = make_database(tmp_path / "x.sqlite", EXP3, np.full((2, 4, 1), 3), participants=["a", "b"])
+    with pytest.raises(NoRatingsError, match="experiment 'exp1' has no ratings yet"):
+        load_database(empty, load_experiment("exp1"))
+
+
+@pytest.mark.parametrize("url", ["nonsense", "mysterysql://x/y"])
+def test_an_unusable_database_address_is_refused(url) -> None:
+    with pytest.raises(InputError, match="is no database URL"):
+        load_database(url, EXP3)
+
+
+def test_a_file_that_is_no_database_is_refused(tmp_path) -> None:
+    (tmp_path / "f.sqlite").write_text("not a database, but a rather long text that SQLite cannot read")
+    with pytest.raises(InputError, match=r"cannot read f\.sqlite"):
+        load_database(f"sqlite:///{tmp_path}/f.sqlite", EXP3)

@@ -1,0 +1,178 @@
+"""Tables, report, figures: readable at 80 columns, self-contained, marked, and the same bytes every time."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from analysis.plans.result import Analysis, analyse_cells
+from analysis.plans.sensitivity import bayes_factors
+from analysis.plans.study import analyse_study
+from analysis.read.study_ratings import StudyRatings, load_csv
+from analysis.report.formats import Table, as_latex, as_markdown, as_text, latex_text, wrap
+from analysis.report.json_output import as_data, as_json
+from analysis.report.numbers import apa_p, fixed, interval, p_value, paper_p, share, sum_text
+from analysis.report.sentences import sentences
+from analysis.report.tables import all_tables, paper_table
+from analysis.report.write import write_report
+from experiments.load import load_experiment
+from tests.analysis.ratings_file import rows_of, simulate, write_export
+
+
+def analysis_of(name: str, folder, participants: int) -> Analysis:
+    experiment = load_experiment(name)
+    rows = rows_of(experiment, simulate(experiment, participants, trials=2))
+    ratings: StudyRatings = load_csv(write_export(folder / f"{name}.csv", experiment, rows), experiment)
+    return analyse_study(experiment, ratings)
+
+
+@pytest.fixture(scope="module", params=["exp1", "exp2", "exp3"])
+def analysis(request, tmp_path_factory) -> Analysis:
+    return analysis_of(request.param, tmp_path_factory.mktemp("r"), 20)
+
+
+def test_every_table_fits_80_columns(analysis) -> None:
+    for table in all_tables(analysis):
+        assert max(map(len, as_text(table).splitlines())) <= 80, table.key
+
+
+def test_the_paper_table_has_conditions_tests_and_interactions(analysis) -> None:
+    table = paper_table(analysis)
+    factors = analysis.anova.factors
+    levels = sum(map(len, analysis.anova.levels))
+    assert len(table.rows) == levels + len(analysis.anova.effects) - len(factors)
+    assert "SYNTHETIC" in table.title
+    mean = analysis.means[0]
+    assert table.rows[0][2] == f"{mean.mean:.2f} ({mean.se:.2f})"
+    test = analysis.anova.effects[0]
+    used = test.multivariate if all(e.multivariate for e in analysis.anova.effects) else test.univariate
+    assert fixed(used.f_value) in table.rows[0]
+
+
+def test_one_sentence_an_effect_with_its_numbers(analysis) -> None:
+    said = sentences(analysis)
+    assert len(said) == len(analysis.anova.effects)
+    assert all(re.search(r"F\([\d.]+, [\d.]+\) = [\d.]+, p [=<] \.\d{3}", text) for text in said)
+
+
+def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:
+    data = json.loads(as_json(analysis), parse_constant=pytest.fail)
+    effect = data["effects"][0]
+    assert set(effect["univariate"]) == {
+        *("ss", "ss_error", "df_effect", "df_error", "f_value", "p_value"),
+        *("epsilon_gg", "p_gg", "epsilon_hf", "p_hf"),
+    }
+    assert set(effect["multivariate"]) == {
+        *("pillai", "wilks", "hotelling_lawley", "roy", "f_value", "df_effect", "df_error", "p_value")
+    }
+    assert {"mauchly", "eta_sq_partial", "eta_sq_partial_ci", "eta_sq_generalized"} <= set(effect)
+    assert set(data["marginal_means"][0]) == {"effect", "levels", "mean", "se", "ci"}
+    assert set(data["pairwise"][0]) == {
+        *("effect", "level_a", "level_b", "difference", "se", "t", "df", "p"),
+        *("p_bonferroni", "p_holm", "ci", "dz"),
+    }
+    assert data["n_participants"] == 20
+    assert data["dropped"] == []
+
+
+def test_report_is_whole_marked_self_contained_and_byte_stable(tmp_path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    for folder in (one, two):
+        write_report(analysis_of("exp3", tmp_path, 6), folder)
+    names = sorted(path.name for path in one.iterdir())
+    assert names == [
+        *("figure-lower-lid.png", "figure-lower-lid.svg", "report.html", "report.md"),
+        *("results.json", "tables.tex"),
+    ]
+    assert all((one / name).read_bytes() == (two / name).read_bytes() for name in names)
+    html = (one / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", html)
+    assert "Synthetic data" in html
+    assert "SYNTHETIC" in (one / "report.md").read_text(encoding="utf-8")
+    assert "SYNTHETIC" in (one / "tables.tex").read_text(encoding="utf-8")
+    assert (one / "figure-lower-lid.png").read_bytes().startswith(b"\x89PNG")
+    balanced(html)
+
+
+class _Balance(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag, attrs) -> None:
+        if tag not in {"meta", "img", "br"}:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag) -> None:
+        assert self.open.pop() == tag
+
+
+def balanced(html: str) -> None:
+    parser = _Balance()
+    parser.feed(html)
+    assert parser.open == []
+
+
+def test_names_are_escaped_everywhere(tmp_path) -> None:
+    from analysis.within.cell_means import CellTable
+
+    y = np.random.default_rng(0).normal(4, 1, (6, 2))
+    cells = CellTable(tuple("abcdef"), ("f<b>",), (("<i>&", "x_y|%"),), y, np.ones((6, 2), dtype=np.int64))
+    analysis = analyse_cells(cells, name="n", title="<script>", source="s", rating="r")
+    write_report(analysis, tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script>" not in html
+    assert "&lt;i&gt;&amp;" in html
+    assert r"x\_y|\%" in (tmp_path / "tables.tex").read_text(encoding="utf-8")
+    assert "x_y\\|%" in (tmp_path / "report.md").read_text(encoding="utf-8")
+
+
+def test_undefined_tests_are_dashes_with_a_reason(tmp_path) -> None:
+    analysis = analysis_of("exp2", tmp_path, 5)
+    text = " ".join(" ".join(as_text(table).split()) for table in all_tables(analysis))
+    assert "needs more participants than contrasts: N = 5" in text
+    assert "univariate, df (q, q (N - 1)), p by Greenhouse-Geisser" in text
+
+
+def test_bayes_factors_stand_beside_the_planned_pairs(tmp_path) -> None:
+    section = bayes_factors(analysis_of("exp3", tmp_path, 12))
+    (table,) = section.tables
+    assert len(table.rows) == 6
+    assert all(row[0].startswith("lower_lid: ") for row in table.rows)
+
+
+@pytest.mark.parametrize(
+    ("made", "text"),
+    [
+        (p_value(0.0004), "<.001"),
+        (p_value(0.0206), ".021"),
+        (p_value(1.0), "1.000"),
+        (p_value(float("nan")), "–"),
+        (paper_p(0.0206), "0.02"),
+        (paper_p(0.0036), "0.004"),
+        (paper_p(0.0001), "<0.001"),
+        (apa_p(0.0001), "p < .001"),
+        (share(-0.25), "-.250"),
+        (fixed(-0.001), "0.00"),
+        (interval((1.234, float("nan"))), "[1.23, –]"),
+        (sum_text(1234.5), "1234"),
+        (sum_text(0.01234), "0.0123"),
+    ],
+)
+def test_numbers_are_printed_as_apa_has_them(made, text) -> None:
+    assert made == text
+
+
+def test_text_wraps_and_latex_escapes() -> None:
+    assert max(map(len, wrap("word " * 60, 40))) <= 40
+    assert latex_text("a_b & 5% < η²") == r"a\_b \& 5\% $<$ $\eta$$^2$".replace("$$", "")
+    table = Table("k", "Title", ("a", "b"), (("x" * 90, "1"),))
+    assert max(map(len, as_text(table).splitlines())) <= 80
+    assert "\\toprule" in as_latex(table)
+    assert as_markdown(table).count("|") == 9
+
+
+def test_data_are_plain(analysis) -> None:
+    assert as_data(analysis)["exclusions"]["n_runs"] == 20
