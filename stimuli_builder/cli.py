@@ -1,11 +1,97 @@
-"""The command `stimuli`: it only gathers the command groups, each of which lives with its subject."""
+"""The command `stimuli`: lists the commands; each lives with its subject and is loaded when called."""
+
+from importlib import import_module
+from typing import Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from experiments.command_line import run_command_line
 
+COMMANDS = {
+    "actor": (
+        "stimuli_builder.actor.cli",
+        "Generate a high-speed recording of a synthetic actor, with exact truth and label files.",
+    ),
+    "track": (
+        "stimuli_builder.tracking.cli",
+        "Track the eyelids of a recording with the coupled active appearance model.",
+    ),
+    "train": (
+        "stimuli_builder.tracking.cli",
+        "Train the model on labelled frames, report its accuracy by fold, and save it.",
+    ),
+    "accuracy": (
+        "stimuli_builder.tracking.cli",
+        "Compare a track of the synthetic actor with its exact truth.",
+    ),
+    "label": (
+        "stimuli_builder.tracking.cli",
+        "Propose labels for frames chosen for variety, with a face landmark detector (optional extra).",
+    ),
+    "blinks": (
+        "stimuli_builder.blinks.cli",
+        "Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.",
+    ),
+    "profiles": (
+        "stimuli_builder.blinks.cli",
+        "The blink profiles that ship with the project.",
+    ),
+    "model": (
+        "stimuli_builder.blinks.cli",
+        "The PCA blink model: learn from recorded blinks, make new ones, hand curves to animation programs.",
+    ),
+    "bake": (
+        "stimuli_builder.characters.cli",
+        "Render a character's atlas of baked pictures.",
+    ),
+    "plan": (
+        "stimuli_builder.clips.cli",
+        "Print an experiment's design: factors, cells, clips, trials, blocks and expected minutes.",
+    ),
+    "build": (
+        "stimuli_builder.clips.cli",
+        "Build an experiment's clips (H.264 in MP4) and manifest.json.",
+    ),
+    "clip": (
+        "stimuli_builder.clips.cli",
+        "Render one clip from a blink profile and a character.",
+    ),
+    "strips": (
+        "stimuli_builder.clips.cli",
+        "Write the shipped characters at 33 closures as picture strips, for the dashboard's blinks page.",
+    ),
+    "verify": (
+        "stimuli_builder.clips.cli",
+        "Check a folder of clips against its manifest: presence, hashes, frame counts, timing and eyelid "
+        "opening.",
+    ),
+}
+"""Command -> the module whose `register` adds it, and the line of help that lists it."""
+
+
+class LazyGroup(TyperGroup):
+    """Imports a command's module when the command is called; its line in `--help` needs no import."""
+
+    def __init__(self, **settings: Any):
+        super().__init__(**settings)
+        self._unloaded = set(COMMANDS)
+        self.commands = {name: TyperCommand(name, help=line) for name, (_, line) in COMMANDS.items()}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Load the module of the command that is called."""
+        if args and args[0] in self._unloaded:
+            part = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False, add_completion=False)
+            import_module(COMMANDS[args[0]][0]).register(part)
+            loaded = typer.main.get_group(part).commands
+            self.commands.update(loaded)
+            self._unloaded -= set(loaded)
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
     name="stimuli",
+    cls=LazyGroup,
     help="From a recorded face to rated clips: track eyelids, measure blinks, build stimuli.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -13,21 +99,9 @@ app = typer.Typer(
 )
 
 
-def _gather() -> None:
-    from stimuli_builder.actor.cli import register as register_actor
-    from stimuli_builder.blinks.cli import register as register_blinks
-    from stimuli_builder.characters.cli import register as register_characters
-    from stimuli_builder.clips.cli import register as register_clips
-    from stimuli_builder.tracking.cli import register as register_tracking
-
-    register_actor(app)
-    register_tracking(app)
-    register_blinks(app)
-    register_characters(app)
-    register_clips(app)
-
-
-_gather()
+@app.callback()
+def _stimuli() -> None:
+    """Make Typer build a group although no command is registered yet."""
 
 
 def main() -> None:
