@@ -1,0 +1,43 @@
+"""The databases that commit c84c2e8 wrote (tests/golden/databases), loaded into either kind of database."""
+
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+import psycopg
+from sqlalchemy.engine import make_url
+
+from server.db import Database
+from tests.conftest import REPOSITORY
+
+FOLDER = REPOSITORY / "tests" / "golden" / "databases"
+SECRET_KEY = "browser tests"
+STUDIES = ("short", "browser")
+
+
+def load_older_database(url: str) -> Database:
+    """The database of revision 0001 with its rows, at this empty address."""
+    parts = make_url(url)
+    if parts.get_backend_name() == "sqlite":
+        Path(str(parts.database)).write_bytes(_golden("0001.sqlite.gz"))
+    else:
+        plain = parts.set(drivername="postgresql").render_as_string(hide_password=False)
+        with psycopg.connect(plain) as connection:
+            connection.execute(_golden("0001.postgresql.sql.gz"))
+    return Database(url)
+
+
+def older_ratings_csv(study: str) -> bytes:
+    """The ratings of a study as that program exported them."""
+    return _golden(f"{study}.ratings.csv.gz")
+
+
+def older_requests() -> dict[str, list[dict[str, Any]]]:
+    """What that program's page sent: `before` the copy, `after` it, and its `outbox`."""
+    requests: dict[str, list[dict[str, Any]]] = json.loads(_golden("requests.json.gz"))
+    return requests
+
+
+def _golden(name: str) -> bytes:
+    return gzip.decompress((FOLDER / name).read_bytes())

@@ -1,0 +1,98 @@
+"""What commit c84c2e8 stored, exported and sent, under the program of today."""
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+
+from server.app import create_app
+from server.context import Services, open_services
+from server.export.formats import FORMATS
+from server.migrate import current_revision, newest_revision, upgrade
+from server.settings import Settings
+from server.studies.lookup import find_study
+from tests.helpers.databases import BACKENDS
+from tests.helpers.older_databases import (
+    SECRET_KEY,
+    STUDIES,
+    load_older_database,
+    older_ratings_csv,
+    older_requests,
+)
+
+both = pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
+
+
+@pytest.fixture
+def migrated(empty_database_url: str, tmp_path: Path) -> Iterator[Services]:
+    """The older database, brought to the newest revision."""
+    load_older_database(empty_database_url).close()
+    settings = Settings(
+        database_url=empty_database_url,
+        data_folder=tmp_path / "data",
+        frontend_folder=tmp_path / "pages",
+        secret_key=SECRET_KEY,
+    )
+    services = open_services(settings)
+    assert current_revision(services.database) == "0001"
+    upgrade(services.database)
+    assert current_revision(services.database) == newest_revision()
+    yield services
+    services.database.close()
+
+
+def exported(services: Services, study: str) -> bytes:
+    with services.database.read() as session:
+        return b"".join(FORMATS["csv"](session, find_study(session, study)))
+
+
+def older_columns_of(content: bytes, header: list[str]) -> bytes:
+    """A CSV cut down to these columns, which must be its first ones."""
+    rows = list(csv.reader(io.StringIO(content.decode(), newline="")))
+    assert rows[0][: len(header)] == header
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(row[: len(header)] for row in rows)
+    return stream.getvalue().encode()
+
+
+@both
+@pytest.mark.parametrize("study", STUDIES)
+def test_the_ratings_csv_has_the_same_bytes(migrated: Services, study: str) -> None:
+    older = older_ratings_csv(study)
+    header = older.split(b"\n", 1)[0].decode().split(",")
+    assert older_columns_of(exported(migrated, study), header) == older
+
+
+def send(client: TestClient, item: dict[str, Any], body: Any) -> Any:
+    headers = item.get("headers") or {"authorization": f"Bearer {item['token']}"}
+    return client.request(item["method"], item["path"], json=body, headers=headers)
+
+
+@both
+def test_a_page_left_open_over_the_upgrade_loses_nothing(migrated: Services) -> None:
+    requests = older_requests()
+    count = text("SELECT count(*) FROM ratings WHERE study = 'browser'")
+    with TestClient(create_app(migrated.settings)) as client:
+        for item in requests["before"]:
+            if "/ratings/" in item["path"]:  # acknowledged before the upgrade, and sent once more
+                again = send(client, item, json.loads(item["body"]))
+                assert again.status_code == 200
+                older, found = json.loads(item["answer"])["receipt"], again.json()["receipt"]
+                same = ("rating_id", "saved_at", "verdict", "rule", "again", "status")
+                assert {name: found[name] for name in same} == {name: older[name] for name in same}
+        for item in requests["after"]:
+            answer = send(client, item, json.loads(item["body"]))
+            assert answer.status_code == item["status"], answer.text
+            older, found = json.loads(item["answer"])["receipt"], answer.json()["receipt"]
+            assert found == older | {"saved_at": found["saved_at"]}
+        for item in requests["outbox"]:
+            body = {"events": [item["body"]]} if item["kind"] == "event" else item["body"]
+            assert send(client, item, body).status_code in (200, 201)
+    with migrated.database.read() as session:
+        assert session.scalar(count) == 2 + 2 + 1
