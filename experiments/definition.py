@@ -217,8 +217,8 @@ def _refuse_repeats(names: list[str], what: str) -> None:
 
 
 def _refuse_reserved(names: list[str]) -> None:
-    from experiments.ratings import COLUMN_NAMES
+    from experiments.columns import RESERVED
 
     for name in names:
-        if name in COLUMN_NAMES:
+        if name in RESERVED:
             raise ValueError(f"factor '{name}' has the name of a ratings column; choose another")

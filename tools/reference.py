@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT))
 from pydantic_core import PydanticUndefined  # noqa: E402
 from sqlalchemy import Table  # noqa: E402
 
-from experiments.ratings import RATING_COLUMNS, Column  # noqa: E402
+from experiments.columns import RUN_COLUMNS, VIEWS, Column  # noqa: E402
 from server.models import Base  # noqa: E402
 from server.settings import Settings  # noqa: E402
 
@@ -35,8 +35,7 @@ def table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[
 def column_row(column: Column) -> tuple[str, ...]:
     """One column of the export."""
     values = ", ".join(f"`{value}`" for value in column.values)
-    sentence = column.sentence + (f" One of {values}." if values else "")
-    return f"`{column.name}`", column.type, column.unit or "", sentence
+    return f"`{column.name}`", column.type, column.unit or "", values or column.allowed, column.description
 
 
 def stored(of: Table) -> Iterator[str]:
@@ -55,17 +54,19 @@ def data_dictionary() -> str:
     """The export's columns, and the tables behind them."""
     lines = [MADE, "# Data dictionary", ""]
     lines += [
-        "## One row a play: the view `ratings`, the CSV export",
-        "",
-        "Declared in `experiments/ratings.py`. The CSV has a column a factor in the place of `levels`; there",
-        "what is missing is empty and booleans are 0 and 1. Times are UTC. Previews and erased people are",
-        "left out.",
+        "Declared in `experiments/columns` and the kinds of trial. A CSV has a column a factor",
+        "in the place of `levels`; there what is missing is empty and booleans are 0 and 1. Times are UTC.",
+        "Previews and erased people are left out.",
         "",
     ]
-    lines += table(("column", "type", "unit", "meaning"), map(column_row, RATING_COLUMNS))
+    header = ("column", "type", "unit", "values or range", "meaning")
+    for view in VIEWS:
+        lines += [f"## {view.title} (the view `{view.name}`, and its CSV)", ""]
+        lines += [*table(header, map(column_row, view.columns)), ""]
+    lines += ["## Runs: one row a visit (the runs CSV)", "", *table(header, map(column_row, RUN_COLUMNS))]
     lines += ["", "## Tables of the database", ""]
     lines += [
-        "The tables may change from version to version (by migrations); the view above is the contract.",
+        "The tables may change from version to version (by migrations); the views above are the contract.",
         "",
     ]
     for each in Base.metadata.sorted_tables:

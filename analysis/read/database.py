@@ -14,13 +14,14 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
 from analysis.errors import NoRatingsError
 from analysis.read.text_table import categorical
+from experiments.columns import RATINGS, names_of
 from experiments.errors import InputError
 
 PORTION = 20_000
 KINDS = ("main", "attention")
 """Practice trials are never fetched: nobody analyses them."""
 
-RUN_TEXTS = (
+_OF_A_RUN = RATINGS.pick(
     "study",
     "experiment",
     "definition_sha256",
@@ -28,8 +29,11 @@ RUN_TEXTS = (
     "participant",
     "run_status",
     "exclusion_reason",
+    "synthetic",
+    "excluded",
 )
-RUN_FLAGS = ("synthetic", "excluded")
+RUN_TEXTS = names_of(_OF_A_RUN, "text")
+RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
 """Columns that are the same for all rows of a run."""
 
 

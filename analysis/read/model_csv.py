@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.read.text_table import numbers, read_text_table, texts_required
+from experiments.columns import RATINGS
 from experiments.errors import InputError
-from experiments.ratings import factors_in_header
 
 EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
 
@@ -37,7 +37,7 @@ def read_model_input(
     header = read_text_table(path, [participant, rating]).header
     exported = "kind" in header and "profile_id" in header
     if not within and exported:
-        within = factors_in_header(header)
+        within = RATINGS.factors_in_header(header)
     if not item and exported:
         item = ["profile_id"]
     if not within:

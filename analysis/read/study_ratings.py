@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from analysis.errors import NoRatingsError
 from analysis.read.database import RUN_FLAGS, RUN_TEXTS, RatingsQuery
 from analysis.read.text_table import numbers, read_text_table
+from experiments.columns import RATINGS, names_of
 from experiments.definition import Experiment
 from experiments.errors import InputError
 
-ROW_TEXTS = ("run", "kind", "verdict")
-ROW_NUMBERS = ("response", "expected_response", "rt")
-CSV_NUMBERS = ("trial_index", "play", "exemplar", *ROW_NUMBERS)
-"""What the analysis reads of the columns that experiments/ratings.py declares, besides the factors.
+ROW_TEXTS = names_of(RATINGS.pick("run", "kind", "verdict"))
+ROW_NUMBERS = names_of(RATINGS.pick("response", "expected_response", "rt"))
+CSV_NUMBERS = (*names_of(RATINGS.pick("trial_index", "play", "exemplar")), *ROW_NUMBERS)
+"""What the analysis reads of the columns that experiments/columns declares, besides the factors.
 
 `trial_index` and `play` only find repeated rows, which the database's unique index rules out.
 """

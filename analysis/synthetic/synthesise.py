@@ -18,10 +18,10 @@ from analysis.synthetic.space import DesignSpace
 from analysis.synthetic.targets import Targets, make_targets
 from analysis.synthetic.trials import rating_rows
 from analysis.synthetic.wishes import with_wishes
+from experiments.columns import RATINGS
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.load import load_experiment
-from experiments.ratings import csv_header
 
 ATTEMPTS = 40
 """Fresh draws of participants before the best is kept and what it misses is reported."""
@@ -139,7 +139,7 @@ def _onward(progress: Callable[[int, int], None] | None, rounds: int) -> Callabl
 
 def write_ratings(synthetic: Synthetic, out: Path) -> int:
     """Write the ratings as the server's CSV export, every row marked synthetic; the number of rows."""
-    header = csv_header(synthetic.experiment.factor_names)
+    header = RATINGS.csv_header(synthetic.experiment.factor_names)
     rng = np.random.default_rng([synthetic.seed, 1])
     count = 0
     with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.synthetic.space import DesignSpace
+from experiments.columns import RATINGS
 from experiments.definition import Experiment
 from experiments.design import BlockSpec, ClipSpec, blocks, clips, exemplar_key
 from experiments.load import definition_sha256
-from experiments.ratings import COLUMN_NAMES
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]
@@ -112,7 +112,7 @@ def _visit(
     rng: np.random.Generator,
 ) -> Iterator[Row]:
     index, clock = 0, 0.0
-    empty = dict.fromkeys(name for name in COLUMN_NAMES if name != "levels")
+    empty = dict.fromkeys(name for name in RATINGS.names if name != "levels")
     for number, block in enumerate(_block_order(experiment, rng), start=1):
         order = rng.permutation(len(block.clips))
         times = np.round(MEDIAN_RT_MS * np.exp(0.35 * rng.normal(size=len(order))), 1)

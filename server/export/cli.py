@@ -30,7 +30,7 @@ def export(
         ),
     ] = "csv",
 ) -> None:
-    """Write a study's data: as csv, the columns of experiments/ratings.py and one column a factor.
+    """Write a study's data: as csv, the columns of experiments/columns and one column a factor.
 
     Memory stays constant however many rows there are; the file appears under its name only when complete.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from experiments.ratings import csv_header, csv_row
+from experiments.columns import RATINGS
 from server.export.ratings_csv import factor_names, rating_rows
 from server.models import Study
 
@@ -27,5 +27,5 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
 def rating_table(session: Session, study: Study) -> Iterator[Sequence[Any]]:
     """Header and rows of the tidy ratings CSV."""
     factors = factor_names(session, study)
-    yield csv_header(factors)
-    yield from (csv_row(row, factors) for row in rating_rows(session, study))
+    yield RATINGS.csv_header(factors)
+    yield from (RATINGS.csv_row(row, factors) for row in rating_rows(session, study))

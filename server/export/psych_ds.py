@@ -9,10 +9,9 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.columns import RUN_COLUMNS, Column
 from experiments.definition import Experiment
-from experiments.ratings import Column
 from server.export.codebook import (
-    RUN_COLUMNS,
     factor_columns,
     markdown,
     rating_columns,

@@ -6,13 +6,13 @@ from typing import Any
 from sqlalchemy import CursorResult, select, text
 from sqlalchemy.orm import Session
 
-from experiments.ratings import COLUMN_NAMES, RATING_COLUMNS
+from experiments.columns import RATINGS, names_of
 from server.models import Study, StudyRun, StudyVersion
 
 RUNS_AT_ONCE = 200
-_BOOLEANS = {column.name for column in RATING_COLUMNS if column.type == "boolean"}
+_BOOLEANS = names_of(RATINGS.columns, "boolean")
 # PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
-_COLUMNS = ", ".join(f"CAST({name} AS INTEGER)" if name in _BOOLEANS else name for name in COLUMN_NAMES)
+_COLUMNS = ", ".join(f"CAST({name} AS INTEGER)" if name in _BOOLEANS else name for name in RATINGS.names)
 _ROWS = text(f"SELECT {_COLUMNS} FROM ratings WHERE run = :run ORDER BY trial_index, play")  # noqa: S608
 
 
@@ -26,7 +26,7 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 
 
 def rating_rows(session: Session, study: Study) -> Iterator[Sequence[Any]]:
-    """Rows of the view (values in the order of COLUMN_NAMES) by start of the run, then trial and play.
+    """Rows of the view (values in the order of RATINGS.names) by start of the run, then trial and play.
 
     Booleans are 0 and 1. One run's rows are in memory at a time.
     """

@@ -8,8 +8,8 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from experiments.columns import RUN_COLUMNS
 from server.clock import iso
-from server.export.codebook import RUN_COLUMNS
 from server.models import FormAnswer, Study, StudyRun
 from server.runs import service
 

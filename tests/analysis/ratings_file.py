@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.columns import RATINGS
 from experiments.definition import Experiment
-from experiments.ratings import COLUMN_NAMES, csv_header
 
 Row = dict[str, object]
 
@@ -33,7 +33,7 @@ def rows_of(experiment: Experiment, ratings: np.ndarray) -> list[Row]:
     rows = []
     for who, answers in enumerate(ratings.reshape(len(ratings), len(cells), -1)):
         for trial, (cell, exemplar) in enumerate(product(range(len(cells)), range(answers.shape[1]))):
-            row: Row = dict.fromkeys([*COLUMN_NAMES, *names], "")
+            row: Row = dict.fromkeys([*RATINGS.names, *names], "")
             row |= {"study": "s", "experiment": experiment.name, "phase": "live", "synthetic": 1}
             row |= {
                 "run": f"run{who}",
@@ -59,7 +59,7 @@ def rows_of(experiment: Experiment, ratings: np.ndarray) -> list[Row]:
 
 def write_export(path: Path, experiment: Experiment, rows: list[Row]) -> Path:
     """Write rows as the CSV export has them."""
-    header = csv_header(experiment.factor_names)
+    header = RATINGS.csv_header(experiment.factor_names)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, header, extrasaction="ignore")
         writer.writeheader()

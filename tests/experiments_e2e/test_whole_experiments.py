@@ -10,8 +10,8 @@ import pytest
 from sqlalchemy import text
 
 from experiments import design
+from experiments.columns import RATINGS
 from experiments.load import FOLDER
-from experiments.ratings import COLUMN_NAMES, csv_header
 from server.app import create_app
 from server.context import Services
 from server.export.formats import ratings_csv
@@ -50,7 +50,7 @@ def test_three_participants_rate_every_trial(
         rows = session.execute(text("SELECT * FROM ratings ORDER BY run, trial_index, play")).mappings().all()
         exported = b"".join(ratings_csv(session, session.query(Study).one())).decode("utf-8")
     assert len(rows) == sum(sent)
-    assert tuple(rows[0]) == COLUMN_NAMES
+    assert tuple(rows[0]) == RATINGS.names
     assert all(row["synthetic"] for row in rows)
     last_plays = {(row["run"], row["trial_index"]): row for row in rows if row["kind"] == "main"}
     cells = Counter((row["run"], row["cell"]) for row in last_plays.values())
@@ -61,7 +61,7 @@ def test_three_participants_rate_every_trial(
 def compare_with_csv(rows: list, content: str, factors: list[str]) -> None:
     """The CSV holds the view's rows: same number, same values."""
     read = list(csv.DictReader(io.StringIO(content)))
-    assert list(read[0]) == csv_header(factors)
+    assert list(read[0]) == RATINGS.csv_header(factors)
     assert len(read) == len(rows)
     by_key = {(row["run"], row["trial_index"], row["play"]): row for row in rows}
     for line in read:

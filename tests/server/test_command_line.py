@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from experiments.columns import RATINGS
 from experiments.load import parse_experiment
-from experiments.ratings import csv_header
 from server.context import Services
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
 from server.settings import Settings
@@ -46,7 +46,7 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     assert f"{out.stat().st_size:,} bytes" in exported.stdout.replace("\n", "")
     # A play that failed is offered again and is a row of its own.
     assert len({(row["run"], row["trial_index"]) for row in rows if row["verdict"] != "failed"}) == 2 * 12
-    assert list(rows[0]) == csv_header(["character", "speed"])
+    assert list(rows[0]) == RATINGS.csv_header(["character", "speed"])
     assert {row["synthetic"] for row in rows} == {"1"}
     assert {row["run_status"] for row in rows} == {"complete"}
     with services.database.read() as session:

@@ -1,9 +1,9 @@
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
-from sqlalchemy import inspect, text
+from sqlalchemy import Connection, inspect, text
 
-from experiments.ratings import COLUMN_NAMES
+from experiments.columns import VIEWS, Dialect
 from server.db import Database
 from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.models import Base
@@ -18,8 +18,30 @@ def test_the_migrations_make_what_the_models_declare(empty_database_url: str) ->
     assert upgrade(database) == (None, newest_revision())
     with database.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
-        assert tuple(connection.execute(text("SELECT * FROM ratings")).keys()) == COLUMN_NAMES
     database.close()
+
+
+@both
+def test_the_views_of_the_database_are_those_of_the_columns(empty_database_url: str) -> None:
+    database = Database(empty_database_url)
+    upgrade(database)
+    dialect: Dialect = "sqlite" if database.engine.dialect.name == "sqlite" else "postgresql"
+    with database.engine.connect() as connection:
+        assert set(inspect(connection).get_view_names()) == {view.name for view in VIEWS}
+        for view in VIEWS:
+            made_by_migrations = definition_of(connection, view.name)
+            connection.execute(text(f"DROP VIEW {view.name}"))
+            connection.execute(text(view.create(dialect)))
+            assert made_by_migrations == definition_of(connection, view.name), "a migration is missing"
+            assert tuple(connection.execute(text(f"SELECT * FROM {view.name}")).keys()) == view.names
+    database.close()
+
+
+def definition_of(connection: Connection, view: str) -> str:
+    """The view as the database keeps it, blanks aside."""
+    query = inspect(connection).get_view_definition(view)
+    assert query is not None
+    return " ".join(query.split())
 
 
 @both

@@ -17,10 +17,10 @@ from analysis.synthetic.trials import split_sum
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
 from analysis.within.pairwise import one_factor_pairs
+from experiments.columns import RATINGS
 from experiments.design import trials_per_participant
 from experiments.errors import InputError
 from experiments.load import load_experiment
-from experiments.ratings import csv_header
 
 for name in ("test_after_moves", "test_value"):
     globals()[name].__test__ = False
@@ -94,7 +94,7 @@ def test_every_row_is_marked_and_has_the_columns_of_the_export(tmp_path):
     with out.open(newline="", encoding="utf-8") as handle:
         reader = csv.DictReader(handle)
         rows = list(reader)
-    assert reader.fieldnames == csv_header(experiment.factor_names)
+    assert reader.fieldnames == RATINGS.csv_header(experiment.factor_names)
     assert count == len(rows) == 12 * trials_per_participant(experiment)
     assert {row["synthetic"] for row in rows} == {"1"}
     assert {row["study"] for row in rows} == {"synthetic exp3"}

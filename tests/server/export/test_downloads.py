@@ -2,7 +2,7 @@ import csv
 import io
 import json
 
-from experiments.ratings import csv_header
+from experiments.columns import RATINGS
 from server.export.codebook import RUN_COLUMNS
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -15,7 +15,7 @@ def table(text: str) -> list[list[str]]:
 def test_the_ratings_csv_has_the_columns_of_the_contract(viewer: Admin, participant: Participant) -> None:
     participant.agree().rate_all()
     rows = table(viewer.get("/studies/short/data/ratings.csv").text)
-    assert rows[0] == csv_header(["character", "speed"])
+    assert rows[0] == RATINGS.csv_header(["character", "speed"])
     assert len(rows) == 1 + 12
     assert {len(row) for row in rows} == {len(rows[0])}
 
@@ -36,7 +36,7 @@ def test_raw_data_are_json_lines(viewer: Admin, participant: Participant) -> Non
 
 def test_the_codebook_explains_every_exported_column(viewer: Admin, study: StudyInDatabase) -> None:
     text = viewer.get("/studies/short/data/codebook.md").text
-    for name in [*csv_header(["character", "speed"]), *(column.name for column in RUN_COLUMNS)]:
+    for name in [*RATINGS.csv_header(["character", "speed"]), *(column.name for column in RUN_COLUMNS)]:
         assert f"| {name} |" in text
 
 

@@ -36,7 +36,9 @@ PROPERTIES = {
         "name", "description", "schemaVersion", "dateModified", "citation", "measurementTechnique",
         "keywords", "variableMeasured",
     },
-    "PropertyValue": {"name", "description", "additionalType", "unitText", "valueReference"},
+    "PropertyValue": {
+        "name", "description", "additionalType", "unitText", "minValue", "maxValue", "valueReference",
+    },
     "DefinedTerm": {"name"},
 }  # fmt: skip
 """Of the schema.org properties of each class, those used here; any other word would be no term."""

@@ -3,7 +3,7 @@ import io
 import json
 from typing import Any
 
-from experiments.ratings import COLUMN_NAMES, RATING_COLUMNS, csv_header, factors_in_header
+from experiments.columns import RATINGS
 from server.context import Services
 from server.export.formats import ratings_csv
 from server.export.ratings_csv import rating_rows
@@ -28,13 +28,14 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
     with services.database.read() as session:
         study = session.query(Study).one()
         stream = io.StringIO(b"".join(ratings_csv(session, study)).decode("utf-8"), newline="")
-        rows = [dict(zip(COLUMN_NAMES, row, strict=True)) for row in rating_rows(session, study)]
+        rows = [dict(zip(RATINGS.names, row, strict=True)) for row in rating_rows(session, study)]
     read = list(csv.DictReader(stream))
     assert len(read) == 5
-    factors = factors_in_header(read[0])
+    factors = RATINGS.factors_in_header(read[0])
     assert factors == ["character", "speed"]
     for row, line in zip(rows, read, strict=True):
-        for column in RATING_COLUMNS:
+        for column in RATINGS.columns:
+            assert column.admits(row[column.name]), column.name
             if column.name == "levels":
                 levels = json.loads(row["levels"]) if row["levels"] else {}
                 assert {name: line[name] for name in factors if line[name]} == levels
@@ -50,4 +51,4 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
 def test_an_empty_study_exports_its_header(services: Services, study: Any) -> None:
     with services.database.read() as session:
         exported = b"".join(ratings_csv(session, session.query(Study).one())).decode("utf-8")
-    assert exported.strip() == ",".join(csv_header(["character", "speed"]))
+    assert exported.strip() == ",".join(RATINGS.csv_header(["character", "speed"]))

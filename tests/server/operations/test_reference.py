@@ -11,9 +11,9 @@ def test_the_generated_pages_are_current() -> None:
 
 
 def test_every_exported_column_is_explained() -> None:
-    from experiments.ratings import RATING_COLUMNS
+    from experiments.columns import RUN_COLUMNS, VIEWS
 
     page = (REPOSITORY / "docs" / "data-dictionary.md").read_text(encoding="utf-8")
-    for column in RATING_COLUMNS:
+    for column in (*RUN_COLUMNS, *(column for view in VIEWS for column in view.columns)):
         assert f"| `{column.name}` | {column.type} |" in page
-        assert column.sentence.endswith(".")
+        assert column.description.endswith(".")

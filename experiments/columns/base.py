@@ -1,0 +1,213 @@
+"""Columns that every kind of trial exports: the study, the run, the trial, its clip, its times, its playback.
+
+Names that jsPsych uses for the same thing are kept (`trial_index`, `rt`, `response`, `stimulus`,
+`time_elapsed`). Aliases of the tables: s studies, v study_versions, r study_runs, a assigned_trials,
+t trial_ratings, c version_clips.
+"""
+
+from experiments.columns.column import Column
+
+STUDY: tuple[Column, ...] = (
+    Column("study", "text", "Name of the study, unique on this server.", source="s.name"),
+    Column("experiment", "text", "Name of the declared experiment.", source="v"),
+    Column(
+        "definition_sha256",
+        "text",
+        "SHA-256 of the experiment's declaration this run was made with.",
+        source="v",
+    ),
+)
+
+RUN: tuple[Column, ...] = (
+    Column(
+        "phase",
+        "text",
+        "Whether the run was made while the study was a pilot or live.",
+        values=("pilot", "live"),
+        source="r",
+    ),
+    Column(
+        "synthetic",
+        "boolean",
+        "True where no person gave this rating: simulated or synthesised data.",
+        source="r",
+    ),
+    Column("run", "text", "Public identifier of the participant's visit (study run).", source="r.public_id"),
+    Column(
+        "participant",
+        "text",
+        "Identifier of the participant: the link's label, the recruiter's id, or the run's.",
+        source="r",
+    ),
+    Column(
+        "run_status",
+        "text",
+        "State of the visit.",
+        values=("active", "complete", "screened_out", "withdrawn"),
+        source="r.status",
+    ),
+    Column("language", "text", "Language the participant read.", source="r"),
+)
+
+TRIAL: tuple[Column, ...] = (
+    Column(
+        "trial_index",
+        "integer",
+        "Position of the trial in the run, from 0, practice and checks included.",
+        minimum=0,
+        source="a",
+    ),
+    Column("kind", "text", "What the trial is.", values=("practice", "main", "attention"), source="a"),
+    Column("block", "integer", "Block number from 1; 0 for practice.", minimum=0, source="a"),
+    Column("block_label", "text", "Level of the factor that splits the blocks, or all.", source="a"),
+    Column(
+        "play",
+        "integer",
+        "Which play of this trial: 1, or more where a failed clip was shown again.",
+        minimum=1,
+        source="t",
+    ),
+)
+
+LEVELS = Column(
+    "levels",
+    "text",
+    "JSON object of factor names and level names; the CSV has a column a factor instead.",
+    source="c",
+    json=True,
+)
+
+CLIP: tuple[Column, ...] = (
+    LEVELS,
+    Column("cell", "text", "Level names in factor order, joined by slashes.", source="c"),
+    Column("exemplar", "integer", "Which exemplar of the cell, from 1.", minimum=1, source="c"),
+    Column("profile_id", "text", "Identifier of the blink profile shown, as in the manifest.", source="c"),
+    Column("stimulus", "text", "File name of the clip.", source="c.file"),
+    Column("clip_sha256", "text", "SHA-256 of the clip's bytes.", source="c"),
+)
+
+TIMES: tuple[Column, ...] = (
+    Column(
+        "rt",
+        "number",
+        "Response time from the clip's last frame to the answer.",
+        unit="ms",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "rt_from_first_frame",
+        "number",
+        "Response time from the clip's first frame to the answer.",
+        unit="ms",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "time_elapsed",
+        "number",
+        "Time from the start of the run to the answer, on the participant's clock.",
+        unit="ms",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "changes",
+        "integer",
+        "How often the answer was changed before it was confirmed.",
+        minimum=0,
+        source="t",
+    ),
+    Column("comment", "text", "What the participant wrote beside the rating, where asked.", source="t"),
+)
+
+PLAYBACK: tuple[Column, ...] = (
+    Column("method", "text", "How the clip was played.", values=("webcodecs", "video", "none"), source="t"),
+    Column(
+        "verdict",
+        "text",
+        "Playback verdict by the declared rules.",
+        values=("good", "flagged", "failed"),
+        source="t",
+    ),
+    Column("verdict_rule", "text", "The rule that gave the verdict, empty where good.", source="t"),
+    Column(
+        "key_to_first_frame_ms",
+        "number",
+        "From the start key to the first frame drawn.",
+        unit="ms",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "frames_drawn",
+        "integer",
+        "Frames of the clip that were drawn.",
+        unit="frames",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "frames_late",
+        "integer",
+        "Frames drawn more than one refresh after their time.",
+        unit="frames",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "frames_missing",
+        "integer",
+        "Frames of the clip that were never drawn.",
+        unit="frames",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "longest_gap_ms",
+        "number",
+        "Longest time between two drawn frames.",
+        unit="ms",
+        minimum=0,
+        source="t",
+    ),
+    Column("stalls", "integer", "How often playback waited for data.", minimum=0, source="t"),
+    Column(
+        "focus_lost",
+        "boolean",
+        "True where the page lost focus or visibility during the clip.",
+        source="t",
+    ),
+)
+
+SCREEN: tuple[Column, ...] = (
+    Column(
+        "refresh_rate_hz", "number", "Measured refresh rate of the screen.", unit="Hz", minimum=0, source="t"
+    ),
+    Column("device_pixel_ratio", "number", "Device pixels per CSS pixel.", minimum=0, source="t"),
+    Column(
+        "px_per_mm",
+        "number",
+        "CSS pixels per millimetre from the size calibration.",
+        unit="px/mm",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "viewing_distance_mm",
+        "number",
+        "Viewing distance from the blind-spot test, where asked.",
+        unit="mm",
+        minimum=0,
+        source="t",
+    ),
+)
+
+EXCLUSION: tuple[Column, ...] = (
+    Column("excluded", "boolean", "True where an experimenter excluded the run by hand.", source="r"),
+    Column("exclusion_reason", "text", "Why an experimenter excluded the run.", source="r"),
+)
+
+SAVED: tuple[Column, ...] = (
+    Column("saved_at", "time", "When the server stored the row (UTC, ISO 8601).", source="t"),
+)

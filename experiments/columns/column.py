@@ -1,0 +1,62 @@
+"""A column of what is exported: its name, type, unit, meaning and range, and where the database has it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+ColumnType = Literal["text", "integer", "number", "boolean", "time"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a view and its export; `description` is its line in the codebook.
+
+    Attributes
+    ----------
+    unit: as SI writes it, or the thing counted; None for what has none.
+    values: every value there is, for columns of names.
+    minimum, maximum: the range of numbers, ends included; None where open.
+    source: the SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the
+    column is of no view.
+    json: True where the source is a JSON column, exported as text.
+    """
+
+    name: str
+    type: ColumnType
+    description: str
+    unit: str | None = None
+    values: tuple[str, ...] = ()
+    minimum: float | None = None
+    maximum: float | None = None
+    source: str = ""
+    json: bool = False
+
+    @property
+    def expression(self) -> str:
+        """The SQL behind the column, its table's alias included."""
+        return f"{self.source}.{self.name}" if self.source.isidentifier() else self.source
+
+    @property
+    def allowed(self) -> str:
+        """The column's values or range in words, empty where anything may stand."""
+        if self.values:
+            return ", ".join(self.values)
+        if self.minimum is not None and self.maximum is not None:
+            return f"{self.minimum:g} to {self.maximum:g}"
+        return f"{self.minimum:g} or more" if self.minimum is not None else ""
+
+    def admits(self, value: object) -> bool:
+        """True where `value` lies in the column's range or among its values; None always does."""
+        if value is None or (self.values and value == ""):
+            return True
+        if self.values:
+            return value in self.values
+        if not isinstance(value, int | float):
+            return True
+        low = self.minimum is None or value >= self.minimum
+        return low and (self.maximum is None or value <= self.maximum)
+
+
+def names_of(columns: Iterable[Column], *types: ColumnType) -> tuple[str, ...]:
+    """Names of the columns of these types, in order; of all columns where no type is given."""
+    return tuple(column.name for column in columns if not types or column.type in types)

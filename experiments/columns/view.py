@@ -1,0 +1,89 @@
+"""A view: the columns of one kind of trial's rows, the SQL that selects them, and their place in a CSV."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, Literal
+
+from experiments.columns.base import LEVELS
+from experiments.columns.column import Column, names_of
+
+Dialect = Literal["sqlite", "postgresql"]
+
+_TIME: dict[Dialect, str] = {
+    "sqlite": "replace({}, ' ', 'T') || 'Z'",
+    "postgresql": """to_char({} AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
+}
+_JSON: dict[Dialect, str] = {"sqlite": "{}", "postgresql": "CAST({} AS text)"}
+
+
+@dataclass(frozen=True)
+class View:
+    """A SQL view and the CSV export made from it.
+
+    Attributes
+    ----------
+    name: of the view in the database.
+    title: what one row is, as a heading of the codebook says it.
+    columns: in order. One of them may be `LEVELS`: the CSV has a column a factor in its place.
+    rows: the SQL after SELECT: tables, joins, and which rows count.
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: str
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Column names in order."""
+        return names_of(self.columns)
+
+    def pick(self, *names: str) -> tuple[Column, ...]:
+        """The columns called so; KeyError for a name that is no column."""
+        by_name = {column.name: column for column in self.columns}
+        return tuple(by_name[name] for name in names)
+
+    def create(self, dialect: Dialect) -> str:
+        """The statement that makes the view; a migration keeps a copy of it as it was then."""
+        selected = ",\n       ".join(
+            f"{_spelled(column, dialect)} AS {column.name}" for column in self.columns
+        )
+        return f"CREATE VIEW {self.name} AS\nSELECT {selected}\n{self.rows}"
+
+    def csv_header(self, factors: Sequence[str]) -> list[str]:
+        """Column names of the CSV export: as the view, with a column a factor in the place of `levels`."""
+        header: list[str] = []
+        for name in self.names:
+            header.extend(factors if name == LEVELS.name else [name])
+        return header
+
+    def csv_row(self, row: Sequence[Any], factors: tuple[str, ...]) -> tuple[Any, ...]:
+        """One row of the view (values in column order, booleans as 0 and 1) as CSV cells.
+
+        What is missing stays None, which a CSV writer leaves empty.
+        """
+        place = self._levels_at
+        return (*row[:place], *_level_cells(row[place], factors), *row[place + 1 :])
+
+    @cached_property
+    def _levels_at(self) -> int:
+        return self.names.index(LEVELS.name)
+
+    def factors_in_header(self, header: Iterable[str]) -> list[str]:
+        """The factor columns of a CSV export: every column the view does not name, in order."""
+        return [name for name in header if name not in self.names]
+
+
+def _spelled(column: Column, dialect: Dialect) -> str:
+    if column.type == "time":
+        return _TIME[dialect].format(column.expression)
+    return _JSON[dialect].format(column.expression) if column.json else column.expression
+
+
+# A study has few cells but many rows: their JSON is parsed once each.
+@lru_cache(maxsize=4096)
+def _level_cells(levels: str | None, factors: tuple[str, ...]) -> tuple[str, ...]:
+    level_of: Mapping[str, str] = json.loads(levels) if levels else {}
+    return tuple(level_of.get(factor, "") for factor in factors)

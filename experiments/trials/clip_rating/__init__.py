@@ -1,0 +1,1 @@
+"""One clip after another, each rated on a scale."""
