@@ -111,7 +111,8 @@ def _welcome(services: Services) -> None:
             select(Study).where(Study.status.in_(("pilot", "live"))).order_by(Study.id)
         ):
             link = general_link(session, settings.key, study)
-            out.print(f"{study.name} ({study.status}): {link_url(settings.public_url, settings.key, link)}")
+            url = link_url(settings.public_url, settings.key, link.public_id)
+            out.print(f"{study.name} ({study.status}): {url}")
         first = not _has_accounts(session)
     out.print(f"admin site: {settings.public_url}/admin/")
     if first:

@@ -1,22 +1,32 @@
 """Participants of a study: list, timeline, exclude, erase."""
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Query
 
 from server.accounts.identity import Experimenter, Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.runs import service
-from server.runs.schemas import Erase, Exclude, RunSummary, Timeline
+from server.runs.schemas import Erase, Exclude, RunPage, Show, Timeline
 from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/runs", tags=["participants"], responses=ERROR_RESPONSES)
 
 
 @router.get("")
-def list_runs(services: ServicesDep, _who: Viewer, study: str) -> list[RunSummary]:
-    """Every run, the latest first."""
+def list_runs(
+    services: ServicesDep,
+    _who: Viewer,
+    study: str,
+    show: Show = "everybody",
+    search: Annotated[str, Query(max_length=200, description="Part of participant or run.")] = "",
+    before: Annotated[str | None, Query(max_length=40)] = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> RunPage:
+    """The runs, the latest first, a page at a time: go on with `before` = `next`."""
     with services.database.read() as session:
-        return service.summaries(session, find_study(session, study))
+        return service.page(session, find_study(session, study), show, search, before, limit)
 
 
 @router.get("/{run}")

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import case, delete, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Select, case, delete, func, select
+from sqlalchemy.orm import Session, joinedload
 
 from server.errors import NotFound
 from server.models import (
@@ -14,8 +14,10 @@ from server.models import (
     RunEvent,
     Study,
     StudyRun,
+    StudyVersion,
     VersionClip,
 )
+from server.runs.schemas import Show
 
 
 def find_run(session: Session, study: Study, public_id: str) -> StudyRun:
@@ -27,14 +29,42 @@ def find_run(session: Session, study: Study, public_id: str) -> StudyRun:
     return run
 
 
-def runs_of(session: Session, study: Study) -> list[StudyRun]:
-    """Every run of a study but previews, the latest first."""
-    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
-    return list(session.scalars(query.order_by(StudyRun.id.desc())))
+_SHOWN: dict[Show, tuple[ColumnElement[bool], ...]] = {
+    "everybody": (),
+    "complete": (StudyRun.status == "complete",),
+    "not_complete": (StudyRun.status != "complete",),
+    "excluded": (StudyRun.excluded.is_(True),),
+    "synthetic": (StudyRun.synthetic.is_(True),),
+}
+
+
+def _chosen(study: Study, show: Show, search: str) -> Select[StudyRun]:
+    """The runs of a study but previews that are to be shown."""
+    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False), *_SHOWN[show])
+    if not search:
+        return query
+    fits = StudyRun.participant.icontains(search, autoescape=True)
+    return query.where(fits | StudyRun.public_id.icontains(search, autoescape=True))
+
+
+def number_of_runs(session: Session, study: Study, show: Show, search: str) -> int:
+    """How many runs are to be shown."""
+    return session.scalar(_chosen(study, show, search).with_only_columns(func.count())) or 0
+
+
+def page_of_runs(
+    session: Session, study: Study, show: Show, search: str, before: int | None, limit: int
+) -> list[StudyRun]:
+    """At most `limit` runs, the latest first, those begun before the run with the number `before`."""
+    query = _chosen(study, show, search).order_by(StudyRun.id.desc()).limit(limit)
+    query = query.options(
+        joinedload(StudyRun.link), joinedload(StudyRun.version).load_only(StudyVersion.number)
+    )
+    return list(session.scalars(query if before is None else query.where(StudyRun.id < before)))
 
 
 def answered(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]]:
-    """Run number -> (trials answered, plays that were not good)."""
+    """Run number -> (trials answered, plays that were not good); for one page of runs."""
     bad = func.sum(case((Rating.verdict != "good", 1), else_=0))
     query = select(Rating.study_run_id, func.count(Rating.trial_index.distinct()), bad)
     query = query.where(Rating.study_run_id.in_(runs)).group_by(Rating.study_run_id)

@@ -1,7 +1,7 @@
 """One participant's visit as the experimenter sees it."""
 
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
@@ -18,6 +18,9 @@ class Erase(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     confirm: Annotated[str, StringConstraints(max_length=40)]
+
+
+Show = Literal["everybody", "complete", "not_complete", "excluded", "synthetic"]
 
 
 class RunSummary(BaseModel):
@@ -42,6 +45,14 @@ class RunSummary(BaseModel):
     erased_at: datetime | None
     version: int
     link: str
+
+
+class RunPage(BaseModel):
+    """Runs, the latest first."""
+
+    runs: list[RunSummary]
+    total: int = Field(description="How many runs fit, on all pages.")
+    next: str | None = Field(description="Ask again with `before` = this; null at the end.")
 
 
 class TimelineTrial(BaseModel):

@@ -12,7 +12,9 @@ from server.errors import Conflict, Invalid
 from server.models import AssignedTrial, Rating, Study, StudyRun, VersionClip
 from server.runs import repository
 from server.runs.schemas import (
+    RunPage,
     RunSummary,
+    Show,
     Timeline,
     TimelineCalibration,
     TimelineEvent,
@@ -21,11 +23,17 @@ from server.runs.schemas import (
 )
 
 
-def summaries(session: Session, study: Study) -> list[RunSummary]:
-    """One line a run, the latest first."""
-    runs = repository.runs_of(session, study)
-    counts = repository.answered(session, [run.id for run in runs])
-    return [summary(run, *counts.get(run.id, (0, 0))) for run in runs]
+def page(session: Session, study: Study, show: Show, search: str, before: str | None, limit: int) -> RunPage:
+    """At most `limit` runs that fit, the latest first, those begun before the run `before`."""
+    last = None if before is None else repository.find_run(session, study, before).id
+    runs = repository.page_of_runs(session, study, show, search, last, limit + 1)
+    shown = runs[:limit]
+    counts = repository.answered(session, [run.id for run in shown])
+    return RunPage(
+        runs=[summary(run, *counts.get(run.id, (0, 0))) for run in shown],
+        total=repository.number_of_runs(session, study, show, search),
+        next=shown[-1].public_id if len(runs) > limit else None,
+    )
 
 
 def summary(run: StudyRun, answered: int, not_good: int) -> RunSummary:

@@ -18,7 +18,16 @@ from server.clock import now
 from server.context import Services
 from server.models import Study, StudyRun, StudyVersion
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
-from server.studies.links import LinkKind, create_link, general_link, link_url, links_of
+from server.studies.links import (
+    LinkKind,
+    LinkOptions,
+    add_links,
+    general_link,
+    link_url,
+    links_of,
+    numbered_labels,
+    prepared_links,
+)
 from server.studies.lookup import active_version, find_study
 
 study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
@@ -88,7 +97,7 @@ def _same_version(session: Session, study: Study, sha256: str, manifest: Manifes
 
 def _url(services: Services, session: Session, study: Study) -> str:
     link = general_link(session, services.settings.key, study)
-    return link_url(services.settings.public_url, services.settings.key, link)
+    return link_url(services.settings.public_url, services.settings.key, link.public_id)
 
 
 def _set_status(session: Session, study: Study, status: str) -> None:
@@ -166,16 +175,17 @@ def create(
             "expected --count with --kind personal only; a general link serves any number of people"
         )
     expires = now() + timedelta(hours=expires_hours) if expires_hours is not None else None
-    with migrated_services() as services, services.database.write() as session:
-        found, settings = find_study(session, study), services.settings
-        for number in range(1, count + 1):
-            text = f"{label or 'P'}{number:03d}" if count > 1 else label
-            link = create_link(
-                session, settings.key, found, KINDS[kind], label=text, quota=quota, expires_at=expires
-            )
-            url = link_url(settings.public_url, settings.key, link)
-            out.print(f"{text},{url}" if count > 1 else url)
-        record(session, None, "links created", "study", found.name, kind=kind, count=count)
+    options = LinkOptions(KINDS[kind], quota=quota, expires_at=expires)
+    with migrated_services() as services:
+        settings = services.settings
+        rows = prepared_links(settings.key, options, numbered_labels(label, count) if count > 1 else [label])
+        with services.database.write() as session:
+            found = find_study(session, study)
+            add_links(session, found, rows)
+            record(session, None, "links created", "study", found.name, kind=kind, count=count)
+    for row in rows:
+        url = link_url(settings.public_url, settings.key, row["public_id"])
+        out.print(f"{row['label']},{url}" if count > 1 else url)
 
 
 @link_app.command("list")
@@ -187,4 +197,4 @@ def list_links(study: Annotated[str, typer.Argument(help="Name of the study.")])
     with migrated_services() as services, services.database.read() as session:
         key, public_url = services.settings.key, services.settings.public_url
         for link in links_of(session, find_study(session, study)):
-            out.print(f"{link.kind},{link.label},{link_url(public_url, key, link)}")
+            out.print(f"{link.kind},{link.label},{link_url(public_url, key, link.public_id)}")

@@ -3,50 +3,59 @@
 import csv
 import io
 from datetime import timedelta
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Response
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
+from fastapi import APIRouter, Query, Response
+from sqlalchemy import select
 
 from server.accounts.audit import record
 from server.accounts.identity import Experimenter
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
-from server.models import Link, Study, StudyRun
-from server.studies.links import create_link, link_url, links_of
+from server.models import Link
+from server.studies.links import (
+    LinkOptions,
+    add_links,
+    link_url,
+    links_with_runs,
+    number_of_links,
+    numbered_labels,
+    page_of_links,
+    prepared_links,
+    runs_by_link,
+)
 from server.studies.lookup import find_study
-from server.studies.schemas import LinkOut, NewLinks
+from server.studies.schemas import LinkOut, LinkPage, NewLinks
 
 router = APIRouter(prefix="/api/admin/studies/{study}/links", tags=["links"], responses=ERROR_RESPONSES)
 
 
-def _out(services: Services, session: Session, study: Study) -> list[LinkOut]:
-    query = select(StudyRun.link_id, StudyRun.status, func.count()).where(StudyRun.study_id == study.id)
-    rows = session.execute(query.group_by(StudyRun.link_id, StudyRun.status))
-    counts = {(link, status): number for link, status, number in rows}
-    return [
-        LinkOut(
-            id=link.public_id,
-            kind=link.kind,
-            label=link.label,
-            url=link_url(services.settings.public_url, services.settings.key, link),
-            quota=link.quota,
-            expires_at=link.expires_at,
-            created_at=link.created_at,
-            runs=sum(n for (owner, _), n in counts.items() if owner == link.id),
-            complete=counts.get((link.id, "complete"), 0),
-            recruiter=link.recruiter,
-        )
-        for link in links_of(session, study)
-    ]
+Limit = Annotated[int, Query(ge=1, le=1000)]
+LINKS_READ_AT_ONCE = 1000
+
+
+def _link_out(services: Services, row: Link | dict[str, Any], runs: int = 0, complete: int = 0) -> LinkOut:
+    values = row if isinstance(row, dict) else vars(row)
+    own = {name: values[name] for name in ("kind", "label", "quota", "expires_at", "created_at", "recruiter")}
+    url = link_url(services.settings.public_url, services.settings.key, values["public_id"])
+    return LinkOut(id=values["public_id"], url=url, runs=runs, complete=complete, **own)
 
 
 @router.get("")
-def list_links(services: ServicesDep, _who: Experimenter, study: str) -> list[LinkOut]:
-    """The links of a study."""
+def list_links(
+    services: ServicesDep, _who: Experimenter, study: str, after: str | None = None, limit: Limit = 100
+) -> LinkPage:
+    """The links of a study in the order they were made, a page at a time: go on with `after` = `next`."""
     with services.database.read() as session:
-        return _out(services, session, find_study(session, study))
+        found = find_study(session, study)
+        links = page_of_links(session, found, after, limit + 1)
+        runs = runs_by_link(session, links[:limit])
+        return LinkPage(
+            links=[_link_out(services, link, *runs.get(link.id, (0, 0))) for link in links[:limit]],
+            total=number_of_links(session, found),
+            next=links[limit - 1].public_id if len(links) > limit else None,
+        )
 
 
 @router.post("", status_code=201)
@@ -54,39 +63,32 @@ def create_links(services: ServicesDep, who: Experimenter, study: str, body: New
     """Make a general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
     labels = [body.label]
     if body.kind == "personal":
-        labels = body.labels or [f"{body.label or 'P'}{number:03d}" for number in range(1, body.count + 1)]
+        labels = body.labels or numbered_labels(body.label, body.count)
+    options = LinkOptions(
+        body.kind,
+        quota=body.quota,
+        expires_at=now() + timedelta(days=body.days) if body.days else None,
+        recruiter=body.recruiter.model_dump() if body.recruiter else None,
+        created_by=who.account_id,
+    )
+    rows = prepared_links(services.settings.key, options, labels)
     with services.database.write() as session:
-        found = find_study(session, study)
-        made = [
-            create_link(
-                session,
-                services.settings.key,
-                found,
-                body.kind,
-                label=label,
-                quota=body.quota,
-                expires_at=now() + timedelta(days=body.days) if body.days else None,
-                recruiter=body.recruiter.model_dump() if body.recruiter else None,
-                created_by=who.account_id,
-            ).public_id
-            for label in labels
-        ]
-        record(session, who, "links made", "study", study, links=body.kind, number=len(made))
-        fresh = set(made)
-        return [link for link in _out(services, session, found) if link.id in fresh]
+        add_links(session, find_study(session, study), rows)
+        record(session, who, "links made", "study", study, links=body.kind, number=len(rows))
+    return [_link_out(services, row) for row in rows]
 
 
 @router.get("/personal.csv", response_class=Response)
 def download_personal_links(services: ServicesDep, _who: Experimenter, study: str) -> Response:
     """The personal links as CSV: label, link, runs, complete."""
-    with services.database.read() as session:
-        links = _out(services, session, find_study(session, study))
     stream = io.StringIO()
     writer = csv.writer(stream)
     writer.writerow(["label", "url", "runs", "complete"])
-    writer.writerows(
-        [link.label, link.url, link.runs, link.complete] for link in links if link.kind == "personal"
-    )
+    with services.database.read() as session:
+        found = find_study(session, study)
+        for link, runs, complete in links_with_runs(session, found, LINKS_READ_AT_ONCE, "personal"):
+            url = link_url(services.settings.public_url, services.settings.key, link.public_id)
+            writer.writerow([link.label, url, runs, complete])
     headers = {"content-disposition": f'attachment; filename="{study}-links.csv"'}
     return Response(stream.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)
 

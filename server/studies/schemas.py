@@ -174,6 +174,14 @@ class LinkOut(BaseModel):
     recruiter: dict[str, Any] | None
 
 
+class LinkPage(BaseModel):
+    """Links in the order they were made."""
+
+    links: list[LinkOut]
+    total: int
+    next: str | None = Field(description="Ask again with `after` = this; null at the end.")
+
+
 class VersionOut(BaseModel):
     """A version of a study."""
 

@@ -901,7 +901,7 @@ export interface paths {
         };
         /**
          * List Links
-         * @description The links of a study.
+         * @description The links of a study in the order they were made, a page at a time: go on with `after` = `next`.
          */
         get: operations["list_links"];
         put?: never;
@@ -1028,7 +1028,7 @@ export interface paths {
         };
         /**
          * List Runs
-         * @description Every run, the latest first.
+         * @description The runs, the latest first, a page at a time: go on with `before` = `next`.
          */
         get: operations["list_runs"];
         put?: never;
@@ -1919,6 +1919,21 @@ export interface components {
             } | null;
         };
         /**
+         * LinkPage
+         * @description Links in the order they were made.
+         */
+        LinkPage: {
+            /** Links */
+            links: components["schemas"]["LinkOut"][];
+            /** Total */
+            total: number;
+            /**
+             * Next
+             * @description Ask again with `after` = this; null at the end.
+             */
+            next: string | null;
+        };
+        /**
          * LinkState
          * @description Where a link leads, and whether it is open.
          */
@@ -2598,6 +2613,24 @@ export interface components {
             /** Response Times */
             response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
+        };
+        /**
+         * RunPage
+         * @description Runs, the latest first.
+         */
+        RunPage: {
+            /** Runs */
+            runs: components["schemas"]["RunSummary"][];
+            /**
+             * Total
+             * @description How many runs fit, on all pages.
+             */
+            total: number;
+            /**
+             * Next
+             * @description Ask again with `before` = this; null at the end.
+             */
+            next: string | null;
         };
         /**
          * RunStart
@@ -5382,7 +5415,10 @@ export interface operations {
     };
     list_links: {
         parameters: {
-            query?: never;
+            query?: {
+                after?: string | null;
+                limit?: number;
+            };
             header?: never;
             path: {
                 study: string;
@@ -5397,7 +5433,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["LinkOut"][];
+                    "application/json": components["schemas"]["LinkPage"];
                 };
             };
             /** @description The request's content is not acceptable */
@@ -5663,7 +5699,13 @@ export interface operations {
     };
     list_runs: {
         parameters: {
-            query?: never;
+            query?: {
+                show?: "everybody" | "complete" | "not_complete" | "excluded" | "synthetic";
+                /** @description Part of participant or run. */
+                search?: string;
+                before?: string | null;
+                limit?: number;
+            };
             header?: never;
             path: {
                 study: string;
@@ -5678,7 +5720,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["RunSummary"][];
+                    "application/json": components["schemas"]["RunPage"];
                 };
             };
             /** @description The request's content is not acceptable */

@@ -18,11 +18,11 @@ def test_exclusion_is_kept_with_its_reason_and_can_be_undone(
     participant.agree().rate_all()
     path = f"/studies/short/runs/{participant.run_id}/exclusion"
     assert experimenter.send("PUT", path, {"reason": "fell asleep"}).status_code == 204
-    [run] = experimenter.get("/studies/short/runs").json()
+    [run] = experimenter.get("/studies/short/runs").json()["runs"]
     assert (run["excluded"], run["exclusion_reason"]) == (True, "fell asleep")
     assert "fell asleep" in experimenter.get("/studies/short/data/ratings.csv").text
     assert experimenter.send("DELETE", path).status_code == 204
-    [run] = experimenter.get("/studies/short/runs").json()
+    [run] = experimenter.get("/studies/short/runs").json()["runs"]
     assert (run["excluded"], run["exclusion_reason"]) == (False, None)
 
 

@@ -230,7 +230,7 @@ def test_a_preview_stores_nothing_that_counts(experimenter: Admin, study: StudyI
     [link] = experimenter.send("POST", "/studies/short/links", {"kind": "preview"}).json()
     person = Participant(experimenter.client, link["url"].rpartition("/")[2])
     assert person.start().status_code == 201
-    assert experimenter.get("/studies/short/runs").json() == []
+    assert experimenter.get("/studies/short/runs").json() == {"runs": [], "total": 0, "next": None}
     assert experimenter.get("/studies/short").json()["summary"]["active"] == 0
 
 

@@ -1,60 +1,87 @@
 import { Anchor, Badge, Group, Select, Stack, TextInput } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
+import { useDebouncedValue } from "@mantine/hooks";
+import { keepPreviousData, useInfiniteQuery } from "@tanstack/react-query";
 import { Link, useParams } from "@tanstack/react-router";
 import { useState } from "react";
+import type { paths } from "../../api/schema";
 import { api, type Schemas, unwrap } from "../api";
-import { Answer } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
+import { PagedAnswer } from "../ui/PagedAnswer";
 
 type Run = Schemas["RunSummary"];
+type Asked = NonNullable<paths["/api/admin/studies/{study}/runs"]["get"]["parameters"]["query"]>;
+type Show = NonNullable<Asked["show"]>;
+
+const SHOW: { value: Show; label: string }[] = [
+  { value: "everybody", label: "everybody" },
+  { value: "complete", label: "complete" },
+  { value: "not_complete", label: "not complete" },
+  { value: "excluded", label: "excluded" },
+  { value: "synthetic", label: "synthetic" },
+];
+/** So long after the last key the server is asked. */
+const TYPING_MS = 250;
 
 export function ParticipantsTab() {
   const { study = "" } = useParams({ strict: false });
-  const runs = useQuery({
-    queryKey: ["runs", study],
-    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/runs", { params: { path: { study } } })),
+  const [search, setSearch] = useState("");
+  const [show, setShow] = useState<Show>("everybody");
+  const [sought] = useDebouncedValue(search.trim(), TYPING_MS);
+  const chosen = sought !== "" || show !== "everybody";
+  const runs = useInfiniteQuery({
+    queryKey: ["runs", study, show, sought],
+    queryFn: ({ pageParam }) =>
+      unwrap(
+        api.GET("/api/admin/studies/{study}/runs", {
+          params: { path: { study }, query: { show, search: sought, before: pageParam } },
+        }),
+      ),
+    initialPageParam: null as string | null,
+    getNextPageParam: (last) => last.next,
+    placeholderData: keepPreviousData,
   });
-  return <Answer of={runs}>{(rows) => <Runs study={study} rows={rows} />}</Answer>;
-}
-
-const SHOW: Record<string, (run: Run) => boolean> = {
-  everybody: () => true,
-  complete: (run) => run.status === "complete",
-  "not complete": (run) => run.status !== "complete",
-  excluded: (run) => run.excluded,
-  synthetic: (run) => run.synthetic,
-};
-
-function Runs({ study, rows }: { study: string; rows: Run[] }) {
-  const [sought, setSought] = useState("");
-  const [show, setShow] = useState("everybody");
-  const chosen = rows.filter(
-    (run) => SHOW[show]?.(run) === true && `${run.participant} ${run.run}`.toLowerCase().includes(sought.toLowerCase()),
-  );
+  const rows = runs.data?.pages.flatMap((page) => page.runs) ?? [];
+  const total = runs.data?.pages.at(-1)?.total ?? 0;
   return (
     <Stack>
-      {rows.length > 0 && (
+      {(rows.length > 0 || chosen) && (
         <Group align="end">
-          <TextInput label="Find" placeholder="participant" value={sought} onChange={(event) => setSought(event.currentTarget.value)} />
-          <Select label="Show" data={Object.keys(SHOW)} value={show} allowDeselect={false} onChange={(word) => setShow(word ?? "everybody")} w={160} />
+          <TextInput label="Find" placeholder="participant" value={search} onChange={(event) => setSearch(event.currentTarget.value)} />
+          <Select
+            label="Show"
+            data={SHOW}
+            value={show}
+            allowDeselect={false}
+            onChange={(word) => setShow(SHOW.find(({ value }) => value === word)?.value ?? "everybody")}
+            w={160}
+          />
         </Group>
       )}
-      <DataTable
-        rows={chosen}
-        rowKey={(run) => run.run}
-        empty={rows.length === 0 ? "Nobody has begun yet." : "Nobody fits."}
-        columns={[
-          { title: "Participant", wrap: true, cell: (run) => <Who study={study} run={run} /> },
-          { title: "Status", cell: (run) => (run.erased_at !== null ? "erased" : run.status.replace("_", " ")) },
-          { title: "Answered", number: true, cell: (run) => `${run.answered} of ${run.trials}` },
-          { title: "Plays not good", number: true, wide: true, cell: (run) => run.not_good },
-          { title: "Began", wide: true, cell: (run) => when(run.started_at) },
-          { title: "Minutes", number: true, wide: true, cell: (run) => run.minutes.toFixed(1) },
-          { title: "Version", number: true, wide: true, cell: (run) => run.version },
-        ]}
-      />
+      <PagedAnswer of={runs} shown={rows.length} total={total} more="Earlier participants">
+        <RunsTable study={study} rows={rows} empty={chosen ? "Nobody fits." : "Nobody has begun yet."} />
+      </PagedAnswer>
     </Stack>
+  );
+}
+
+function RunsTable({ study, rows, empty }: { study: string; rows: Run[]; empty: string }) {
+  return (
+    <DataTable
+      rows={rows}
+      rowKey={(run) => run.run}
+      empty={empty}
+      paged={false}
+      columns={[
+        { title: "Participant", wrap: true, cell: (run) => <Who study={study} run={run} /> },
+        { title: "Status", cell: (run) => (run.erased_at !== null ? "erased" : run.status.replace("_", " ")) },
+        { title: "Answered", number: true, cell: (run) => `${run.answered} of ${run.trials}` },
+        { title: "Plays not good", number: true, wide: true, cell: (run) => run.not_good },
+        { title: "Began", wide: true, cell: (run) => when(run.started_at) },
+        { title: "Minutes", number: true, wide: true, cell: (run) => run.minutes.toFixed(1) },
+        { title: "Version", number: true, wide: true, cell: (run) => run.version },
+      ]}
+    />
   );
 }
 

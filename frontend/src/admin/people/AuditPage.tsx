@@ -1,9 +1,9 @@
-import { Button, Center, Loader, Stack, Text, Title } from "@mantine/core";
+import { Stack, Text, Title } from "@mantine/core";
 import { useInfiniteQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
-import { ErrorAlert } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { when, words } from "../ui/format";
+import { PagedAnswer } from "../ui/PagedAnswer";
 
 const A_PAGE = 50;
 
@@ -15,6 +15,7 @@ export function AuditPage() {
     initialPageParam: null as number | null,
     getNextPageParam: (last) => (last.length === A_PAGE ? (last.at(-1)?.id ?? null) : null),
   });
+  const rows = log.data?.pages.flat() ?? [];
   return (
     <Stack>
       <div>
@@ -23,15 +24,9 @@ export function AuditPage() {
           Every change that an account or the command line made, latest first.
         </Text>
       </div>
-      {log.error !== null && <ErrorAlert error={log.error} retry={() => void log.refetch()} />}
-      {log.isPending && (
-        <Center py="xl">
-          <Loader aria-label="Loading" />
-        </Center>
-      )}
-      {log.data !== undefined && (
+      <PagedAnswer of={log} shown={rows.length} more="Earlier entries">
         <DataTable
-          rows={log.data.pages.flat()}
+          rows={rows}
           rowKey={(row) => row.id}
           empty="Nothing yet."
           paged={false}
@@ -42,12 +37,7 @@ export function AuditPage() {
             { title: "Details", wrap: true, wide: true, cell: (row) => detailWords(row.details) },
           ]}
         />
-      )}
-      {log.hasNextPage && (
-        <Button variant="default" style={{ alignSelf: "flex-start" }} loading={log.isFetchingNextPage} onClick={() => void log.fetchNextPage()}>
-          Earlier entries
-        </Button>
-      )}
+      </PagedAnswer>
     </Stack>
   );
 }

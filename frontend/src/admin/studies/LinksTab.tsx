@@ -1,24 +1,29 @@
 import { Button, CopyButton, Group, Stack, Text } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
+import { useInfiniteQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { api, type Schemas, unwrap } from "../api";
-import { Answer } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
+import { PagedAnswer } from "../ui/PagedAnswer";
 import { useChange } from "../ui/useChange";
 import { NewLinks } from "./NewLinks";
 
 export function LinksTab() {
   const { study = "" } = useParams({ strict: false });
-  const path = { params: { path: { study } } };
-  const links = useQuery({
+  const links = useInfiniteQuery({
     queryKey: ["links", study],
-    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/links", path)),
+    queryFn: ({ pageParam }) =>
+      unwrap(api.GET("/api/admin/studies/{study}/links", { params: { path: { study }, query: { after: pageParam } } })),
+    initialPageParam: null as string | null,
+    getNextPageParam: (last) => last.next,
   });
+  const rows = links.data?.pages.flatMap((page) => page.links) ?? [];
   return (
     <Stack>
       <NewLinks study={study} />
-      <Answer of={links}>{(rows) => <LinkTable study={study} rows={rows} />}</Answer>
+      <PagedAnswer of={links} shown={rows.length} total={links.data?.pages.at(-1)?.total} more="More links">
+        <LinkTable study={study} rows={rows} />
+      </PagedAnswer>
       <Button
         component="a"
         variant="default"
@@ -43,6 +48,7 @@ function LinkTable({ study, rows }: { study: string; rows: Schemas["LinkOut"][] 
       rows={rows}
       rowKey={(row) => row.id}
       empty="No links yet."
+      paged={false}
       columns={[
         { title: "Link", cell: (row) => <Address url={row.url} /> },
         { title: "For", wrap: true, cell: (row) => row.label || "–" },
