@@ -1,0 +1,124 @@
+"""What the engine needs to know of a person and a state, with defaults that each name their source."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any, Literal
+
+from blink_engine.events import EVENT_KINDS, EventKind, Response
+from blink_engine.laws import Law
+
+StateName = Literal["rest", "reading", "screen", "speaking", "listening"]
+STATE_NAMES: tuple[StateName, ...] = ("rest", "reading", "screen", "speaking", "listening")
+
+
+@dataclass(frozen=True)
+class ProfileModel:
+    """How single blinks look.
+
+    Attributes
+    ----------
+    closing_s, opening_s, closed_s, long_closed_s : Law
+        Durations in s; `closed_s` for complete blinks, `long_closed_s` for long ones; partial ones have none.
+    closing_power, opening_power : float
+        p and q of `BlinkShape`.
+    complete_share, long_share, double_share : float
+        Shares of the blinks in which the lids meet, stay closed for long, or close a second time at once.
+    partial_logit_median, partial_logit_spread : float
+        Peak closure a of a partial blink: log(a / (1 - a)) is normal.
+    asymmetry : float
+        Standard deviation of the difference between the eyes' peak closures.
+    delay_s : float
+        Standard deviation of the right eye's onset against the left's, in s.
+    lower_up, lower_in : float
+        How far the lower lid goes at full closure, as a share of its full vertical and horizontal travel.
+    """
+
+    closing_s: Law
+    opening_s: Law
+    closed_s: Law
+    long_closed_s: Law
+    closing_power: float
+    opening_power: float
+    complete_share: float
+    long_share: float
+    double_share: float
+    partial_logit_median: float
+    partial_logit_spread: float
+    asymmetry: float
+    delay_s: float
+    lower_up: float
+    lower_in: float
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Everything the engine draws by.
+
+    Attributes
+    ----------
+    intervals : mapping of state to Law
+        Onset to onset, in s.
+    responses : mapping of event kind to Response
+    profile : ProfileModel
+    least_interval_s : float
+        No blink begins sooner after the one before, in s.
+    gaze_closure_per_deg : float
+        How much of the opening the lid covers per degree of downward gaze.
+    squint_closure : float
+        How much of the opening a full squint covers from above; the lower lid then is raised fully.
+    """
+
+    intervals: Mapping[StateName, Law]
+    responses: Mapping[EventKind, Response]
+    profile: ProfileModel
+    least_interval_s: float
+    gaze_closure_per_deg: float
+    squint_closure: float
+    sources: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+    def with_rate(self, state: StateName, per_minute: float) -> "Parameters":
+        """Return the same with another mean blink rate in one state.
+
+        Raises
+        ------
+        ValueError
+            Where the rate is not between 0.1 and 60 a minute.
+        """
+        if not 0.1 <= per_minute <= 60.0:
+            raise ValueError(f"expected a blink rate of 0.1 to 60 a minute, got {per_minute}")
+        intervals = {**self.intervals, state: self.intervals[state].with_mean(60.0 / per_minute)}
+        return Parameters(**{**_own(self), "intervals": intervals})
+
+    def with_profile(self, **changes: Any) -> "Parameters":
+        """Return the same with some values of the profile model changed."""
+        profile = ProfileModel(**{**_own(self.profile), **changes})
+        return Parameters(**{**_own(self), "profile": profile})
+
+
+def _own(instance: Any) -> dict[str, Any]:
+    return {one.name: getattr(instance, one.name) for one in fields(instance)}
+
+
+@lru_cache(maxsize=1)
+def default_parameters() -> Parameters:
+    """Return the shipped defaults (`defaults.json`, written by `tools/fit_blink_engine.py`)."""
+    return from_json(json.loads(files("blink_engine").joinpath("defaults.json").read_text(encoding="utf-8")))
+
+
+def from_json(data: Mapping[str, Any]) -> Parameters:
+    """Read parameters as `defaults.json` and the TypeScript engine write them."""
+    profile: dict[str, Any] = {
+        name: Law(**value) if isinstance(value, Mapping) else value for name, value in data["profile"].items()
+    }
+    return Parameters(
+        intervals={state: Law(**data["intervals"][state]) for state in STATE_NAMES},
+        responses={kind: Response(**data["responses"][kind]) for kind in EVENT_KINDS},
+        profile=ProfileModel(**profile),
+        least_interval_s=data["least_interval_s"],
+        gaze_closure_per_deg=data["gaze_closure_per_deg"],
+        squint_closure=data["squint_closure"],
+        sources=data["sources"],
+    )

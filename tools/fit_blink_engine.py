@@ -1,0 +1,211 @@
+"""Fit the blink engine's defaults and write blink_engine/defaults.json, or print how well they fit.
+
+    python tools/fit_blink_engine.py --data FOLDER [--write]
+
+FOLDER holds blink_series/blinking_full_blinking.xlsx (JeFaPaTo's test files, MIT): the blink table of a
+20-minute recording. Its first half is fitted, its second half tested. The courses of single blinks are fitted
+to the profiles that ship with Palpebra.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy import optimize, stats
+
+from blink_engine.profile import BlinkShape
+from stimuli_builder.blinks.library import load_library
+
+ROOT = Path(__file__).resolve().parent.parent
+DEFAULTS = ROOT / "blink_engine" / "defaults.json"
+RECORDING_FPS, PROFILE_FPS = 240.0, 300.0
+COMPLETE_FROM = 0.95
+Array = npt.NDArray[np.float64]
+
+BENTIVOGLIO = "Bentivoglio et al. 1997, Movement Disorders 12(6), 1028-1034: means of 150 healthy people"
+TSUBOTA = "Tsubota & Nakamori 1993, New England Journal of Medicine 328(8), 584: mean at a display terminal"
+RATES_PER_MINUTE = {"rest": 17.0, "reading": 4.5, "screen": 7.0, "speaking": 26.0, "listening": 17.0}
+RECORDED = "blink table of a 20-minute recording (JeFaPaTo test files, MIT)"
+SHIPPED = "the 21 one-eye profiles that ship with Palpebra (stimuli_builder/blinks/library)"
+SOURCES = {
+    "intervals.rest": f"mean: {BENTIVOGLIO}, 17 a minute; spread: first half of the {RECORDED}",
+    "intervals.reading": f"mean: {BENTIVOGLIO}, 4.5 a minute; spread as at rest",
+    "intervals.speaking": f"mean: {BENTIVOGLIO}, 26 a minute; spread as at rest",
+    "intervals.screen": f"mean: {TSUBOTA}, 7 a minute; spread as at rest",
+    "intervals.listening": "no agreed figure; the rate at rest is taken",
+    "profile": f"fitted to {SHIPPED}",
+    "profile.delay_s": f"between the eyes' apexes in the {RECORDED}, half the range of its middle 68%",
+    "profile.asymmetry": f"between the eyes' peak closures of one blink, {SHIPPED}",
+    "profile.complete_share": f"share of peak closures from 0.95 on, {SHIPPED}",
+    "profile.long_closed_s": "so that a long blink lasts 607 ms in the median, as Hoemke, Holler & Levinson "
+    "2018, PLoS ONE 13(12), e0208030, showed them; none come unless asked for: Oetringer 2021 did not find "
+    "their effect on a robot",
+    "profile.double_share": "0: the intervals as recorded hold double blinks already (4% below 0.7 s)",
+    "responses.gaze_shift": "Evinger et al. 1994, Experimental Brain Research 100(2), 337-344: 97% of shifts "
+    "above 33 degrees, beginning with the movement; the midpoint at 17 degrees is where their head turns "
+    "began to be answered always with the eyes closed",
+    "responses.speech": "Ford, Bugmann & Culverhouse 2013, International Journal of Humanoid Robotics 10(1), "
+    "1350006: 71% of blinks within 375 ms of communicative events (23% by chance)",
+    "gaze_closure_per_deg": "chosen: the opening narrows to about half at 30 degrees down",
+    "squint_closure": "chosen",
+}
+
+
+def intervals_of(data: Path, eye: str = "left") -> Array:
+    """Return the intervals between blinks in s."""
+    apexes = _recording(data, eye)
+    return np.asarray(np.diff(apexes) / RECORDING_FPS)
+
+
+def _recording(data: Path, eye: str) -> Array:
+    table = pd.read_excel(data / "blink_series/blinking_full_blinking.xlsx", sheet_name=f"blinking {eye} eye")
+    return table["apex_frame"].to_numpy(dtype=np.float64)
+
+
+def delay_between_eyes(data: Path) -> float:
+    """Half the range of the middle 68% of right minus left apex in s, over blinks within 50 ms."""
+    left, right = _recording(data, "left"), _recording(data, "right")
+    nearest = right[np.abs(right[None, :] - left[:, None]).argmin(axis=1)]
+    delays = (nearest - left)[np.abs(nearest - left) <= 0.05 * RECORDING_FPS] / RECORDING_FPS
+    low, high = np.percentile(delays, [16, 84])
+    return float(high - low) / 2
+
+
+def fitted_shapes() -> tuple[Array, Array]:
+    """(21, 5) closing, closed, opening time and both powers of each shipped profile; residuals (21,)."""
+    rows, residuals = [], []
+    for profile in load_library():
+        course = np.clip(profile.closure, 0.0, None) / profile.amplitude
+        fit = _fit_course(course, float(np.argmax(course)) / PROFILE_FPS)
+        rows.append(fit.x[1:])
+        residuals.append(float(np.sqrt(2 * fit.cost / course.size)))
+    return np.array(rows), np.array(residuals)
+
+
+def _fit_course(course: Array, peak_s: float) -> Any:
+    time = np.arange(course.size) / PROFILE_FPS
+
+    def residual(values: Array) -> Array:
+        onset, *shape = values
+        return BlinkShape(*shape).course(time - onset) - course
+
+    bounds = ([-0.3, 0.02, 0.0, 0.04, 0.5, 0.4], [0.4, 0.4, 0.3, 0.8, 2.0, 1.2])
+    starts = [[max(0.0, peak_s - closing), closing, 0.01, 0.2, 1.0, 0.6] for closing in (0.06, 0.1, 0.15)]
+    fits = [optimize.least_squares(residual, start, bounds=bounds) for start in starts]
+    return min(fits, key=lambda fit: fit.cost)
+
+
+def profile_defaults(data: Path) -> dict[str, Any]:
+    """Return the profile model's defaults."""
+    shapes, _ = fitted_shapes()
+    closing, closed, opening, closing_power, opening_power = shapes.T
+    peaks = np.array([profile.amplitude for profile in load_library()])
+    partial = peaks[peaks < COMPLETE_FROM]
+    logits = np.log(partial / (1 - partial))
+    held = closed[(peaks >= COMPLETE_FROM) & (closed > 0.002)]
+    pairs = [p.closure_other for p in load_library(paired=True)]
+    asymmetry = np.std(
+        [
+            p.amplitude - float(np.max(o))
+            for p, o in zip(load_library(paired=True), pairs, strict=True)
+            if o is not None
+        ]
+    )
+    return {
+        "closing_s": _lognormal(closing),
+        "opening_s": _lognormal(opening),
+        "closed_s": _lognormal(held),
+        "long_closed_s": {"kind": "lognormal", "median": 0.29, "spread": 0.2},
+        "closing_power": round(float(np.median(closing_power)), 3),
+        "opening_power": round(float(np.median(opening_power)), 3),
+        "complete_share": round(float(np.mean(peaks >= COMPLETE_FROM)), 3),
+        "long_share": 0.0,
+        "double_share": 0.0,
+        "partial_logit_median": round(float(np.median(logits)), 3),
+        "partial_logit_spread": round(float(np.std(logits, ddof=1)), 3),
+        "asymmetry": round(float(asymmetry), 3),
+        "delay_s": round(delay_between_eyes(data), 4),
+        "lower_up": 1.0,
+        "lower_in": 1.0,
+    }
+
+
+def _lognormal(values: Array) -> dict[str, Any]:
+    logs = np.log(values)
+    return {
+        "kind": "lognormal",
+        "median": round(float(np.exp(np.median(logs))), 4),
+        "spread": round(float(np.std(logs, ddof=1)), 3),
+    }
+
+
+def defaults(data: Path) -> dict[str, Any]:
+    """Return what defaults.json holds."""
+    intervals = intervals_of(data)
+    spread = round(float(np.std(np.log(intervals[: intervals.size // 2]), ddof=1)), 3)
+    laws = {
+        state: {
+            "kind": "lognormal",
+            "median": round(60.0 / rate / float(np.exp(spread**2 / 2)), 4),
+            "spread": spread,
+        }
+        for state, rate in RATES_PER_MINUTE.items()
+    }
+    speech = {"utterance_start": 0.35, "utterance_end": 0.6, "pause": 0.5, "turn_end": 0.7}
+    responses = {
+        kind: {"probability": chance, "earliest_s": 0.0, "latest_s": 0.375} for kind, chance in speech.items()
+    }
+    movement = {
+        "probability": 0.0,
+        "earliest_s": 0.0,
+        "latest_s": 0.05,
+        "midpoint_deg": 17.0,
+        "slope_deg": 4.6,
+    }
+    responses |= {"gaze_shift": movement, "head_turn": movement}
+    responses["blink"] = {"probability": 1.0, "earliest_s": 0.0, "latest_s": 0.0}
+    return {
+        "intervals": laws,
+        "responses": responses,
+        "profile": profile_defaults(data),
+        "least_interval_s": 0.22,
+        "gaze_closure_per_deg": 0.016,
+        "squint_closure": 0.35,
+        "sources": SOURCES,
+    }
+
+
+def report(data: Path) -> None:
+    """Print the fit, and how the half that was not fitted agrees."""
+    intervals = intervals_of(data)
+    half = intervals.size // 2
+    logs = np.log(intervals)
+    law = stats.norm(np.mean(logs[:half]), np.std(logs[:half], ddof=1))
+    spread_only = stats.norm(np.mean(logs[half:]), np.std(logs[:half], ddof=1))
+    print(
+        f"intervals: {intervals.size}, first half median {np.exp(law.mean()):.2f} s, log SD {law.std():.3f}"
+    )
+    print(f"second half under the first half's law: KS p {stats.kstest(logs[half:], law.cdf).pvalue:.3f}")
+    print(
+        "second half, its own median, first half's spread: KS p "
+        f"{stats.kstest(logs[half:], spread_only.cdf).pvalue:.3f}"
+    )
+    _, residuals = fitted_shapes()
+    print(f"courses: residual median {np.median(residuals):.3f}, greatest {residuals.max():.3f} of the way")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--write", action="store_true")
+    chosen = parser.parse_args()
+    report(chosen.data)
+    if chosen.write:
+        DEFAULTS.write_text(json.dumps(defaults(chosen.data), indent=2) + "\n", encoding="utf-8")
+        print(f"wrote {DEFAULTS.name}")
