@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test check setup setup-test lock format types bench load audit screenshots docs api clean
+.PHONY: help run test check setup setup-test lock format types bench scope load audit screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -57,6 +57,10 @@ screenshots: setup-test ## make the pictures of README and docs anew (needs the 
 	@$(BIN)/python tools/screenshots.py
 	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
 	@$(BIN)/python tools/screenshots_admin.py
+
+PLAYS ?= 200
+scope: setup-test ## what reaches a virtual screen against what is recorded (hours; PLAYS=20 SCOPE="--rates 30 --conditions idle")
+	@$(BIN)/python -m tools.scope --plays $(PLAYS) $(SCOPE)
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python tools/load.py $(LOAD)

@@ -4,7 +4,7 @@ Only the standard library, because it runs before anything is installed. Each st
 hash of what it was made from, so that a later run repeats only what has changed.
 
     python3 tools/setup.py run      what `make run` needs
-    python3 tools/setup.py test     what `make test` needs too: test packages, npm packages, Chromium, Firefox
+    python3 tools/setup.py test     what `make test` needs too: test and npm packages, Chromium, Firefox, Xvfb
 """
 
 from __future__ import annotations
@@ -131,6 +131,9 @@ BROWSERS = {
     "firefox-esr": ("firefox-esr", "firefox"),
     # Firefox decodes H.264 with the system's libavcodec, which its package only recommends.
     "libavcodec-extra": ("libavcodec.so",),
+    # The bench of what reaches the screen: a display whose frame buffer can be read, and its keyboard.
+    "xvfb": ("Xvfb",),
+    "libxtst6": ("libXtst.so",),
 }
 
 
