@@ -92,3 +92,6 @@ class Browser:
             self._process.wait(timeout=15)
         except subprocess.TimeoutExpired:
             self._process.kill()
+            self._process.wait()
+        if self._process.stdout:
+            self._process.stdout.close()
