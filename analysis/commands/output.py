@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 if TYPE_CHECKING:
     from analysis.report.formats import Table
@@ -36,6 +35,8 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool) -> No
 @contextmanager
 def working(what: str) -> Iterator[None]:
     """A spinner on a terminal, silence elsewhere."""
+    from rich.console import Console
+
     console = Console(stderr=True)
     if console.is_terminal:
         with console.status(what):

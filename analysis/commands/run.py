@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from experiments.errors import InputError
 
@@ -144,8 +143,8 @@ def anova(
 def show(analysis: "Analysis") -> None:
     """Print who was left out and the tables, at most 80 columns wide."""
     from analysis.report.formats import as_text, wrap
+    from analysis.report.left_out import left_out
     from analysis.report.tables import all_tables
-    from analysis.report.write import left_out
 
     lines = [analysis.title, f"{analysis.n_participants} participants, from {analysis.source}"]
     if analysis.synthetic:
@@ -176,6 +175,8 @@ def _scale(text: str | None) -> tuple[float, float] | None:
 @contextmanager
 def _working(what: str) -> Iterator[Callable[[str], None]]:
     """A spinner on a terminal, silence elsewhere; gives a function that says which step is being taken."""
+    from rich.console import Console
+
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda _: None

@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from analysis.plans.exclusions import Exclusions
 from analysis.within.anova import AnovaResult, within_anova
 from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.marginal_means import MarginalMean, marginal_means
 from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of
-from experiments.definition import Experiment
+
+if TYPE_CHECKING:
+    from analysis.plans.exclusions import Exclusions
+    from experiments.definition import Experiment
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,8 @@ class Analysis:
     pairs: tuple[Pair, ...]
     decisions: tuple[str, ...]
     labels: Labels = Labels()
-    experiment: Experiment | None = None
-    exclusions: Exclusions | None = None
+    experiment: "Experiment | None" = None
+    exclusions: "Exclusions | None" = None
 
     @property
     def n_participants(self) -> int:
@@ -69,8 +72,8 @@ def analyse_cells(
     two_factor_pairs: bool = False,
     decisions: tuple[str, ...] = (),
     labels: Labels | None = None,
-    experiment: Experiment | None = None,
-    exclusions: Exclusions | None = None,
+    experiment: "Experiment | None" = None,
+    exclusions: "Exclusions | None" = None,
 ) -> Analysis:
     """Run every test on a table of cell means."""
     anova = within_anova(cells.y, cells.factors, cells.levels)

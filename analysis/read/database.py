@@ -13,28 +13,13 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
 from analysis.errors import NoRatingsError
+from analysis.read.run_columns import RUN_FLAGS, RUN_TEXTS
 from analysis.read.text_table import categorical
-from experiments.columns import RATINGS, names_of
 from experiments.errors import InputError
 
 PORTION = 20_000
 KINDS = ("main", "attention")
 """Practice trials are never fetched: nobody analyses them."""
-
-_OF_A_RUN = RATINGS.pick(
-    "study",
-    "experiment",
-    "definition_sha256",
-    "phase",
-    "participant",
-    "run_status",
-    "exclusion_reason",
-    "synthetic",
-    "excluded",
-)
-RUN_TEXTS = names_of(_OF_A_RUN, "text")
-RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
-"""Columns that are the same for all rows of a run."""
 
 
 def default_url() -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.errors import NoRatingsError
-from analysis.read.database import RUN_FLAGS, RUN_TEXTS, RatingsQuery
+from analysis.read.run_columns import RUN_FLAGS, RUN_TEXTS
 from analysis.read.text_table import numbers, read_text_table
 from experiments.columns import RATINGS, names_of
 from experiments.definition import Experiment
@@ -82,6 +82,9 @@ def load_database(
     InputError
         A URL that cannot be used, or several studies and no `study` to choose one.
     """
+    # SQLAlchemy takes as long to import as numpy, and a CSV needs none of it
+    from analysis.read.database import RatingsQuery
+
     query = RatingsQuery(url, experiment.name, study)
     try:
         numbers = (*ROW_NUMBERS, "exemplar") if exemplars else ROW_NUMBERS

@@ -1,12 +1,14 @@
 """An analysis as JSON: the keys that `analysis anova --json` promises."""
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analysis.files import json_text
-from analysis.plans.exclusions import Exclusions
 from analysis.plans.result import Analysis
 from analysis.within.effect_tests import Effect
+
+if TYPE_CHECKING:
+    from analysis.plans.exclusions import Exclusions
 
 
 def as_json(analysis: Analysis) -> str:
@@ -67,7 +69,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
     }
 
 
-def _exclusions(exclusions: Exclusions) -> dict[str, Any]:
+def _exclusions(exclusions: "Exclusions") -> dict[str, Any]:
     return {
         "runs": [asdict(run) for run in exclusions.runs],
         "trials": [asdict(dropped) for dropped in exclusions.trials],

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from analysis.files import whole_file
-from analysis.plans.exclusions import Exclusions
 from analysis.plans.result import Analysis
 from analysis.report.formats import Table, as_latex, as_markdown
 from analysis.report.json_output import as_json
+from analysis.report.left_out import left_out
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables
 from experiments.errors import InputError
@@ -107,6 +105,9 @@ def _latex(analysis: Analysis, tables: tuple[Table, ...]) -> str:
 def _render(
     template: str, analysis: Analysis, pictures: tuple[Picture, ...], sections: tuple[Section, ...]
 ) -> str:
+    # as with matplotlib: commands that only print tables need not pay for the import
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     environment = Environment(
         loader=PackageLoader("analysis", "report/templates"),
         autoescape=template.endswith(".html.j2"),
@@ -128,20 +129,3 @@ def _render(
         methods=METHODS,
         version=version("palpebra"),
     )
-
-
-def left_out(exclusions: Exclusions) -> tuple[str, ...]:
-    """Who and what was left out and why, a line each; a line that says so where nothing was."""
-    lines = [
-        f"participant {run.participant}{f' (run {run.run})' if run.run != run.participant else ''} excluded: "
-        f"{'; '.join(run.reasons)}"
-        for run in exclusions.runs
-    ]
-    lines += [
-        f"{d.trials} trials of {d.participants} participants dropped: {d.rule}" for d in exclusions.trials
-    ]
-    lines += [f"set aside: {aside}" for aside in exclusions.set_aside]
-    lines += [f"rule not applied: {reason}" for reason in exclusions.not_applied]
-    if not exclusions.runs and not exclusions.trials:
-        lines.insert(0, f"no participant and no trial excluded (of {exclusions.n_runs} participants)")
-    return tuple(lines)

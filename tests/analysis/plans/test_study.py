@@ -7,7 +7,7 @@ from analysis.errors import NoRatingsError
 from analysis.plans.study import analyse_study
 from analysis.read.study_ratings import load_csv, load_database
 from analysis.report.json_output import as_data
-from analysis.report.write import left_out
+from analysis.report.left_out import left_out
 from experiments import rules
 from experiments.errors import InputError
 from experiments.load import load_experiment

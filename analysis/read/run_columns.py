@@ -1,0 +1,18 @@
+"""Columns of a study's ratings that hold one value for a whole run."""
+
+from experiments.columns import RATINGS, names_of
+
+_OF_A_RUN = RATINGS.pick(
+    "study",
+    "experiment",
+    "definition_sha256",
+    "phase",
+    "participant",
+    "run_status",
+    "exclusion_reason",
+    "synthetic",
+    "excluded",
+)
+RUN_TEXTS = names_of(_OF_A_RUN, "text")
+RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
+"""Columns that are the same for all rows of a run."""
