@@ -10,7 +10,8 @@ const repository = fileURLToPath(new URL("../../", import.meta.url));
 const target = fileURLToPath(new URL("../src/api/schema.d.ts", import.meta.url));
 const own = ["bin/python", "Scripts/python.exe"].map((name) => join(repository, ".venv", name)).find(existsSync);
 const data = mkdtempSync(join(tmpdir(), "openapi-"));
-const program = "import json; from server.app import create_app; from server.settings import Settings; print(json.dumps(create_app(Settings()).openapi()))";
+const program =
+  "import json; from server.app import create_app; from server.settings import Settings; print(json.dumps(create_app(Settings()).openapi()))";
 
 try {
   const env = { ...process.env, PALPEBRA_DATA_FOLDER: data };

@@ -23,21 +23,14 @@ function onRefusal(error: Error): void {
 const queries = new QueryClient({
   queryCache: new QueryCache({ onError: onRefusal }),
   mutationCache: new MutationCache({ onError: onRefusal }),
-  defaultOptions: {
-    queries: { staleTime: 5_000, retry: (times, error) => !(error instanceof Refused) && times < 2 },
-  },
+  defaultOptions: { queries: { staleTime: 5_000, retry: (times, error) => !(error instanceof Refused) && times < 2 } },
 });
 
 const root = document.getElementById("root");
 if (root !== null) {
   createRoot(root).render(
     <StrictMode>
-      <MantineProvider
-        theme={theme}
-        cssVariablesResolver={readable}
-        defaultColorScheme="auto"
-        getStyleNonce={styleNonce}
-      >
+      <MantineProvider theme={theme} cssVariablesResolver={readable} defaultColorScheme="auto" getStyleNonce={styleNonce}>
         <QueryClientProvider client={queries}>
           <Notifications position="top-right" />
           <RouterProvider router={router} />

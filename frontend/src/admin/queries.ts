@@ -9,10 +9,7 @@ export const sessionQuery = queryOptions({
   staleTime: 30_000,
 });
 
-export const studiesQuery = queryOptions({
-  queryKey: ["studies"],
-  queryFn: () => unwrap(api.GET("/api/admin/studies")),
-});
+export const studiesQuery = queryOptions({ queryKey: ["studies"], queryFn: () => unwrap(api.GET("/api/admin/studies")) });
 
 export const studyQuery = (study: string) =>
   queryOptions({

@@ -20,11 +20,7 @@ const invitation = createRoute({
 
 const inside = createRoute({ getParentRoute: () => root, id: "inside", component: Shell });
 const page = { getParentRoute: () => inside };
-const studies = createRoute({
-  ...page,
-  path: "/",
-  component: lazyRouteComponent(() => import("./studies/StudiesPage"), "StudiesPage"),
-});
+const studies = createRoute({ ...page, path: "/", component: lazyRouteComponent(() => import("./studies/StudiesPage"), "StudiesPage") });
 const create = createRoute({
   ...page,
   path: "/studies/new",
@@ -35,16 +31,8 @@ const account = createRoute({
   path: "/account",
   component: lazyRouteComponent(() => import("./account/AccountPage"), "AccountPage"),
 });
-const people = createRoute({
-  ...page,
-  path: "/people",
-  component: lazyRouteComponent(() => import("./people/PeoplePage"), "PeoplePage"),
-});
-const audit = createRoute({
-  ...page,
-  path: "/audit",
-  component: lazyRouteComponent(() => import("./people/AuditPage"), "AuditPage"),
-});
+const people = createRoute({ ...page, path: "/people", component: lazyRouteComponent(() => import("./people/PeoplePage"), "PeoplePage") });
+const audit = createRoute({ ...page, path: "/audit", component: lazyRouteComponent(() => import("./people/AuditPage"), "AuditPage") });
 const figures = createRoute({
   ...page,
   path: "/blinks",
@@ -69,41 +57,13 @@ const study = createRoute({
 });
 const tab = { getParentRoute: () => study };
 const tabs = [
-  createRoute({
-    ...tab,
-    path: "/",
-    component: lazyRouteComponent(() => import("./studies/DesignTab"), "DesignTab"),
-  }),
-  createRoute({
-    ...tab,
-    path: "/texts",
-    component: lazyRouteComponent(() => import("./studies/TextsTab"), "TextsTab"),
-  }),
-  createRoute({
-    ...tab,
-    path: "/clips",
-    component: lazyRouteComponent(() => import("./studies/ClipsTab"), "ClipsTab"),
-  }),
-  createRoute({
-    ...tab,
-    path: "/links",
-    component: lazyRouteComponent(() => import("./studies/LinksTab"), "LinksTab"),
-  }),
-  createRoute({
-    ...tab,
-    path: "/monitor",
-    component: lazyRouteComponent(() => import("./monitor/MonitorTab"), "MonitorTab"),
-  }),
-  createRoute({
-    ...tab,
-    path: "/results",
-    component: lazyRouteComponent(() => import("./results/ResultsTab"), "ResultsTab"),
-  }),
-  createRoute({
-    ...tab,
-    path: "/data",
-    component: lazyRouteComponent(() => import("./data/DataTab"), "DataTab"),
-  }),
+  createRoute({ ...tab, path: "/", component: lazyRouteComponent(() => import("./studies/DesignTab"), "DesignTab") }),
+  createRoute({ ...tab, path: "/texts", component: lazyRouteComponent(() => import("./studies/TextsTab"), "TextsTab") }),
+  createRoute({ ...tab, path: "/clips", component: lazyRouteComponent(() => import("./studies/ClipsTab"), "ClipsTab") }),
+  createRoute({ ...tab, path: "/links", component: lazyRouteComponent(() => import("./studies/LinksTab"), "LinksTab") }),
+  createRoute({ ...tab, path: "/monitor", component: lazyRouteComponent(() => import("./monitor/MonitorTab"), "MonitorTab") }),
+  createRoute({ ...tab, path: "/results", component: lazyRouteComponent(() => import("./results/ResultsTab"), "ResultsTab") }),
+  createRoute({ ...tab, path: "/data", component: lazyRouteComponent(() => import("./data/DataTab"), "DataTab") }),
   createRoute({
     ...tab,
     path: "/participants",
@@ -114,27 +74,13 @@ const tabs = [
     path: "/participants/$run",
     component: lazyRouteComponent(() => import("./participants/TimelinePage"), "TimelinePage"),
   }),
-  createRoute({
-    ...tab,
-    path: "/settings",
-    component: lazyRouteComponent(() => import("./studies/SettingsTab"), "SettingsTab"),
-  }),
+  createRoute({ ...tab, path: "/settings", component: lazyRouteComponent(() => import("./studies/SettingsTab"), "SettingsTab") }),
 ];
 
 const tree = root.addChildren([
   signIn,
   invitation,
-  inside.addChildren([
-    studies,
-    create,
-    account,
-    people,
-    audit,
-    figures,
-    labelling,
-    blinkReview,
-    study.addChildren(tabs),
-  ]),
+  inside.addChildren([studies, create, account, people, audit, figures, labelling, blinkReview, study.addChildren(tabs)]),
 ]);
 
 export const router = createRouter({
@@ -142,10 +88,7 @@ export const router = createRouter({
   basepath: "/admin",
   defaultPreload: "intent",
   defaultErrorComponent: ({ error }) => (
-    <ErrorAlert
-      error={error instanceof Error ? error : new Error(String(error))}
-      retry={() => window.location.reload()}
-    />
+    <ErrorAlert error={error instanceof Error ? error : new Error(String(error))} retry={() => window.location.reload()} />
   ),
 });
 

@@ -2,7 +2,16 @@ import { Alert, Anchor, Badge, createTheme, type CSSVariablesResolver, type Mant
 
 // A calm petrol, dark enough for white text at every shade that buttons use.
 const petrol: MantineColorsTuple = [
-  "#e9f4f6", "#d5e5e8", "#aacad1", "#7badb9", "#5595a4", "#3c8697", "#2b7184", "#1f6172", "#125464", "#014855",
+  "#e9f4f6",
+  "#d5e5e8",
+  "#aacad1",
+  "#7badb9",
+  "#5595a4",
+  "#3c8697",
+  "#2b7184",
+  "#1f6172",
+  "#125464",
+  "#014855",
 ];
 
 export const theme = createTheme({

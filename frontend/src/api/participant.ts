@@ -23,8 +23,17 @@ export type PlaybackRecord = Required<Omit<Schemas["PlaybackLog"], "drawn">> & {
 export type PlaybackMethod = PlaybackRecord["method"];
 
 export type EventType =
-  | "heartbeat" | "focus_lost" | "fullscreen_left" | "clip_unavailable" | "unsupported" | "storage_blocked"
-  | "offline" | "online" | "stage" | "clock_changed" | "second_tab";
+  | "heartbeat"
+  | "focus_lost"
+  | "fullscreen_left"
+  | "clip_unavailable"
+  | "unsupported"
+  | "storage_blocked"
+  | "offline"
+  | "online"
+  | "stage"
+  | "clock_changed"
+  | "second_tab";
 export type RunEvent = Schemas["Event"] & { type: EventType };
 
 export interface RunDocument extends Omit<Schemas["RunState"], "texts" | "forms" | "trial" | "display"> {
@@ -34,9 +43,22 @@ export interface RunDocument extends Omit<Schemas["RunState"], "texts" | "forms"
   display: Gates & { background: string };
 }
 
-export interface Texts { consent: string; instructions: string; practice: string; block_break: string; debrief: string; screened_out?: string }
+export interface Texts {
+  consent: string;
+  instructions: string;
+  practice: string;
+  block_break: string;
+  debrief: string;
+  screened_out?: string;
+}
 
-export interface Scale { minimum: number; maximum: number; question: Translated; low: Translated; high: Translated }
+export interface Scale {
+  minimum: number;
+  maximum: number;
+  question: Translated;
+  low: Translated;
+  high: Translated;
+}
 export interface ClipRating {
   kind: "clip_rating";
   scale: Scale;
@@ -48,13 +70,44 @@ export interface ClipRating {
   expected_seconds: number;
 }
 
-interface FieldBase { name: string; label: Translated; help?: Translated | null; required: boolean }
-export interface TextField extends FieldBase { type: "text"; max_length: number }
-export interface NumberField extends FieldBase { type: "number"; minimum: number; maximum: number }
-export interface Option { value: string; label: Translated }
-export interface ChoiceField extends FieldBase { type: "choice"; options: Option[] }
-export interface MultipleChoiceField extends FieldBase { type: "multiple_choice"; options: Option[] }
-export interface LikertField extends FieldBase { type: "likert"; points: number; low: Translated; high: Translated }
+interface FieldBase {
+  name: string;
+  label: Translated;
+  help?: Translated | null;
+  required: boolean;
+}
+export interface TextField extends FieldBase {
+  type: "text";
+  max_length: number;
+}
+export interface NumberField extends FieldBase {
+  type: "number";
+  minimum: number;
+  maximum: number;
+}
+export interface Option {
+  value: string;
+  label: Translated;
+}
+export interface ChoiceField extends FieldBase {
+  type: "choice";
+  options: Option[];
+}
+export interface MultipleChoiceField extends FieldBase {
+  type: "multiple_choice";
+  options: Option[];
+}
+export interface LikertField extends FieldBase {
+  type: "likert";
+  points: number;
+  low: Translated;
+  high: Translated;
+}
 export type FormField = TextField | NumberField | ChoiceField | MultipleChoiceField | LikertField;
-export interface Form { name: string; when: "before" | "after"; title: Translated; fields: FormField[] }
+export interface Form {
+  name: string;
+  when: "before" | "after";
+  title: Translated;
+  fields: FormField[];
+}
 export type FormAnswers = Record<string, string | number | string[] | null>;

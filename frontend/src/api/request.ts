@@ -16,7 +16,12 @@ export class NetworkError extends Error {
 /** The server refused: `code` and `message` come from its one error shape. */
 export class Refused extends Error {
   override name = "Refused";
-  constructor(readonly status: number, readonly code: string, message: string, readonly details: unknown) {
+  constructor(
+    readonly status: number,
+    readonly code: string,
+    message: string,
+    readonly details: unknown,
+  ) {
     super(message);
   }
 }

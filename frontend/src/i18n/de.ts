@@ -14,7 +14,8 @@ export const de: Messages = {
   consent_agree: "Ich habe das gelesen und bin mit der Teilnahme einverstanden",
   consent_needed: "Bitte setzen Sie den Haken, wenn Sie einverstanden sind. Sonst schließen Sie die Seite: Es wurde nichts gespeichert.",
   saving: "Wird gespeichert …",
-  saving_offline: "Gerade besteht keine Verbindung. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald sie wieder da ist.",
+  saving_offline:
+    "Gerade besteht keine Verbindung. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald sie wieder da ist.",
   not_saved: "Der Server hat das nicht angenommen: {message}",
 
   form_required: "erforderlich",
@@ -30,10 +31,12 @@ export const de: Messages = {
   full_screen_again: "Das Fenster hat das Vollbild verlassen. Bitte kehren Sie zurück, um weiterzumachen.",
   full_screen_denied: "Dieser Browser erlaubt kein Vollbild. Bitte machen Sie das Fenster so groß wie möglich.",
   window_small_title: "Das Fenster ist zu klein",
-  window_small: "Diese Studie braucht ein Fenster von mindestens {width} mal {height} Pixeln; Ihres hat {have_width} mal {have_height}. Vergrößern Sie es, drehen Sie das Gerät oder stellen Sie den Zoom auf 100 % (Strg und 0).",
+  window_small:
+    "Diese Studie braucht ein Fenster von mindestens {width} mal {height} Pixeln; Ihres hat {have_width} mal {have_height}. Vergrößern Sie es, drehen Sie das Gerät oder stellen Sie den Zoom auf 100 % (Strg und 0).",
 
   card_title: "Wie groß ist Ihr Bildschirm?",
-  card_text: "Die Augen erscheinen so groß wie in einem wirklichen Gesicht. Halten Sie eine Bankkarte (oder eine Karte dieser Größe) an den Bildschirm. Machen Sie das Bild genau so groß wie die Karte.",
+  card_text:
+    "Die Augen erscheinen so groß wie in einem wirklichen Gesicht. Halten Sie eine Bankkarte (oder eine Karte dieser Größe) an den Bildschirm. Machen Sie das Bild genau so groß wie die Karte.",
   card_slider: "Größe der Karte auf dem Bildschirm",
   card_smaller: "Kleiner",
   card_larger: "Größer",
@@ -51,27 +54,32 @@ export const de: Messages = {
   ruler_bad: "Bitte geben Sie die Länge in Millimetern ein, von {minimum} bis {maximum}.",
   use_card: "Mit einer Bankkarte",
   clip_too_large_title: "Der Film passt nicht",
-  clip_too_large: "In wirklicher Größe braucht der Film {width} Pixel, dieses Fenster bietet {have}. Bitte nehmen Sie einen größeren Bildschirm oder ein größeres Fenster, oder messen Sie noch einmal.",
+  clip_too_large:
+    "In wirklicher Größe braucht der Film {width} Pixel, dieses Fenster bietet {have}. Bitte nehmen Sie einen größeren Bildschirm oder ein größeres Fenster, oder messen Sie noch einmal.",
   measure_again: "Noch einmal messen",
   skip: "Überspringen",
   screen_changed_title: "Ihr Bildschirm hat sich geändert",
-  screen_changed: "Die Seite ist auf einem anderen Bildschirm, oder er wurde neu eingestellt. Bitte messen Sie noch einmal, damit die Größe stimmt.",
+  screen_changed:
+    "Die Seite ist auf einem anderen Bildschirm, oder er wurde neu eingestellt. Bitte messen Sie noch einmal, damit die Größe stimmt.",
 
   distance_title: "Wie weit weg sitzen Sie?",
-  distance_text: "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
+  distance_text:
+    "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
   distance_start: "Beginnen (Leertaste)",
   distance_gone: "Der Punkt ist weg (Leertaste)",
   distance_round: "{round} von {times}",
   distance_type: "Stattdessen den Abstand eingeben",
   distance_cm: "Abstand von Ihren Augen zum Bildschirm in Zentimetern",
   distance_bad: "Bitte geben Sie einen Abstand von {minimum} bis {maximum} cm ein.",
-  distance_missed: "Diese Runde zählt nicht. Schauen Sie die ganze Zeit auf das Quadrat und drücken Sie die Leertaste, sobald der Punkt verschwindet.",
+  distance_missed:
+    "Diese Runde zählt nicht. Schauen Sie die ganze Zeit auf das Quadrat und drücken Sie die Leertaste, sobald der Punkt verschwindet.",
 
   preload_title: "Die Filme werden geholt",
   preload_text: "Sie werden vorher geladen, damit jeder ohne Stocken läuft.",
   preload_progress: "{done} von {total} Filmen",
   preload_failed_title: "Einige Filme konnten nicht geladen werden",
-  preload_failed: "Die Verbindung scheint unterbrochen zu sein. Was Sie bisher getan haben, bleibt erhalten. Versuchen Sie es noch einmal, oder kommen Sie später mit demselben Link wieder.",
+  preload_failed:
+    "Die Verbindung scheint unterbrochen zu sein. Was Sie bisher getan haben, bleibt erhalten. Versuchen Sie es noch einmal, oder kommen Sie später mit demselben Link wieder.",
   preload_without: "Ohne diese Filme weitermachen",
 
   practice_title: "Übung",
@@ -151,23 +159,31 @@ export const de: Messages = {
   link_full: "Diese Studie hat alle Teilnehmenden, die sie braucht. Danke für Ihr Interesse.",
   link_paused: "Diese Studie macht eine Pause. Bitte versuchen Sie es später noch einmal.",
   link_used: "Dieser Link wurde schon benutzt.",
-  run_left: "Diese Studie muss in einem Zug bearbeitet werden. Ihr Besuch wurde unterbrochen und kann nicht fortgesetzt werden. Bitte wenden Sie sich an die Person, die Sie eingeladen hat.",
+  run_left:
+    "Diese Studie muss in einem Zug bearbeitet werden. Ihr Besuch wurde unterbrochen und kann nicht fortgesetzt werden. Bitte wenden Sie sich an die Person, die Sie eingeladen hat.",
   run_too_old: "Ihr Besuch hat vor zu langer Zeit begonnen, um fortgesetzt zu werden. Bitte fragen Sie die Person, die Sie eingeladen hat.",
   link_title: "Sie können gerade nicht teilnehmen",
 
   no_answer_title: "Der Server ist nicht erreichbar",
   no_answer: "Bitte prüfen Sie Ihre Verbindung. Die Seite versucht es alle paar Sekunden von selbst wieder.",
   problem_title: "Etwas ist schiefgegangen",
-  problem: "Was Sie bisher getan haben, bleibt erhalten. Laden Sie die Seite neu; wenn es wiederkommt, schreiben Sie bitte der Person, die Sie eingeladen hat: {detail}",
+  problem:
+    "Was Sie bisher getan haben, bleibt erhalten. Laden Sie die Seite neu; wenn es wiederkommt, schreiben Sie bitte der Person, die Sie eingeladen hat: {detail}",
 
   gate_title: "Die Studie kann hier nicht gezeigt werden",
   gate_open_title: "Bevor Sie beginnen",
-  gate_insecure: "Die Seite wurde ohne sichere Verbindung geöffnet, und ohne sie kann der Browser die Filme nicht prüfen. Öffnen Sie den Link mit https:// am Anfang. Wenn das nicht geht, sagen Sie es der Person, die Sie eingeladen hat.",
-  gate_browser: "Dieser Browser kann Filme nicht Bild für Bild zeigen. Bitte öffnen Sie den Link in einem aktuellen Chrome, Edge, Firefox oder Safari auf einem Computer.",
-  gate_video: "Ihr Browser kann die Filme nicht Bild für Bild dekodieren und spielt sie deshalb als gewöhnliches Video. Das geht, aber ein aktueller Chrome, Edge oder Firefox kann es besser.",
-  gate_h264: "Diesem Browser scheint der H.264-Decoder zu fehlen, den die meisten Filme brauchen. Bitte öffnen Sie den Link in Chrome, Edge oder Safari, oder in Firefox mit den Codecs Ihres Systems. Wenn Sie hier weitermachen, werden die Filme vielleicht nicht gezeigt.",
-  gate_screen: "Der Bildschirm dieses Geräts ist zu klein: Die Studie braucht {width} mal {height} Pixel, dieser hat {have_width} mal {have_height}. Bitte nehmen Sie einen Computer oder ein größeres Tablet.",
+  gate_insecure:
+    "Die Seite wurde ohne sichere Verbindung geöffnet, und ohne sie kann der Browser die Filme nicht prüfen. Öffnen Sie den Link mit https:// am Anfang. Wenn das nicht geht, sagen Sie es der Person, die Sie eingeladen hat.",
+  gate_browser:
+    "Dieser Browser kann Filme nicht Bild für Bild zeigen. Bitte öffnen Sie den Link in einem aktuellen Chrome, Edge, Firefox oder Safari auf einem Computer.",
+  gate_video:
+    "Ihr Browser kann die Filme nicht Bild für Bild dekodieren und spielt sie deshalb als gewöhnliches Video. Das geht, aber ein aktueller Chrome, Edge oder Firefox kann es besser.",
+  gate_h264:
+    "Diesem Browser scheint der H.264-Decoder zu fehlen, den die meisten Filme brauchen. Bitte öffnen Sie den Link in Chrome, Edge oder Safari, oder in Firefox mit den Codecs Ihres Systems. Wenn Sie hier weitermachen, werden die Filme vielleicht nicht gezeigt.",
+  gate_screen:
+    "Der Bildschirm dieses Geräts ist zu klein: Die Studie braucht {width} mal {height} Pixel, dieser hat {have_width} mal {have_height}. Bitte nehmen Sie einen Computer oder ein größeres Tablet.",
   gate_touch: "Diese Studie braucht eine Tastatur. Bitte öffnen Sie den Link auf einem Computer.",
-  gate_storage: "Dieser Browser lässt die Seite nichts aufbewahren, vielleicht wegen eines privaten Fensters. Sie können weitermachen, aber jede Antwort muss den Server erreichen, bevor der nächste Film kommt; dazu braucht es eine gute Verbindung. Ein normales Fenster ist besser.",
+  gate_storage:
+    "Dieser Browser lässt die Seite nichts aufbewahren, vielleicht wegen eines privaten Fensters. Sie können weitermachen, aber jede Antwort muss den Server erreichen, bevor der nächste Film kommt; dazu braucht es eine gute Verbindung. Ein normales Fenster ist besser.",
   gate_continue: "Trotzdem weitermachen",
 };

@@ -22,16 +22,19 @@ export const en = {
   form_fix: "Please look at the marked questions.",
 
   screen_title: "Your screen",
-  full_screen_text: "The clips are shown in full screen, so that nothing else is moving beside them. You can leave it at any time with Esc.",
+  full_screen_text:
+    "The clips are shown in full screen, so that nothing else is moving beside them. You can leave it at any time with Esc.",
   full_screen_enter: "Go to full screen",
   full_screen_again_title: "Full screen, please",
   full_screen_again: "The window has left full screen. Please go back to go on.",
   full_screen_denied: "This browser does not allow full screen. Please make the window as large as you can.",
   window_small_title: "The window is too small",
-  window_small: "This study needs a window of at least {width} by {height} pixels; yours has {have_width} by {have_height}. Make it larger, turn the device, or set the zoom to 100% (Ctrl and 0).",
+  window_small:
+    "This study needs a window of at least {width} by {height} pixels; yours has {have_width} by {have_height}. Make it larger, turn the device, or set the zoom to 100% (Ctrl and 0).",
 
   card_title: "How large is your screen?",
-  card_text: "The eyes are shown at the size of a real face. Hold a bank card (or any card of that size) against the screen. Make the picture exactly as large as the card.",
+  card_text:
+    "The eyes are shown at the size of a real face. Hold a bank card (or any card of that size) against the screen. Make the picture exactly as large as the card.",
   card_slider: "Size of the card on the screen",
   card_smaller: "Smaller",
   card_larger: "Larger",
@@ -49,14 +52,16 @@ export const en = {
   ruler_bad: "Please enter the length in millimetres, from {minimum} to {maximum}.",
   use_card: "Use a bank card",
   clip_too_large_title: "The clip does not fit",
-  clip_too_large: "At its real size the clip needs {width} pixels, and this window offers {have}. Please use a larger screen or window, or measure again.",
+  clip_too_large:
+    "At its real size the clip needs {width} pixels, and this window offers {have}. Please use a larger screen or window, or measure again.",
   measure_again: "Measure again",
   skip: "Skip",
   screen_changed_title: "Your screen has changed",
   screen_changed: "The page is on another screen, or the screen was set up anew. Please measure again, so that the size is right.",
 
   distance_title: "How far away do you sit?",
-  distance_text: "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} times.",
+  distance_text:
+    "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} times.",
   distance_start: "Start (Space)",
   distance_gone: "The dot is gone (Space)",
   distance_round: "{round} of {times}",
@@ -69,7 +74,8 @@ export const en = {
   preload_text: "They are loaded beforehand, so that each one runs smoothly.",
   preload_progress: "{done} of {total} clips",
   preload_failed_title: "Some clips could not be loaded",
-  preload_failed: "The connection seems to be interrupted. What you have done so far is kept. Try again, or come back later with the same link.",
+  preload_failed:
+    "The connection seems to be interrupted. What you have done so far is kept. Try again, or come back later with the same link.",
   preload_without: "Go on without these clips",
 
   practice_title: "Practice",
@@ -149,24 +155,32 @@ export const en = {
   link_full: "This study has all the participants it needs. Thank you for your interest.",
   link_paused: "This study is paused. Please try again later.",
   link_used: "This link has been used already.",
-  run_left: "This study must be done in one go, and your visit was interrupted, so it cannot be continued. Please ask the person who invited you.",
+  run_left:
+    "This study must be done in one go, and your visit was interrupted, so it cannot be continued. Please ask the person who invited you.",
   run_too_old: "Your visit began too long ago to be continued. Please ask the person who invited you.",
   link_title: "You cannot take part now",
 
   no_answer_title: "The server cannot be reached",
   no_answer: "Please check your connection. The page tries again by itself every few seconds.",
   problem_title: "Something went wrong",
-  problem: "What you have done so far is kept. Load the page again; if this comes back, please write to the person who invited you: {detail}",
+  problem:
+    "What you have done so far is kept. Load the page again; if this comes back, please write to the person who invited you: {detail}",
 
   gate_title: "The study cannot be shown here",
   gate_open_title: "Before you begin",
-  gate_insecure: "The page was opened without a secure connection, and without one the browser cannot check the clips. Open the link with https:// at its beginning. If that does not work, tell the person who invited you.",
-  gate_browser: "This browser cannot show clips frame by frame. Please open the link in a recent Chrome, Edge, Firefox or Safari, on a computer.",
-  gate_video: "Your browser cannot decode the clips frame by frame, so they are played as an ordinary video. That works, but a recent Chrome, Edge or Firefox does it better.",
-  gate_h264: "This browser seems to lack the H.264 decoder that most clips need. Please open the link in Chrome, Edge or Safari, or in Firefox with the codecs of your system installed. If you go on here, the clips may not be shown.",
-  gate_screen: "The screen of this device is too small: the study needs {width} by {height} pixels, this one has {have_width} by {have_height}. Please use a computer or a larger tablet.",
+  gate_insecure:
+    "The page was opened without a secure connection, and without one the browser cannot check the clips. Open the link with https:// at its beginning. If that does not work, tell the person who invited you.",
+  gate_browser:
+    "This browser cannot show clips frame by frame. Please open the link in a recent Chrome, Edge, Firefox or Safari, on a computer.",
+  gate_video:
+    "Your browser cannot decode the clips frame by frame, so they are played as an ordinary video. That works, but a recent Chrome, Edge or Firefox does it better.",
+  gate_h264:
+    "This browser seems to lack the H.264 decoder that most clips need. Please open the link in Chrome, Edge or Safari, or in Firefox with the codecs of your system installed. If you go on here, the clips may not be shown.",
+  gate_screen:
+    "The screen of this device is too small: the study needs {width} by {height} pixels, this one has {have_width} by {have_height}. Please use a computer or a larger tablet.",
   gate_touch: "This study needs a keyboard. Please open the link on a computer.",
-  gate_storage: "This browser does not let the page keep anything, perhaps because of a private window. You can go on, but each answer must reach the server before the next clip, so a good connection is needed. A normal window is better.",
+  gate_storage:
+    "This browser does not let the page keep anything, perhaps because of a private window. You can go on, but each answer must reach the server before the next clip, so a good connection is needed. A normal window is better.",
   gate_continue: "Go on all the same",
 };
 

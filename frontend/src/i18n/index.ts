@@ -11,8 +11,7 @@ const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ku", "ps", "sd", "ug", "
 /** Messages in `language`, in English where no catalogue of that language is shipped. */
 export function translator(language: string): Translate {
   const messages = catalogues[language] ?? catalogues[language.slice(0, 2)] ?? en;
-  return (key, values = {}) =>
-    messages[key].replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
+  return (key, values = {}) => messages[key].replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
 }
 
 /** True where the page speaks `language` itself, not only the study's texts. */

@@ -22,7 +22,10 @@ function fieldsOf(line: string): string[] {
 
 /** Read a table; blanks round names and values are dropped. */
 export function parseTable(name: string, text: string): Table {
-  const lines = text.replace(/^\uFEFF/, "").split(/\r?\n/).filter((line) => line.trim() !== "");
+  const lines = text
+    .replace(/^\uFEFF/, "")
+    .split(/\r?\n/)
+    .filter((line) => line.trim() !== "");
   const [first, ...rest] = lines;
   if (first === undefined || rest.length === 0) {
     throw new TableProblem(`${name}: expected a CSV table with a header line and rows`);
@@ -46,9 +49,7 @@ export function wholeAt(table: Table, row: number, place: number): number {
   const text = table.rows[row]?.[place] ?? "";
   const value = Number(text);
   if (text !== "" && Number.isInteger(value) && value >= 0) return value;
-  throw new TableProblem(
-    `${table.name} row ${row + 2}: ${table.header[place] ?? "value"} must be a whole number, got '${text}'`,
-  );
+  throw new TableProblem(`${table.name} row ${row + 2}: ${table.header[place] ?? "value"} must be a whole number, got '${text}'`);
 }
 
 /** A field as CSV writes it. */

@@ -122,14 +122,10 @@ function markersOf(name: string, document: Record<string, unknown>, key: string,
 
 /** Refuse a shape that `stimuli` would refuse: outside the picture, eyes swapped, an outline that crosses itself. */
 export function checkShape(where: string, shape: Shape, size: Size): void {
-  const outside = shape.findIndex(
-    ([x, y]) => !(x >= -0.5 && y >= -0.5 && x <= size[0] - 0.5 && y <= size[1] - 0.5),
-  );
+  const outside = shape.findIndex(([x, y]) => !(x >= -0.5 && y >= -0.5 && x <= size[0] - 0.5 && y <= size[1] - 0.5));
   if (outside >= 0) {
     const [x, y] = at(shape, outside).map((value) => Number(value.toPrecision(6)));
-    throw new LabelProblem(
-      `${where}: point ${outside + 1} at (${x}, ${y}) is outside the picture of ${size[0]} x ${size[1]}`,
-    );
+    throw new LabelProblem(`${where}: point ${outside + 1} at (${x}, ${y}) is outside the picture of ${size[0]} x ${size[1]}`);
   }
   const eyes = shape.length / EYE_POINTS;
   const centres = Array.from({ length: eyes }, (_, eye) => eyeOf(shape, eye).reduce((sum, [x]) => sum + x, 0));
@@ -155,9 +151,7 @@ function straightened(eye: Shape): Point[] {
 
 function checkEye(where: string, eye: Shape, first: number): void {
   if (eyeWidth(eye) < 4) {
-    throw new LabelProblem(
-      `${where}: canthi ${first + 1} and ${first + 6} are under 4 px apart; label a larger eye`,
-    );
+    throw new LabelProblem(`${where}: canthi ${first + 1} and ${first + 6} are under 4 px apart; label a larger eye`);
   }
   const flat = straightened(eye);
   const outline = [0, 1, 2, 3, 4, 5, 6, 7, 8, 0];

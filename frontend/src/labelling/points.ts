@@ -11,7 +11,15 @@ export const POINT_ORDER =
 
 /** One open eye, its canthi at x 0 and 1, in widths of the eye. */
 const OPEN_EYE: Shape = [
-  [0, 0], [0.2, -0.14], [0.4, -0.2], [0.6, -0.19], [0.8, -0.1], [1, 0.03], [0.75, 0.1], [0.5, 0.14], [0.25, 0.1],
+  [0, 0],
+  [0.2, -0.14],
+  [0.4, -0.2],
+  [0.6, -0.19],
+  [0.8, -0.1],
+  [1, 0.03],
+  [0.75, 0.1],
+  [0.5, 0.14],
+  [0.25, 0.1],
 ];
 
 /** A first shape in the middle of the picture: one eye, or two beside each other. */
@@ -44,8 +52,15 @@ export function eyeWidth(eye: Shape): number {
 }
 
 const NAMES = [
-  "outer canthus", "upper lid 1", "upper lid 2", "upper lid 3", "upper lid 4", "inner canthus", "lower lid 1",
-  "lower lid 2", "lower lid 3",
+  "outer canthus",
+  "upper lid 1",
+  "upper lid 2",
+  "upper lid 3",
+  "upper lid 4",
+  "inner canthus",
+  "lower lid 1",
+  "lower lid 2",
+  "lower lid 3",
 ];
 
 /** What a point is, as read aloud: "left eye in the picture, upper lid 2". */

@@ -103,10 +103,7 @@ export function proposeShape(picture: Grey, labelled: readonly Labelled[]): Shap
   const first = labelled[0];
   if (first === undefined) throw new RangeError("expected at least one labelled frame, got none");
   const eyes = Array.from({ length: eyeCount(first.shape) }, (_, eye) => proposeEye(picture, labelled, eye));
-  return eyes.flat().map(([x, y]) => [
-    Math.min(picture.width - 0.5, Math.max(-0.5, x)),
-    Math.min(picture.height - 0.5, Math.max(-0.5, y)),
-  ]);
+  return eyes.flat().map(([x, y]) => [Math.min(picture.width - 0.5, Math.max(-0.5, x)), Math.min(picture.height - 0.5, Math.max(-0.5, y))]);
 }
 
 function proposeEye(picture: Grey, labelled: readonly Labelled[], number: number): Shape {
@@ -140,7 +137,7 @@ function refined(picture: Grey, before: Grey, labelled: Shape, laid: Shape): Sha
     return [x + start[0] * (1 - share) + end[0] * share, y + start[1] * (1 - share) + end[1] * share];
   });
   const across: Point = [-along[1], along[0]];
-  const moves = carried.map((point, place) => (place % 5 === 0 ? [0, 0] as const : follow(place, point, [across])));
+  const moves = carried.map((point, place) => (place % 5 === 0 ? ([0, 0] as const) : follow(place, point, [across])));
   return carried.map(([x, y], place): Point => {
     if (place % 5 === 0) return [x, y];
     const [least, most] = place < 5 ? [1, 4] : [6, 8];

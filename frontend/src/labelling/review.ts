@@ -118,11 +118,7 @@ export function matchFrames(fps: number): number {
 }
 
 /** Decisions on the blinks they belong to, and the rows that match no blink (kept when the file is written). */
-export function decide(
-  blinks: readonly Blink[],
-  rows: readonly ReviewRow[],
-  fps: number,
-): { decisions: Decisions; lost: ReviewRow[] } {
+export function decide(blinks: readonly Blink[], rows: readonly ReviewRow[], fps: number): { decisions: Decisions; lost: ReviewRow[] } {
   const decisions = new Map<string, Decision>();
   const lost: ReviewRow[] = [];
   for (const row of rows) {
@@ -190,11 +186,7 @@ export function withDecision(decisions: Decisions, blink: Blink, decision: Decis
 }
 
 /** The text of a review file: all decisions, and rows that matched no blink; moved ends where there are any. */
-export function reviewText(
-  blinks: readonly Blink[],
-  decisions: Decisions,
-  lost: readonly ReviewRow[],
-): string {
+export function reviewText(blinks: readonly Blink[], decisions: Decisions, lost: readonly ReviewRow[]): string {
   const rows = blinks
     .filter((blink) => decisions.has(blinkKey(blink)))
     .map((blink): ReviewRow => ({ column: blink.column, minimum: blink.minimum, ...decisionOn(decisions, blink) }));

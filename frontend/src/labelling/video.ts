@@ -61,7 +61,12 @@ async function opened(name: string, input: Input): Promise<OpenedVideo> {
     size: [width, height],
     frameCount: times.length,
     frame: async (number) => copied(await oneFrame(whole, times, number), width, height),
-    thumbnails: (numbers, done) => greyFrames(small, numbers.map((number) => within(times, number)), done),
+    thumbnails: (numbers, done) =>
+      greyFrames(
+        small,
+        numbers.map((number) => within(times, number)),
+        done,
+      ),
     close: () => input.dispose(),
   };
 }
@@ -98,9 +103,7 @@ function copied(picture: CanvasImageSource, width: number, height: number): HTML
 /** Grey values of a whole canvas. */
 export function greyOfCanvas(canvas: HTMLCanvasElement | OffscreenCanvas): Grey {
   const context = canvas.getContext("2d", { willReadFrequently: true }) as
-    | CanvasRenderingContext2D
-    | OffscreenCanvasRenderingContext2D
-    | null;
+    CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D | null;
   if (context === null) throw new VideoProblem("this browser gives no canvas to draw in");
   return greyOf(context.getImageData(0, 0, canvas.width, canvas.height));
 }

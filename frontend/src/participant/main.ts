@@ -29,7 +29,15 @@ const RETURNS = 3;
 const RETURNED = "palpebra returns";
 
 /** What is known when the link has answered, or an earlier visit answers for it. */
-interface Entry { root: HTMLElement; t: Translate; link_token: string; link: LinkDocument; language: string; keeping: KeptVisit; kept: Kept | null }
+interface Entry {
+  root: HTMLElement;
+  t: Translate;
+  link_token: string;
+  link: LinkDocument;
+  language: string;
+  keeping: KeptVisit;
+  kept: Kept | null;
+}
 
 export async function main(root: HTMLElement): Promise<void> {
   let t = translator(preferred(["en", "de"], navigator.languages));
@@ -104,11 +112,15 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
     return persistently(root, session.t, () => fetchRun(started.run_token)).then((now) => ended(root, session.t, now, started, identity));
   };
   if (run.status !== "active") return over();
-  root.addEventListener("run-over", () => {
-    session.over.abort();
-    emptied(root);
-    void over();
-  }, { once: true });
+  root.addEventListener(
+    "run-over",
+    () => {
+      session.over.abort();
+      emptied(root);
+      void over();
+    },
+    { once: true },
+  );
   for (const { reason } of found) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
   if (kept) session.events.add("offline", { loaded_without_server: true });
   if (run.resumable_until) serveOffline();
@@ -142,7 +154,9 @@ async function oneTab(root: HTMLElement, t: Translate, link_token: string): Prom
   const taken = (): void => void root.dispatchEvent(new CustomEvent("tab-taken"));
   const reload = { label: t("reload"), press: () => location.reload() };
   root.addEventListener("tab-taken", () => showNotice(root, { title: t("taken_over_title"), text: t("taken_over") }));
-  root.addEventListener("taken-over", () => showNotice(root, { title: t("taken_over_title"), text: t("taken_over_device"), actions: [reload] }));
+  root.addEventListener("taken-over", () =>
+    showNotice(root, { title: t("taken_over_title"), text: t("taken_over_device"), actions: [reload] }),
+  );
   if ((await claimTab(`palpebra ${link_token}`, false, taken)) === "held") return true;
   await new Promise<void>((resolve) => {
     showNotice(root, { title: t("second_tab_title"), text: t("second_tab"), actions: [{ label: t("second_tab_take"), press: resolve }] });

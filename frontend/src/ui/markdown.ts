@@ -60,8 +60,11 @@ export function inline(text: string): Child[] {
   const found = INLINE.exec(text);
   if (!found) return [text];
   const [whole, bold, bold2, italic, code, label, address] = found;
-  return [text.slice(0, found.index), inlineNode(whole, bold ?? bold2, italic, code, label, address),
-    ...inline(text.slice(found.index + whole.length))];
+  return [
+    text.slice(0, found.index),
+    inlineNode(whole, bold ?? bold2, italic, code, label, address),
+    ...inline(text.slice(found.index + whole.length)),
+  ];
 }
 
 function inlineNode(whole: string, bold?: string, italic?: string, code?: string, label?: string, address?: string): Child {

@@ -14,11 +14,14 @@ export interface PageParts {
 /** Show a page in `display` and give its heading the focus, so that screen readers begin there. */
 export function showPage(display: HTMLElement, parts: PageParts): HTMLElement {
   const title = parts.title ? h("h1", {}, parts.title) : null;
-  const section = h("section", { class: parts.wide ? "page page-wide" : "page" },
+  const section = h(
+    "section",
+    { class: parts.wide ? "page page-wide" : "page" },
     parts.eyebrow && h("p", { class: "eyebrow" }, parts.eyebrow),
     title,
     ...parts.body,
-    parts.actions && h("footer", { class: "actions" }, ...parts.actions));
+    parts.actions && h("footer", { class: "actions" }, ...parts.actions),
+  );
   display.replaceChildren(section);
   focusHeading(section);
   return section;

@@ -20,7 +20,12 @@ const [base = "", link = "", participants = "1", pace_ms = "20", hurry = "1"] = 
 const RATING = "/api/run/ratings/";
 const RELOAD_CHANCE = 0.02;
 
-interface Acknowledged { rating_id: string; run_id: string; trial_index: number; response: number }
+interface Acknowledged {
+  rating_id: string;
+  run_id: string;
+  trial_index: number;
+  response: number;
+}
 const acknowledged: Acknowledged[] = [];
 const refused: { path: string; status: number; body: unknown }[] = [];
 let given = 0;
@@ -65,7 +70,9 @@ async function participant(): Promise<void> {
 
 /** One visit from load to reload; true when the run is complete. */
 async function visit(factory: IDBFactory, client_id: string): Promise<boolean> {
-  const started = await insist<StartedRun>("POST", `/api/links/${link}/runs`, { body: { language: "en", client_id, query: {}, device: {} } });
+  const started = await insist<StartedRun>("POST", `/api/links/${link}/runs`, {
+    body: { language: "en", client_id, query: {}, device: {} },
+  });
   const outbox = new Outbox(await IndexedDbStore.open(factory), { send: watched(started.run_id), pause });
   const unsent = await flush(outbox, started);
   const run = await insist<RunDocument>("GET", "/api/run", { token: started.run_token });
@@ -91,10 +98,26 @@ function ratingOf(trial: RunDocument["trials"][number]): RatingBody {
   const frames = trial.frames ?? 0;
   const period = 1000 / 30;
   const drawn = Array.from({ length: frames }, (_, index): [number, number] => [index, 10 + index * period]);
-  const showing = { method: "webcodecs" as const, key_at_ms: 0, ended_at_ms: frames * period, drawn, frames, fps: 30, stalls: 0, focus_lost: 0 };
+  const showing = {
+    method: "webcodecs" as const,
+    key_at_ms: 0,
+    ended_at_ms: frames * period,
+    drawn,
+    frames,
+    fps: 30,
+    stalls: 0,
+    focus_lost: 0,
+  };
   return {
-    trial_index: trial.trial_index, play: 1, response: 1 + Math.floor(Math.random() * 7), rt: 500, rt_from_first_frame: 1_500,
-    time_elapsed: 1_000 * (trial.trial_index + 1), changes: 0, comment: null, answered_at_client: new Date().toISOString(),
+    trial_index: trial.trial_index,
+    play: 1,
+    response: 1 + Math.floor(Math.random() * 7),
+    rt: 500,
+    rt_from_first_frame: 1_500,
+    time_elapsed: 1_000 * (trial.trial_index + 1),
+    changes: 0,
+    comment: null,
+    answered_at_client: new Date().toISOString(),
     playback: playbackRecord(trial.clip_sha256, [showing], { refresh_rate_hz: 60, device_pixel_ratio: 1 }),
   };
 }

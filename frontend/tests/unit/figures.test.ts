@@ -26,14 +26,20 @@ describe("the monitor's runs", () => {
   it("are those told of last, the others kept as they are", () => {
     const before = snapshot(["a", 1], ["b", 1]);
     const after = merge(before, snapshot(["b", 2], ["c", 0]));
-    expect(after.runs.map(({ run, answered }) => [run, answered])).toEqual([["a", 1], ["b", 2], ["c", 0]]);
+    expect(after.runs.map(({ run, answered }) => [run, answered])).toEqual([
+      ["a", 1],
+      ["b", 2],
+      ["c", 0],
+    ]);
     expect(after.runs[0]).toBe(before.runs[0]);
   });
 });
 
 describe("words of the pages", () => {
   it("name a browser and its system", () => {
-    expect(browserName("Mozilla/5.0 (Windows NT 10.0; Win64; x64) AppleWebKit/537.36 Chrome/140.0 Safari/537.36 Edg/140.0")).toBe("Edge on Windows");
+    expect(browserName("Mozilla/5.0 (Windows NT 10.0; Win64; x64) AppleWebKit/537.36 Chrome/140.0 Safari/537.36 Edg/140.0")).toBe(
+      "Edge on Windows",
+    );
     expect(browserName("curl/8.1")).toBe("curl/8.1");
     expect(browserName("")).toBe("unknown");
   });

@@ -13,19 +13,43 @@ class FakeStorage {
 }
 
 const trial = (trial_index: number): AssignedTrial => ({
-  trial_index, kind: "main", block: 1, clip_sha256: "ab", clip_url: "/c", frames: 45, fps: 30, bytes: 1, width_px: 800,
-  height_px: 300, width_mm: 130, inter_ocular_px: 400, prompt: null, plays_done: 0, plays_wanted: 1, answered: false,
+  trial_index,
+  kind: "main",
+  block: 1,
+  clip_sha256: "ab",
+  clip_url: "/c",
+  frames: 45,
+  fps: 30,
+  bytes: 1,
+  width_px: 800,
+  height_px: 300,
+  width_mm: 130,
+  inter_ocular_px: 400,
+  prompt: null,
+  plays_done: 0,
+  plays_wanted: 1,
+  answered: false,
 });
 
 function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
   const run = {
-    status: "active", consented_at: null, answered_forms: [] as string[], trials: [trial(0), trial(1)], elapsed_ms_before: 5,
-    server_time: "2026-11-21T11:59:00Z", resumable_until, calibration: null,
+    status: "active",
+    consented_at: null,
+    answered_forms: [] as string[],
+    trials: [trial(0), trial(1)],
+    elapsed_ms_before: 5,
+    server_time: "2026-11-21T11:59:00Z",
+    resumable_until,
+    calibration: null,
   };
   return { link: {} as LinkDocument, started: { run_id: "r", run_token: "t" } as StartedRun, run: run as unknown as RunDocument };
 }
 
-const rating = (trial_index: number, play = 1) => ({ kind: "write" as const, path: "/api/run/ratings/x", body: { trial_index, play, time_elapsed: 900 } });
+const rating = (trial_index: number, play = 1) => ({
+  kind: "write" as const,
+  path: "/api/run/ratings/x",
+  body: { trial_index, play, time_elapsed: 900 },
+});
 
 function kept(storage = new FakeStorage(), begun: Kept | null = visit()): [KeptVisit, FakeStorage] {
   const keeping = new KeptVisit("key", storage as unknown as Storage);
@@ -44,7 +68,10 @@ describe("the visit kept for a reload without a server", () => {
     const run = readAgain(storage)?.run;
     expect(run?.consented_at).toBe("2026-11-21T11:59:00Z");
     expect(run?.answered_forms).toEqual(["about"]);
-    expect(run?.trials.map((one) => [one.answered, one.plays_done])).toEqual([[false, 0], [true, 1]]);
+    expect(run?.trials.map((one) => [one.answered, one.plays_done])).toEqual([
+      [false, 0],
+      [true, 1],
+    ]);
     expect(run?.elapsed_ms_before).toBe(900);
   });
 
@@ -66,7 +93,11 @@ describe("the visit kept for a reload without a server", () => {
   });
 
   it("does without a storage, with a broken one and with one that is full", () => {
-    const full = Object.assign(new FakeStorage(), { setItem: () => { throw new Error("full"); } });
+    const full = Object.assign(new FakeStorage(), {
+      setItem: () => {
+        throw new Error("full");
+      },
+    });
     kept(full);
     expect(readAgain(full)).toBeNull();
     const broken = new FakeStorage();

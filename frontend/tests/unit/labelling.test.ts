@@ -5,7 +5,17 @@ import { begun, changed, redone, undone } from "../../src/labelling/history";
 import { checkShape, labelsText, parseLabels } from "../../src/labelling/label-file";
 import { at, type Point, type Shape, templateShape, withEyeStretched, withPoint } from "../../src/labelling/points";
 import { proposeShape } from "../../src/labelling/propose";
-import { decide, decisionOn, edgeLimits, edgesOf, parseBlinks, parseReview, reviewText, withDecision, withEdge } from "../../src/labelling/review";
+import {
+  decide,
+  decisionOn,
+  edgeLimits,
+  edgesOf,
+  parseBlinks,
+  parseReview,
+  reviewText,
+  withDecision,
+  withEdge,
+} from "../../src/labelling/review";
 import { parseTable } from "../../src/labelling/csv";
 import { traceOf, tracePath, zoomedWindow } from "../../src/labelling/trace";
 

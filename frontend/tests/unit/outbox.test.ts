@@ -79,7 +79,9 @@ describe("outbox", () => {
     const fake = server([401, 409]);
     const outbox = new Outbox(await IndexedDbStore.open(factory), { send: fake.send, pause: noPause, onRefused });
     await outbox.open("second run", "token");
-    await (await outbox.put("PUT", "/a", {})).receipt;
+    await (
+      await outbox.put("PUT", "/a", {})
+    ).receipt;
     expect(onRefused).toHaveBeenCalledOnce();
     expect(onRefused.mock.calls[0]?.[0]).toMatchObject({ status: 409 });
   });
@@ -90,7 +92,8 @@ describe("outbox", () => {
     const store = await IndexedDbStore.open(factory);
     let left = 1;
     const outbox = new Outbox(store, {
-      send: server().send, pause: noPause,
+      send: server().send,
+      pause: noPause,
       onAccepted: (item, body) => void seen.push([item.path, body, left]),
     });
     await outbox.open("run", "token");
@@ -124,8 +127,16 @@ describe("outbox", () => {
 });
 
 describe("batches and back-off", () => {
-  const event = (n: number): OutboxItem =>
-    ({ id: `${n}`, run_id: "r", token: "t", kind: "event", method: "POST", path: "", body: n, sequence: n });
+  const event = (n: number): OutboxItem => ({
+    id: `${n}`,
+    run_id: "r",
+    token: "t",
+    kind: "event",
+    method: "POST",
+    path: "",
+    body: n,
+    sequence: n,
+  });
 
   it("puts at most 100 events into a call", () => {
     const batch = nextBatch(Array.from({ length: 130 }, (_, n) => event(n)));

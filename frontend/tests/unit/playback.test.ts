@@ -41,29 +41,80 @@ describe("frame schedule", () => {
 });
 
 describe("playback record", () => {
-  const showing = (drawn: [number, number][], rest: Partial<Showing> = {}): Showing =>
-    ({ method: "webcodecs", key_at_ms: 1_000, ended_at_ms: 2_000, drawn, frames: 3, fps: 30, stalls: 0, focus_lost: 0, ...rest });
+  const showing = (drawn: [number, number][], rest: Partial<Showing> = {}): Showing => ({
+    method: "webcodecs",
+    key_at_ms: 1_000,
+    ended_at_ms: 2_000,
+    drawn,
+    frames: 3,
+    fps: 30,
+    stalls: 0,
+    focus_lost: 0,
+    ...rest,
+  });
   const screen = { refresh_rate_hz: 60, device_pixel_ratio: 2 };
 
   it("counts a clean play", () => {
-    const record = playbackRecord("ab", [showing([[0, 1_010], [1, 1_043.4], [2, 1_076.7]])], screen);
-    expect(record).toMatchObject({ method: "webcodecs", key_to_first_frame_ms: 10, frames_drawn: 3, frames_late: 0, frames_missing: 0, longest_gap_ms: 33.4 });
-    expect(record.drawn).toEqual([[0, 10], [1, 43.4], [2, 76.7]]);
+    const record = playbackRecord(
+      "ab",
+      [
+        showing([
+          [0, 1_010],
+          [1, 1_043.4],
+          [2, 1_076.7],
+        ]),
+      ],
+      screen,
+    );
+    expect(record).toMatchObject({
+      method: "webcodecs",
+      key_to_first_frame_ms: 10,
+      frames_drawn: 3,
+      frames_late: 0,
+      frames_missing: 0,
+      longest_gap_ms: 33.4,
+    });
+    expect(record.drawn).toEqual([
+      [0, 10],
+      [1, 43.4],
+      [2, 76.7],
+    ]);
   });
 
   it("counts what is missing and late", () => {
-    const record = playbackRecord("ab", [showing([[0, 1_010], [2, 1_110]])], screen);
+    const record = playbackRecord(
+      "ab",
+      [
+        showing([
+          [0, 1_010],
+          [2, 1_110],
+        ]),
+      ],
+      screen,
+    );
     expect(record).toMatchObject({ frames_drawn: 2, frames_missing: 1, frames_late: 1, longest_gap_ms: 100 });
   });
 
   it("adds up the views of a trial, the worst method counting", () => {
-    const views = [showing([[0, 1_010], [1, 1_043], [2, 1_077]]), showing([[0, 5_005]], { key_at_ms: 5_000, method: "video", focus_lost: 2 })];
+    const views = [
+      showing([
+        [0, 1_010],
+        [1, 1_043],
+        [2, 1_077],
+      ]),
+      showing([[0, 5_005]], { key_at_ms: 5_000, method: "video", focus_lost: 2 }),
+    ];
     const record = playbackRecord("ab", views, screen);
     expect(record).toMatchObject({ method: "video", frames_drawn: 4, frames_missing: 2, focus_lost: 2 });
     expect(record.drawn.at(-1)).toEqual([0, 5]);
   });
 
   it("claims nothing where nothing was shown", () => {
-    expect(playbackRecord(null, [], screen)).toMatchObject({ method: "none", key_to_first_frame_ms: null, longest_gap_ms: null, drawn: [] });
+    expect(playbackRecord(null, [], screen)).toMatchObject({
+      method: "none",
+      key_to_first_frame_ms: null,
+      longest_gap_ms: null,
+      drawn: [],
+    });
   });
 });

@@ -12,7 +12,11 @@ async function source() {
 
 describe("one clip", () => {
   it("is tried again after a break and after a wrong hash, then past the cache", async () => {
-    const answers = [() => Promise.reject(new TypeError("down")), () => Promise.resolve(reply(new ArrayBuffer(3))), () => Promise.resolve(reply(bytes))];
+    const answers = [
+      () => Promise.reject(new TypeError("down")),
+      () => Promise.resolve(reply(new ArrayBuffer(3))),
+      () => Promise.resolve(reply(bytes)),
+    ];
     const fetching = vi.spyOn(globalThis, "fetch").mockImplementation(() => (answers.shift() ?? answers[0])!());
     expect(new Uint8Array(await fetchClip(await source(), { pause }))).toEqual(new Uint8Array(bytes));
     expect(fetching.mock.calls.map(([, init]) => init?.cache)).toEqual(["default", "default", "reload"]);
@@ -28,8 +32,10 @@ describe("one clip", () => {
   });
 
   it("is stopped where no byte comes", async () => {
-    vi.spyOn(globalThis, "fetch").mockImplementation((_url, init) =>
-      new Promise((_resolve, reject) => init?.signal?.addEventListener("abort", () => reject(new DOMException("stopped", "AbortError")))));
+    vi.spyOn(globalThis, "fetch").mockImplementation(
+      (_url, init) =>
+        new Promise((_resolve, reject) => init?.signal?.addEventListener("abort", () => reject(new DOMException("stopped", "AbortError")))),
+    );
     await expect(fetchClip(await source(), { pause, attempts: 2, stall_ms: 10 })).rejects.toMatchObject({ fault: "offline" });
   });
 });

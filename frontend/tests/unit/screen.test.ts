@@ -9,8 +9,23 @@ import { distanceFrom } from "../../src/participant/screens/distance";
 import { keyFor, valueOf } from "../../src/participant/trials/clip-rating/scale-keys";
 
 const trial = (rest: Partial<AssignedTrial> = {}): AssignedTrial => ({
-  trial_index: 0, kind: "main", block: 1, clip_sha256: "ab", clip_url: "/c", frames: 45, fps: 30, bytes: 1, width_px: 800,
-  height_px: 300, width_mm: 130, inter_ocular_px: 400, prompt: null, plays_done: 0, plays_wanted: 1, answered: false, ...rest,
+  trial_index: 0,
+  kind: "main",
+  block: 1,
+  clip_sha256: "ab",
+  clip_url: "/c",
+  frames: 45,
+  fps: 30,
+  bytes: 1,
+  width_px: 800,
+  height_px: 300,
+  width_mm: 130,
+  inter_ocular_px: 400,
+  prompt: null,
+  plays_done: 0,
+  plays_wanted: 1,
+  answered: false,
+  ...rest,
 });
 
 describe("actual size", () => {
@@ -50,8 +65,25 @@ describe("actual size", () => {
 });
 
 describe("gates", () => {
-  const fine: Abilities = { secure: true, web_codecs: true, video: true, h264: true, storage: true, touch_only: false, screen_width_px: 1_440, screen_height_px: 900 };
-  const gates = { minimum_width_px: 800, minimum_height_px: 500, allow_touch: true, full_screen: true, calibrate: "required" as const, viewing_distance: false, inter_ocular_mm: 60 };
+  const fine: Abilities = {
+    secure: true,
+    web_codecs: true,
+    video: true,
+    h264: true,
+    storage: true,
+    touch_only: false,
+    screen_width_px: 1_440,
+    screen_height_px: 900,
+  };
+  const gates = {
+    minimum_width_px: 800,
+    minimum_height_px: 500,
+    allow_touch: true,
+    full_screen: true,
+    calibrate: "required" as const,
+    viewing_distance: false,
+    inter_ocular_mm: 60,
+  };
   it.each([
     [{}, []],
     [{ secure: false }, ["gate_insecure"]],
@@ -65,7 +97,10 @@ describe("gates", () => {
     expect(findings({ ...fine, ...change }, gates).map((finding) => finding.reason)).toEqual(reasons);
   });
   it("asks for a keyboard where touch is not allowed", () => {
-    expect(findings({ ...fine, touch_only: true }, { ...gates, allow_touch: false })[0]).toMatchObject({ reason: "gate_touch", closed: true });
+    expect(findings({ ...fine, touch_only: true }, { ...gates, allow_touch: false })[0]).toMatchObject({
+      reason: "gate_touch",
+      closed: true,
+    });
   });
 });
 
@@ -86,7 +121,13 @@ describe("repetitions", () => {
 
 describe("keys of the scale", () => {
   it.each([
-    ["1", 1, 7, 1], ["7", 1, 7, 7], ["8", 1, 7, null], ["0", 1, 7, null], ["0", 0, 10, 0], ["0", 1, 10, 10], ["a", 1, 7, null],
+    ["1", 1, 7, 1],
+    ["7", 1, 7, 7],
+    ["8", 1, 7, null],
+    ["0", 1, 7, null],
+    ["0", 0, 10, 0],
+    ["0", 1, 10, 10],
+    ["a", 1, 7, null],
   ])("%s on a scale from %i to %i", (key, minimum, maximum, value) => {
     expect(valueOf(key, { minimum, maximum })).toBe(value);
   });

@@ -20,8 +20,7 @@ export function InvitationPage() {
   const [token] = useState(() => window.location.hash.slice(1));
   const invitation = useQuery({
     queryKey: ["invitation", token],
-    queryFn: () =>
-      unwrap(api.GET("/api/admin/invitations/{token}/state", { params: { path: { token: token || "-" } } })),
+    queryFn: () => unwrap(api.GET("/api/admin/invitations/{token}/state", { params: { path: { token: token || "-" } } })),
   });
   const unknown = invitation.error instanceof Refused && invitation.error.status === 404;
   return (
@@ -30,9 +29,7 @@ export function InvitationPage() {
         <Closed why="not_found" />
       ) : (
         <Answer of={invitation}>
-          {({ role, status }) =>
-            status === "open" ? <MakeAccount token={token} role={role} /> : <Closed why={status} />
-          }
+          {({ role, status }) => (status === "open" ? <MakeAccount token={token} role={role} /> : <Closed why={status} />)}
         </Answer>
       )}
     </EntryPage>
@@ -62,13 +59,7 @@ function MakeAccount({ token, role }: { token: string; role: Schemas["Invitation
   const [name, setName] = useState("");
   const [password, setPassword] = useState("");
   const accept = useMutation({
-    mutationFn: () =>
-      unwrap(
-        api.POST("/api/admin/invitations/{token}/account", {
-          params: { path: { token } },
-          body: { name, password },
-        }),
-      ),
+    mutationFn: () => unwrap(api.POST("/api/admin/invitations/{token}/account", { params: { path: { token } }, body: { name, password } })),
     onSuccess: useEntered(),
   });
   return (

@@ -7,17 +7,14 @@ import { PasswordField } from "./fields";
 export function PasswordCard() {
   const [password, setPassword] = useState("");
   const [fresh, setFresh] = useState("");
-  const change = useChange(
-    () => unwrap(api.PUT("/api/admin/password", { body: { password, new_password: fresh } })),
-    {
-      touches: [["sessions"]],
-      done: "Password changed; your other sessions have ended.",
-      then: () => {
-        setPassword("");
-        setFresh("");
-      },
+  const change = useChange(() => unwrap(api.PUT("/api/admin/password", { body: { password, new_password: fresh } })), {
+    touches: [["sessions"]],
+    done: "Password changed; your other sessions have ended.",
+    then: () => {
+      setPassword("");
+      setFresh("");
     },
-  );
+  });
   const submit = (event: FormEvent) => {
     event.preventDefault();
     change.mutate(undefined);

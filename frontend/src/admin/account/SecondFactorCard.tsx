@@ -55,13 +55,7 @@ function Confirm({ setup, done }: { setup: Schemas["SecondFactorSetup"]; done: (
       <Code block className="wrap-anywhere">
         {setup.secret}
       </Code>
-      <PinInput
-        length={6}
-        type="number"
-        oneTimeCode
-        aria-label="Code of the app"
-        onComplete={(code) => confirm.mutate(code)}
-      />
+      <PinInput length={6} type="number" oneTimeCode aria-label="Code of the app" onComplete={(code) => confirm.mutate(code)} />
     </>
   );
 }

@@ -14,8 +14,7 @@ export function SignInPage() {
   const [code, setCode] = useState("");
   const session = useQuery(sessionQuery);
   const signIn = useMutation({
-    mutationFn: () =>
-      unwrap(api.POST("/api/admin/session", { body: { name, password, code: code === "" ? null : code } })),
+    mutationFn: () => unwrap(api.POST("/api/admin/session", { body: { name, password, code: code === "" ? null : code } })),
     onSuccess: useEntered(usePageAskedFor()),
   });
   const error = signIn.error;

@@ -17,18 +17,13 @@ export function TokensCard() {
   const [scopes, setScopes] = useState<string[]>(["read"]);
   const [fresh, setFresh] = useState<string | null>(null);
   const create = useChange(
-    () =>
-      unwrap(
-        api.POST("/api/admin/tokens", {
-          body: { name, scopes: SCOPES.filter((scope) => scopes.includes(scope)), days: 365 },
-        }),
-      ),
+    () => unwrap(api.POST("/api/admin/tokens", { body: { name, scopes: SCOPES.filter((scope) => scopes.includes(scope)), days: 365 } })),
     { touches: [["tokens"]], then: ({ token }) => setFresh(token) },
   );
-  const revoke = useChange(
-    (token_id: number) => unwrap(api.DELETE("/api/admin/tokens/{token_id}", { params: { path: { token_id } } })),
-    { touches: [["tokens"]], done: "The token is revoked." },
-  );
+  const revoke = useChange((token_id: number) => unwrap(api.DELETE("/api/admin/tokens/{token_id}", { params: { path: { token_id } } })), {
+    touches: [["tokens"]],
+    done: "The token is revoked.",
+  });
   return (
     <Card withBorder>
       <Stack>

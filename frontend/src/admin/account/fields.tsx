@@ -10,13 +10,7 @@ interface Field {
 
 export function NameField({ label, value, onChange }: Field) {
   return (
-    <TextInput
-      label={label}
-      autoComplete="username"
-      required
-      value={value}
-      onChange={(event) => onChange(event.currentTarget.value)}
-    />
+    <TextInput label={label} autoComplete="username" required value={value} onChange={(event) => onChange(event.currentTarget.value)} />
   );
 }
 

@@ -18,8 +18,8 @@ export function DataTab() {
   return (
     <Stack>
       <Text size="sm">
-        Pilot and live data, excluded runs and simulated people are all in the files, each marked in its column; previews
-        and erased people are not.
+        Pilot and live data, excluded runs and simulated people are all in the files, each marked in its column; previews and erased people
+        are not.
       </Text>
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
         {FILES.map(([file, title, words]) => (
@@ -50,7 +50,11 @@ export function DataTab() {
         </Anchor>{" "}
         saved as {study}.toml:
       </Text>
-      <Code block tabIndex={0} aria-label="Commands">{`server export ${study} --out ${study}.csv\nserver export ${study} --format psych-ds --out ${study}.zip\nanalysis run ${study}.toml --csv ${study}.csv`}</Code>
+      <Code
+        block
+        tabIndex={0}
+        aria-label="Commands"
+      >{`server export ${study} --out ${study}.csv\nserver export ${study} --format psych-ds --out ${study}.zip\nanalysis run ${study}.toml --csv ${study}.csv`}</Code>
     </Stack>
   );
 }

@@ -28,8 +28,7 @@ export function Character(props: Props) {
   if (strips.data.characters.length === 0) {
     return (
       <Text size="sm" c="dimmed">
-        The characters' pictures are not on this server; <code>make run</code> makes them, or{" "}
-        <code>stimuli strips</code>.
+        The characters' pictures are not on this server; <code>make run</code> makes them, or <code>stimuli strips</code>.
       </Text>
     );
   }
@@ -68,7 +67,14 @@ function Player({ closure, other, fps, strips }: Props & { strips: Schemas["Stri
 
   return (
     <Stack gap="xs">
-      <canvas ref={canvas} className="strip" width={width} height={height} role="img" aria-label={`The ${character} character playing this blink`} />
+      <canvas
+        ref={canvas}
+        className="strip"
+        width={width}
+        height={height}
+        role="img"
+        aria-label={`The ${character} character playing this blink`}
+      />
       <Group gap="sm">
         <Button size="xs" onClick={() => setPlayed(played + 1)}>
           Play
@@ -103,7 +109,10 @@ function usePicture(address: string): HTMLImageElement | null {
     const image = new Image();
     image.src = address;
     let wanted = true;
-    void image.decode().then(() => wanted && setPicture(image), () => wanted && setPicture(null));
+    void image.decode().then(
+      () => wanted && setPicture(image),
+      () => wanted && setPicture(null),
+    );
     return () => {
       wanted = false;
     };

@@ -17,8 +17,8 @@ export function FiguresPage() {
     <Stack>
       <Title order={1}>Blinks</Title>
       <Text maw={720}>
-        The blinks that clips are made from: recorded ones, and the PCA model fitted to them. Closure is 0 with the eye
-        open and 1 with it closed, at 300 samples a second.
+        The blinks that clips are made from: recorded ones, and the PCA model fitted to them. Closure is 0 with the eye open and 1 with it
+        closed, at 300 samples a second.
       </Text>
       <Answer of={library}>
         {(data) => (

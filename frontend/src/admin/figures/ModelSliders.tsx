@@ -20,8 +20,7 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
           {model.explained.map((share, mode) => (
             <div key={`mode${String(mode)}`}>
               <Text size="sm" className="number">
-                Component {mode + 1}: {(100 * share).toFixed(1)}% of the variance, now at{" "}
-                {(deviations[mode] ?? 0).toFixed(1)} sd
+                Component {mode + 1}: {(100 * share).toFixed(1)}% of the variance, now at {(deviations[mode] ?? 0).toFixed(1)} sd
               </Text>
               <Slider
                 min={-2}

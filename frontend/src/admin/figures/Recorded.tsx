@@ -19,8 +19,8 @@ export function Recorded({ library }: { library: Schemas["BlinkLibrary"] }) {
   return (
     <Stack>
       <Text size="sm" maw={720}>
-        {singles.length} curves of one eye. {pairs.length} blinks were seen in both eyes: they are there once more as
-        pairs, left and right on common samples, for clips whose eyes move separately.
+        {singles.length} curves of one eye. {pairs.length} blinks were seen in both eyes: they are there once more as pairs, left and right
+        on common samples, for clips whose eyes move separately.
       </Text>
       <SegmentedControl
         aria-label="Which blinks"
@@ -113,7 +113,12 @@ function One({ profile, chosen, onChoose }: { profile: Profile; chosen: boolean;
         </Text>
       )}
       <Group gap="xs" mt="auto">
-        <Button size="compact-xs" variant={chosen ? "filled" : "default"} aria-label={`Show ${nameOf(profile)} on the character`} onClick={onChoose}>
+        <Button
+          size="compact-xs"
+          variant={chosen ? "filled" : "default"}
+          aria-label={`Show ${nameOf(profile)} on the character`}
+          onClick={onChoose}
+        >
           On the character
         </Button>
         <Button
@@ -131,6 +136,11 @@ function One({ profile, chosen, onChoose }: { profile: Profile; chosen: boolean;
 
 /** A curve as the clip builder reads it: one closure sample a line, the right eye's beside it where there is one. */
 export function curveCsv(closure: readonly number[], other: readonly number[] = []): string {
-  const lines = closure.map((value, place) => [value, other[place]].filter((one) => one !== undefined).map((one) => one.toFixed(6)).join(","));
+  const lines = closure.map((value, place) =>
+    [value, other[place]]
+      .filter((one) => one !== undefined)
+      .map((one) => one.toFixed(6))
+      .join(","),
+  );
   return `closure${other.length > 0 ? ",closure_other" : ""}\n${lines.join("\n")}\n`;
 }

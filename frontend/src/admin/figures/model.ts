@@ -41,8 +41,7 @@ export function readModel(json: Record<string, unknown>): BlinkModel {
 export function blinkOf(model: BlinkModel, deviations: readonly number[]): { closure: number[]; valid: boolean } {
   const row = model.mean.map((mean, place) =>
     model.components.reduce(
-      (sum, component, mode) =>
-        sum + (deviations[mode] ?? 0) * (model.coefficient_sd[mode] ?? 0) * (component[place] ?? 0),
+      (sum, component, mode) => sum + (deviations[mode] ?? 0) * (model.coefficient_sd[mode] ?? 0) * (component[place] ?? 0),
       mean,
     ),
   );

@@ -19,9 +19,8 @@ export function BlinkReviewPage() {
     <Stack>
       <Title order={1}>Review blinks</Title>
       <Text maw={720}>
-        The blinks that <code>stimuli blinks</code> found in a series or track: leave out what is no blink, correct
-        starts and ends, and give the saved file to <code>stimuli blinks --review</code>. The files are opened in this
-        page only: nothing is uploaded.
+        The blinks that <code>stimuli blinks</code> found in a series or track: leave out what is no blink, correct starts and ends, and
+        give the saved file to <code>stimuli blinks --review</code>. The files are opened in this page only: nothing is uploaded.
       </Text>
       <Group>
         <OpenFile label="Open series or track" accept=".csv,text/csv" primary={!review.hasSeries} onOpen={review.openSeries} />
@@ -79,12 +78,7 @@ function Reviewing({ review, values }: { review: Review; values: Float64Array })
             Whole series
           </Button>
           {review.columns.length > 1 && (
-            <SegmentedControl
-              aria-label="Column"
-              data={review.columns}
-              value={review.column ?? ""}
-              onChange={review.setColumn}
-            />
+            <SegmentedControl aria-label="Column" data={review.columns} value={review.column ?? ""} onChange={review.setColumn} />
           )}
         </Group>
         <Group gap="xs">
@@ -116,10 +110,9 @@ function Reviewing({ review, values }: { review: Review; values: Float64Array })
       {chosen !== null && <BlinkCard key={`${chosen.column}:${chosen.minimum}`} review={review} blink={chosen} />}
       <BlinkList review={review} />
       <Text size="sm" c="dimmed">
-        <kbd>N</kbd> <kbd>P</kbd> next, previous blink · <kbd>A</kbd> accept · <kbd>R</kbd> reject: type the reason,
-        then <kbd>Enter</kbd> · start and end: drag them, or <kbd>Tab</kbd> to them and arrows (1 frame, with{" "}
-        <kbd>Shift</kbd> 10) · <kbd>Ctrl Z</kbd> <kbd>Ctrl Shift Z</kbd> undo, redo · <kbd>+</kbd> <kbd>-</kbd>{" "}
-        <kbd>0</kbd> zoom
+        <kbd>N</kbd> <kbd>P</kbd> next, previous blink · <kbd>A</kbd> accept · <kbd>R</kbd> reject: type the reason, then <kbd>Enter</kbd> ·
+        start and end: drag them, or <kbd>Tab</kbd> to them and arrows (1 frame, with <kbd>Shift</kbd> 10) · <kbd>Ctrl Z</kbd>{" "}
+        <kbd>Ctrl Shift Z</kbd> undo, redo · <kbd>+</kbd> <kbd>-</kbd> <kbd>0</kbd> zoom
       </Text>
     </>
   );

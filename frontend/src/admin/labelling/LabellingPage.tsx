@@ -16,7 +16,8 @@ import { useUnsaved } from "../ui/useUnsaved";
 type Labelling = ReturnType<typeof useLabelling>;
 
 const STARTS = {
-  template: "A shape to begin with: drag each point to its place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
+  template:
+    "A shape to begin with: drag each point to its place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
   nearest: `The points of the nearest labelled frame. From ${FRAMES_BEFORE_PROPOSALS} accepted frames on, they are proposed.`,
   proposal: "Proposed from the labelled frames: correct what is off, then accept.",
 } as const;
@@ -29,8 +30,8 @@ export function LabellingPage() {
     <Stack>
       <Title order={1}>Label video</Title>
       <Text maw={720}>
-        Points round the eyes on about 20 frames, from which <code>stimuli track</code> learns to follow the lids. The
-        video is opened in this page only: nothing is uploaded.
+        Points round the eyes on about 20 frames, from which <code>stimuli track</code> learns to follow the lids. The video is opened in
+        this page only: nothing is uploaded.
       </Text>
       <Group>
         <OpenFile label="Open video" accept="video/*,.mp4,.mov,.webm,.mkv" primary={work.video === null} onOpen={work.open} />
@@ -206,9 +207,9 @@ function AddFrame({ work }: { work: Labelling }) {
 function Keys() {
   return (
     <Text size="sm" c="dimmed">
-      <kbd>Tab</kbd> next point · arrows 1 px, with <kbd>Shift</kbd> 10 px, with <kbd>Ctrl</kbd> the whole eye ·{" "}
-      <kbd>A</kbd> accept · <kbd>N</kbd> <kbd>P</kbd> next, previous frame · <kbd>Ctrl Z</kbd> <kbd>Ctrl Shift Z</kbd>{" "}
-      undo, redo · <kbd>+</kbd> <kbd>-</kbd> <kbd>0</kbd> <kbd>E</kbd> zoom in, out, whole frame, eyes
+      <kbd>Tab</kbd> next point · arrows 1 px, with <kbd>Shift</kbd> 10 px, with <kbd>Ctrl</kbd> the whole eye · <kbd>A</kbd> accept ·{" "}
+      <kbd>N</kbd> <kbd>P</kbd> next, previous frame · <kbd>Ctrl Z</kbd> <kbd>Ctrl Shift Z</kbd> undo, redo · <kbd>+</kbd> <kbd>-</kbd>{" "}
+      <kbd>0</kbd> <kbd>E</kbd> zoom in, out, whole frame, eyes
     </Text>
   );
 }

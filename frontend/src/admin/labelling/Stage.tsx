@@ -42,13 +42,7 @@ export function Stage({ picture, size, shape, selected, onSelect, onMove }: Prop
     return () => element?.removeEventListener("wheel", wheel);
   }, [zoom]);
 
-  useShortcuts({
-    "+": () => zoom(1.25),
-    "=": () => zoom(1.25),
-    "-": () => zoom(0.8),
-    "0": fit,
-    e: () => showShape(shape),
-  });
+  useShortcuts({ "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8), "0": fit, e: () => showShape(shape) });
 
   const placeOf = (event: PointerEvent<SVGSVGElement>): Point => {
     const box = event.currentTarget.getBoundingClientRect();

@@ -36,10 +36,7 @@ export function TraceView(props: Props) {
   const last = values.length - 1;
   const scale = width / (window.to - window.from);
   const range = useMemo(() => extent(values), [values]);
-  const path = useMemo(
-    () => tracePath(values, window, width, HEIGHT - BOTTOM, range),
-    [values, window, width, range],
-  );
+  const path = useMemo(() => tracePath(values, window, width, HEIGHT - BOTTOM, range), [values, window, width, range]);
   const x = (frame: number): number => (frame - window.from) * scale;
 
   useEffect(() => {
@@ -60,11 +57,7 @@ export function TraceView(props: Props) {
     const hit = blinks.find((one) => blinkKey(one) === blink);
     if (hit !== undefined) onChoose(hit);
     drags.current += 1;
-    drag.current = {
-      edge: edge === "onset" || edge === "end" ? edge : null,
-      step: `drag ${drags.current}`,
-      x: event.clientX,
-    };
+    drag.current = { edge: edge === "onset" || edge === "end" ? edge : null, step: `drag ${drags.current}`, x: event.clientX };
     event.currentTarget.setPointerCapture(event.pointerId);
   };
   const move = (event: PointerEvent<SVGSVGElement>): void => {
@@ -116,9 +109,7 @@ export function TraceView(props: Props) {
         <path className="line" d={path} />
         <Times window={window} fps={fps} width={width} />
         {chosen !== null &&
-          (["onset", "end"] as const).map((edge) => (
-            <EdgeHandle key={edge} {...props} blink={chosen} edge={edge} last={last} x={x} />
-          ))}
+          (["onset", "end"] as const).map((edge) => <EdgeHandle key={edge} {...props} blink={chosen} edge={edge} last={last} x={x} />)}
       </svg>
     </div>
   );

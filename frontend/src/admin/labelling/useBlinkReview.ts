@@ -120,8 +120,7 @@ export function useBlinkReview() {
     },
     decide: (blink: Blink, decision: Decision["decision"], reason: string) =>
       put(withDecision(decisions, blink, { ...decisionOn(decisions, blink), decision, reason })),
-    restore: (blink: Blink) =>
-      put(withDecision(decisions, blink, { ...decisionOn(decisions, blink), onset: null, end: null })),
+    restore: (blink: Blink) => put(withDecision(decisions, blink, { ...decisionOn(decisions, blink), onset: null, end: null })),
     moveEdge: (blink: Blink, edge: Edge, frame: number, step: string | null) =>
       put(withEdge(blink, edge, frame, blinks, decisions, last), step),
     undo: () => setHistory(undone),

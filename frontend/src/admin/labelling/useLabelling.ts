@@ -45,8 +45,7 @@ function message(error: unknown): string {
 function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
   const taken = labelled.map((number) =>
     candidates.reduce(
-      (best, candidate, place) =>
-        Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best,
+      (best, candidate, place) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best),
       0,
     ),
   );
@@ -237,8 +236,7 @@ function requireSameVideo(name: string, labels: LabelFile, video: OpenedVideo): 
   const [[width, height], [wide, high]] = [labels.size, video.size];
   if (width !== wide || height !== high) {
     throw new LabelProblem(
-      `${name}: labels were made on ${width} x ${height} pixels, the video has ${wide} x ${high}; ` +
-        "use the video they were made on",
+      `${name}: labels were made on ${width} x ${height} pixels, the video has ${wide} x ${high}; ` + "use the video they were made on",
     );
   }
   const beyond = [...labels.frames.keys()].find((number) => number >= video.frameCount);

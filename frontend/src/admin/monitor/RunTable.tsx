@@ -22,7 +22,14 @@ export function RunTable({ study, snapshot }: { study: string; snapshot: Schemas
   const runs = snapshot.runs.filter((run) => shown === "all" || run.presence === shown);
   return (
     <Stack gap="xs">
-      <SegmentedControl size="xs" aria-label="Which runs" data={PRESENCES} value={shown} onChange={setShown} style={{ alignSelf: "flex-start" }} />
+      <SegmentedControl
+        size="xs"
+        aria-label="Which runs"
+        data={PRESENCES}
+        value={shown}
+        onChange={setShown}
+        style={{ alignSelf: "flex-start" }}
+      />
       <div className="scroll-x">
         <table className="runs" onClick={follow}>
           <thead>

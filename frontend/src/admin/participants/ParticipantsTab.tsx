@@ -33,9 +33,7 @@ export function ParticipantsTab() {
     queryKey: ["runs", study, show, sought],
     queryFn: ({ pageParam }) =>
       unwrap(
-        api.GET("/api/admin/studies/{study}/runs", {
-          params: { path: { study }, query: { show, search: sought, before: pageParam } },
-        }),
+        api.GET("/api/admin/studies/{study}/runs", { params: { path: { study }, query: { show, search: sought, before: pageParam } } }),
       ),
     initialPageParam: null as string | null,
     getNextPageParam: (last) => last.next,

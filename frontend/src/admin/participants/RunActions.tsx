@@ -11,14 +11,17 @@ interface Props {
 
 export function RunActions({ study, summary }: Props) {
   const path = { params: { path: { study, run: summary.run } } };
-  const touches = [["timeline", study, summary.run], ["runs", study], ["results", study]];
+  const touches = [
+    ["timeline", study, summary.run],
+    ["runs", study],
+    ["results", study],
+  ];
   const include = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}/runs/{run}/exclusion", path)), {
     touches,
     done: "The run counts again.",
   });
   const exclude = useChange(
-    (reason: string) =>
-      unwrap(api.PUT("/api/admin/studies/{study}/runs/{run}/exclusion", { ...path, body: { reason } })),
+    (reason: string) => unwrap(api.PUT("/api/admin/studies/{study}/runs/{run}/exclusion", { ...path, body: { reason } })),
     { touches, done: "The run is excluded." },
   );
   const erase = useChange(

@@ -29,9 +29,9 @@ export function TimelinePage() {
                   {data.summary.participant}
                 </Title>
                 <Text size="sm" c="dimmed">
-                  {words(data.summary.status)}, began {when(data.summary.started_at)}, {data.consented_at === null ? "has not agreed" : `agreed ${when(data.consented_at)}`},{" "}
-                  {data.summary.minutes.toFixed(1)} minutes, language {data.summary.language}, through “
-                  {data.summary.link}”
+                  {words(data.summary.status)}, began {when(data.summary.started_at)},{" "}
+                  {data.consented_at === null ? "has not agreed" : `agreed ${when(data.consented_at)}`}, {data.summary.minutes.toFixed(1)}{" "}
+                  minutes, language {data.summary.language}, through “{data.summary.link}”
                 </Text>
                 {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>

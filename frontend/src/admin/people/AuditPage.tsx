@@ -10,8 +10,7 @@ const A_PAGE = 50;
 export function AuditPage() {
   const log = useInfiniteQuery({
     queryKey: ["audit"],
-    queryFn: ({ pageParam }) =>
-      unwrap(api.GET("/api/admin/audit", { params: { query: { before: pageParam, limit: A_PAGE } } })),
+    queryFn: ({ pageParam }) => unwrap(api.GET("/api/admin/audit", { params: { query: { before: pageParam, limit: A_PAGE } } })),
     initialPageParam: null as number | null,
     getNextPageParam: (last) => (last.length === A_PAGE ? (last.at(-1)?.id ?? null) : null),
   });

@@ -36,7 +36,12 @@ function Invite() {
   return (
     <>
       <Group align="end">
-        <TextInput label="Whom" placeholder="a name, for your list" value={label} onChange={(event) => setLabel(event.currentTarget.value)} />
+        <TextInput
+          label="Whom"
+          placeholder="a name, for your list"
+          value={label}
+          onChange={(event) => setLabel(event.currentTarget.value)}
+        />
         <Select label="As" data={ROLES} value={role} allowDeselect={false} onChange={(word) => setRole(asRole(word))} />
         <Button onClick={() => invite.mutate(undefined)} loading={invite.isPending}>
           Make a one-time link
@@ -63,8 +68,7 @@ function Invite() {
 function OpenInvitations() {
   const open = useQuery({ queryKey: ["invitations"], queryFn: () => unwrap(api.GET("/api/admin/invitations")) });
   const withdraw = useChange(
-    (invitation_id: number) =>
-      unwrap(api.DELETE("/api/admin/invitations/{invitation_id}", { params: { path: { invitation_id } } })),
+    (invitation_id: number) => unwrap(api.DELETE("/api/admin/invitations/{invitation_id}", { params: { path: { invitation_id } } })),
     { touches: [["invitations"]], done: "The link is withdrawn." },
   );
   return (

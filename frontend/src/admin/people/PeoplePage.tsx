@@ -53,9 +53,7 @@ export function PeoplePage() {
               {
                 title: "Second factor",
                 wide: true,
-                cell: (row) => (
-                  <Badge color={row.second_factor ? "teal.9" : "gray.7"}>{row.second_factor ? "on" : "off"}</Badge>
-                ),
+                cell: (row) => <Badge color={row.second_factor ? "teal.9" : "gray.7"}>{row.second_factor ? "on" : "off"}</Badge>,
               },
               { title: "Since", wide: true, cell: (row) => when(row.created_at) },
             ]}

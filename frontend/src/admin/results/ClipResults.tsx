@@ -53,7 +53,11 @@ export function ClipResults({ study, data }: { study: string; data: Schemas["Res
           </Table>
         </ScrollArea>
         <Stack flex="1 1 300px" maw={460}>
-          {shown === undefined ? <Text c="dimmed">This clip is of an earlier version of the study.</Text> : <ClipCard key={shown.url} clip={shown} />}
+          {shown === undefined ? (
+            <Text c="dimmed">This clip is of an earlier version of the study.</Text>
+          ) : (
+            <ClipCard key={shown.url} clip={shown} />
+          )}
         </Stack>
       </Group>
     </Card>

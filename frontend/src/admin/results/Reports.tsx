@@ -16,10 +16,9 @@ export function Reports({ study, phase }: { study: string; phase: "pilot" | "liv
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/reports", path)),
     refetchInterval: (query) => (query.state.data?.some(isUnderWay) ? 1_000 : false),
   });
-  const build = useChange(
-    () => unwrap(api.POST("/api/admin/studies/{study}/reports", { ...path, body: { phase, sensitivity } })),
-    { touches: [["reports", study]] },
-  );
+  const build = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/reports", { ...path, body: { phase, sensitivity } })), {
+    touches: [["reports", study]],
+  });
   return (
     <Card withBorder>
       <Group justify="space-between" mb="sm" gap="sm">
@@ -64,9 +63,7 @@ function Report({ study, report }: { study: string; report: Schemas["ReportOut"]
   const address = (file: string) => `/api/admin/studies/${study}/reports/${report.id}/${file}`;
   return (
     <Group gap="sm">
-      <Badge color={report.status === "failed" ? "red.9" : report.status === "done" ? "teal.9" : "gray.7"}>
-        {report.status}
-      </Badge>
+      <Badge color={report.status === "failed" ? "red.9" : report.status === "done" ? "teal.9" : "gray.7"}>{report.status}</Badge>
       <Text size="sm">
         {when(report.created_at)}, {report.phase}
       </Text>

@@ -20,8 +20,7 @@ export function ResultsTab() {
   const phase = chosen ?? (detail?.summary.status === "pilot" ? "pilot" : "live");
   const results = useQuery({
     queryKey: ["results", study, phase],
-    queryFn: () =>
-      unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { phase } } })),
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { phase } } })),
     refetchInterval: 15_000,
   });
   return (
@@ -59,8 +58,8 @@ function Shown({ study, data, factors }: { study: string; data: Schemas["Results
   return (
     <Stack>
       <Alert>
-        {data.participants} participants, {data.ratings.toLocaleString()} ratings. These are means as data arrive, for a look at whether
-        all is well; the analysis is the report below.
+        {data.participants} participants, {data.ratings.toLocaleString()} ratings. These are means as data arrive, for a look at whether all
+        is well; the analysis is the report below.
       </Alert>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {singles.map((margin) => (

@@ -14,11 +14,7 @@ export function labelsOf(factors: Factors, name: string): { title: string; of: (
 }
 
 /** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
-export function marginPlot(
-  margin: Schemas["Margin"],
-  { scale_minimum, scale_maximum }: Results,
-  factors: Factors,
-): Plot.PlotOptions {
+export function marginPlot(margin: Schemas["Margin"], { scale_minimum, scale_maximum }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
   const [across, beside] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
   const rows = margin.means.map((mean) => ({
@@ -63,9 +59,19 @@ export function cellPlot({ cells, scale_minimum }: Results): Plot.PlotOptions {
     marginLeft: 12 + 7 * Math.max(4, ...cells.map((cell) => Math.min(22, cell.cell.length))),
     marginBottom: 36,
     x: { label: "answer" },
-    y: { label: null, domain: cells.map((cell) => cell.cell), tickFormat: (name: string) => (name.length > 22 ? `${name.slice(0, 21)}…` : name) },
+    y: {
+      label: null,
+      domain: cells.map((cell) => cell.cell),
+      tickFormat: (name: string) => (name.length > 22 ? `${name.slice(0, 21)}…` : name),
+    },
     marks: [
-      Plot.cell(rows, { x: "response", y: "cell", fill: SHARE_COLOUR, fillOpacity: (row: { share: number }) => (0.75 * row.share) / deepest, inset: 0.5 }),
+      Plot.cell(rows, {
+        x: "response",
+        y: "cell",
+        fill: SHARE_COLOUR,
+        fillOpacity: (row: { share: number }) => (0.75 * row.share) / deepest,
+        inset: 0.5,
+      }),
       Plot.text(rows, {
         x: "response",
         y: "cell",
@@ -86,13 +92,7 @@ function histogram(bins: { from: number; count: number }[], step: number, label:
     x: { label },
     y: { label: counted, grid: true },
     marks: [
-      Plot.rectY(bins, {
-        x1: "from",
-        x2: ({ from }: { from: number }) => from + step,
-        y: "count",
-        fill: SHARE_COLOUR,
-        tip: true,
-      }),
+      Plot.rectY(bins, { x1: "from", x2: ({ from }: { from: number }) => from + step, y: "count", fill: SHARE_COLOUR, tip: true }),
       Plot.ruleY([0]),
     ],
   };

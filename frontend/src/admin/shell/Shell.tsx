@@ -38,11 +38,7 @@ export function Shell() {
         account === null ? (
           <ToSignIn from={pathname} />
         ) : (
-          <AppShell
-            header={{ height: 52 }}
-            navbar={{ width: 200, breakpoint: "sm", collapsed: { mobile: !opened } }}
-            padding="md"
-          >
+          <AppShell header={{ height: 52 }} navbar={{ width: 200, breakpoint: "sm", collapsed: { mobile: !opened } }} padding="md">
             <AppShell.Header>
               <a className="skip-link" href="#content">
                 Skip to the content
@@ -66,16 +62,18 @@ export function Shell() {
                   <Text size="xs" c="dimmed" px="sm" pt="sm" pb={4}>
                     {group}
                   </Text>
-                  {PAGES.filter((page) => page.group === group && (page.role === "viewer" || account.role === "owner")).map(({ to, label }) => (
-                    <NavLink
-                      key={to}
-                      component={Link}
-                      to={to}
-                      label={label}
-                      onClick={close}
-                      active={to === "/" ? pathname === "/" || pathname.startsWith("/studies") : pathname.startsWith(to)}
-                    />
-                  ))}
+                  {PAGES.filter((page) => page.group === group && (page.role === "viewer" || account.role === "owner")).map(
+                    ({ to, label }) => (
+                      <NavLink
+                        key={to}
+                        component={Link}
+                        to={to}
+                        label={label}
+                        onClick={close}
+                        active={to === "/" ? pathname === "/" || pathname.startsWith("/studies") : pathname.startsWith(to)}
+                      />
+                    ),
+                  )}
                 </div>
               ))}
             </AppShell.Navbar>

@@ -24,7 +24,15 @@ export function ClipVideo({ url, label }: { url: string; label: string }) {
         onPlay={() => setPlaying(true)}
         onPause={() => setPlaying(false)}
       />
-      <Button size="compact-sm" variant="default" mt="xs" style={{ alignSelf: "flex-start" }} disabled={playing} onClick={play} aria-label={`Play ${label}`}>
+      <Button
+        size="compact-sm"
+        variant="default"
+        mt="xs"
+        style={{ alignSelf: "flex-start" }}
+        disabled={playing}
+        onClick={play}
+        aria-label={`Play ${label}`}
+      >
         Play
       </Button>
     </>

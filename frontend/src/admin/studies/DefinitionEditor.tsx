@@ -16,7 +16,11 @@ export function DefinitionEditor({ toml, onChange }: Props) {
   const place = useRef<HTMLTextAreaElement>(null);
   const checked = useCheck(toml);
   const goTo = (line: number) => {
-    const start = toml.split("\n").slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+    const start =
+      toml
+        .split("\n")
+        .slice(0, line - 1)
+        .join("\n").length + (line > 1 ? 1 : 0);
     const end = toml.indexOf("\n", start);
     place.current?.focus();
     place.current?.setSelectionRange(start, end === -1 ? toml.length : end);

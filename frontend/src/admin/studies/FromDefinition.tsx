@@ -10,10 +10,7 @@ export function FromDefinition({ name }: { name: string }) {
   const [toml, setToml] = useState("");
   const [upload, setUpload] = useState<Schemas["UploadOut"] | null>(null);
   const [shipped, setShipped] = useState<string | null>(null);
-  const experiments = useQuery({
-    queryKey: ["experiments"],
-    queryFn: () => unwrap(api.GET("/api/admin/experiments")),
-  });
+  const experiments = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
   const send = useChange(uploadFiles, { touches: [], then: setUpload });
   const create = useCreate();
   const usable = useCheck(toml)?.design != null;

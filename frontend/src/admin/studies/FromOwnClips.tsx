@@ -33,8 +33,7 @@ function Received({ upload }: { upload: Schemas["UploadOut"] }) {
     <>
       <Text>
         {upload.files.length} clips received
-        {first?.frames != null && `; the first has ${first.frames} frames at ${first.fps} fps, ${first.width_px} x ${first.height_px}`}
-        .
+        {first?.frames != null && `; the first has ${first.frames} frames at ${first.fps} fps, ${first.width_px} x ${first.height_px}`}.
       </Text>
       {wrong.length > 0 && (
         <Alert color="red" variant="light" title={`${wrong.length} files cannot be used`}>
@@ -53,19 +52,10 @@ function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }
   const [by, setBy] = useState("pattern");
   const [pattern, setPattern] = useState(upload.suggested_pattern ?? "");
   const [csv, setCsv] = useState(`file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`);
-  const [asked, setAsked] = useState({
-    title: "",
-    question: "How natural was this clip?",
-    low: "very unnatural",
-    high: "very natural",
-  });
+  const [asked, setAsked] = useState({ title: "", question: "How natural was this clip?", low: "very unnatural", high: "very natural" });
   const create = useCreate();
   const field = (key: keyof typeof asked, label: string) => (
-    <TextInput
-      label={label}
-      value={asked[key]}
-      onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })}
-    />
+    <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
   );
   return (
     <Stack>
@@ -110,9 +100,7 @@ function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }
         style={{ alignSelf: "flex-start" }}
         disabled={name === "" || asked.title === ""}
         loading={create.isPending}
-        onClick={() =>
-          create.mutate({ name, upload: upload.id, levels: by === "pattern" ? { pattern } : { csv }, own_clips: asked })
-        }
+        onClick={() => create.mutate({ name, upload: upload.id, levels: by === "pattern" ? { pattern } : { csv }, own_clips: asked })}
       >
         Create
       </Button>

@@ -5,10 +5,7 @@ import { Answer } from "../ui/Answer";
 import { useCreate } from "./useCreate";
 
 export function FromShipped({ name }: { name: string }) {
-  const shipped = useQuery({
-    queryKey: ["experiments"],
-    queryFn: () => unwrap(api.GET("/api/admin/experiments")),
-  });
+  const shipped = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
   const create = useCreate();
   return (
     <Answer of={shipped}>

@@ -39,8 +39,7 @@ export function LinksTab() {
 
 function LinkTable({ study, rows }: { study: string; rows: Schemas["LinkOut"][] }) {
   const revoke = useChange(
-    (link: string) =>
-      unwrap(api.DELETE("/api/admin/studies/{study}/links/{link}", { params: { path: { study, link } } })),
+    (link: string) => unwrap(api.DELETE("/api/admin/studies/{study}/links/{link}", { params: { path: { study, link } } })),
     { touches: [["links", study]], done: "The link is withdrawn." },
   );
   return (

@@ -21,7 +21,10 @@ export function NewLinks({ study }: { study: string }) {
   const [code, setCode] = useState("");
   const make = useChange(
     () => {
-      const labels = names.split("\n").map((name) => name.trim()).filter((name) => name !== "");
+      const labels = names
+        .split("\n")
+        .map((name) => name.trim())
+        .filter((name) => name !== "");
       const sent =
         recruiter === "none"
           ? null
@@ -65,7 +68,11 @@ export function NewLinks({ study }: { study: string }) {
               )}
             </>
           )}
-          <Button disabled={kind === "personal" && names.trim() === "" && count === ""} onClick={() => make.mutate(undefined)} loading={make.isPending}>
+          <Button
+            disabled={kind === "personal" && names.trim() === "" && count === ""}
+            onClick={() => make.mutate(undefined)}
+            loading={make.isPending}
+          >
             Make
           </Button>
         </Group>

@@ -34,13 +34,7 @@ function ChangeDefinition({ detail }: { detail: Schemas["StudyDetail"] }) {
   const [note, setNote] = useState("");
   const usable = useCheck(toml)?.design != null;
   const save = useChange(
-    () =>
-      unwrap(
-        api.POST("/api/admin/studies/{study}/versions", {
-          params: { path: { study: name } },
-          body: { revision, toml, note },
-        }),
-      ),
+    () => unwrap(api.POST("/api/admin/studies/{study}/versions", { params: { path: { study: name } }, body: { revision, toml, note } })),
     { touches: [["study", name]], done: "Saved as a new version." },
   );
   return (
@@ -99,10 +93,11 @@ function Versions({ detail }: { detail: Schemas["StudyDetail"] }) {
 
 function Delete({ name }: { name: string }) {
   const navigate = useNavigate();
-  const remove = useChange(
-    () => unwrap(api.DELETE("/api/admin/studies/{study}", { params: { path: { study: name } } })),
-    { touches: [["studies"]], done: "The draft is deleted.", then: () => void navigate({ to: "/" }) },
-  );
+  const remove = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}", { params: { path: { study: name } } })), {
+    touches: [["studies"]],
+    done: "The draft is deleted.",
+    then: () => void navigate({ to: "/" }),
+  });
   return (
     <ConfirmButton
       style={{ alignSelf: "flex-start" }}

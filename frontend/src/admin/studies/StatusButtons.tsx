@@ -4,12 +4,7 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
 
 type Status = Schemas["StudySummary"]["status"];
-const NEXT: Record<Status, Status[]> = {
-  draft: ["pilot", "live"],
-  pilot: ["draft", "live", "closed"],
-  live: ["closed"],
-  closed: ["live"],
-};
+const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draft", "live", "closed"], live: ["closed"], closed: ["live"] };
 const WORDS: Record<Status, [label: string, question: string]> = {
   draft: ["Back to draft", "Participants can no longer begin; pilot data stay."],
   pilot: ["Open as pilot", "Participants can begin; their data are marked as pilot."],
@@ -20,8 +15,7 @@ const WORDS: Record<Status, [label: string, question: string]> = {
 export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
   const path = { params: { path: { study: summary.name } } };
   const change = useChange(
-    (status: Status) =>
-      unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
+    (status: Status) => unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
     { touches: [["study", summary.name], ["studies"]], done: "The status is changed." },
   );
   const preview = useChange(

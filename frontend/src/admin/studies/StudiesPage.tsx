@@ -22,11 +22,7 @@ export function StudiesPage() {
       </Group>
       <Answer of={studies}>
         {(rows) =>
-          rows.length === 0 ? (
-            <Nothing />
-          ) : (
-            <DataTable rows={rows} rowKey={(row) => row.name} columns={COLUMNS} empty="No studies." />
-          )
+          rows.length === 0 ? <Nothing /> : <DataTable rows={rows} rowKey={(row) => row.name} columns={COLUMNS} empty="No studies." />
         }
       </Answer>
     </Stack>
@@ -36,9 +32,7 @@ export function StudiesPage() {
 function Nothing() {
   return (
     <Paper withBorder p="xl">
-      <Text>
-        No studies yet. Start from one of the three that ship with Palpebra, from a definition, or from your own clips.
-      </Text>
+      <Text>No studies yet. Start from one of the three that ship with Palpebra, from a definition, or from your own clips.</Text>
     </Paper>
   );
 }

@@ -39,9 +39,7 @@ export function StudyLayout() {
           <Group justify="space-between" align="start">
             <div>
               <Group gap="sm">
-                <Title order={1}>
-                  {summary.title}
-                </Title>
+                <Title order={1}>{summary.title}</Title>
                 <StatusBadge status={summary.status} />
               </Group>
               <Text c="dimmed" size="sm">

@@ -16,11 +16,7 @@ const PAGES = { consent: "Consent", instructions: "Instructions", practice: "Pra
 
 export function TextsTab() {
   const { study = "" } = useParams({ strict: false });
-  return (
-    <Answer of={useQuery(studyQuery(study))}>
-      {(detail) => <Texts key={detail.summary.revision} detail={detail} />}
-    </Answer>
-  );
+  return <Answer of={useQuery(studyQuery(study))}>{(detail) => <Texts key={detail.summary.revision} detail={detail} />}</Answer>;
 }
 
 /** The texts of one language as a record of strings. */
@@ -41,10 +37,7 @@ function Texts({ detail }: { detail: Schemas["StudyDetail"] }) {
   const save = useChange(
     () =>
       unwrap(
-        api.PUT("/api/admin/studies/{study}/texts", {
-          params: { path: { study: name } },
-          body: { revision, language, texts: edits },
-        }),
+        api.PUT("/api/admin/studies/{study}/texts", { params: { path: { study: name } }, body: { revision, language, texts: edits } }),
       ),
     { touches: [["study", name]], done: "Saved as a new version." },
   );

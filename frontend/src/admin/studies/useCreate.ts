@@ -16,10 +16,5 @@ export function useCreate() {
 export async function uploadFiles(files: readonly File[]): Promise<Schemas["UploadOut"]> {
   const form = new FormData();
   for (const file of files) form.append("files", file);
-  return unwrap(
-    api.POST("/api/admin/uploads", {
-      body: { files: [] },
-      bodySerializer: () => form,
-    }),
-  );
+  return unwrap(api.POST("/api/admin/uploads", { body: { files: [] }, bodySerializer: () => form }));
 }

@@ -9,7 +9,10 @@ export function soon(moment: string | null, now: string): string {
   if (moment === null) return "–";
   const then = new Date(moment);
   const today = then.toDateString() === new Date(now).toDateString();
-  return then.toLocaleString(undefined, today ? { timeStyle: "short" } : { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+  return then.toLocaleString(
+    undefined,
+    today ? { timeStyle: "short" } : { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" },
+  );
 }
 
 export function ago(moment: string, now: string): string {

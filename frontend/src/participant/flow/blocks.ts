@@ -39,10 +39,12 @@ export function restNodes(session: Session, block: number): Node[] {
 export function blockNodes(session: Session, block: number, next: number | null): Node[] {
   const trials = trialsOf(session, block);
   const open = trials.filter((one) => !one.answered && one.plays_done === 0);
-  return [{
-    timeline: [preloadNode(session, trials), ...trialNodes(session, open), ...repetitions(session, block)],
-    on_timeline_start: () => (enterStage(session, "trials"), fetchAhead(session, trials, next)),
-  }];
+  return [
+    {
+      timeline: [preloadNode(session, trials), ...trialNodes(session, open), ...repetitions(session, block)],
+      on_timeline_start: () => (enterStage(session, "trials"), fetchAhead(session, trials, next)),
+    },
+  ];
 }
 
 function trialsOf({ run }: Session, block: number): AssignedTrial[] {
@@ -97,10 +99,6 @@ function repetitions(session: Session, block: number): Node[] {
     return { ...next, next: null };
   });
   const taken: Node = { timeline: [], on_timeline_start: () => session.replays.shift(block) };
-  const loop: Node = {
-    timeline: [...checks(session), again, taken, waits],
-    conditional_function: wanted,
-    loop_function: wanted,
-  };
+  const loop: Node = { timeline: [...checks(session), again, taken, waits], conditional_function: wanted, loop_function: wanted };
   return [waits, loop];
 }

@@ -8,7 +8,14 @@ import type { Identity } from "./identity";
 import { persistently } from "./link";
 
 /** `why` is said first where the participant does not know yet what ended the run. */
-export async function ended(root: HTMLElement, t: Translate, run: RunDocument, started: StartedRun, identity: Identity, why = ""): Promise<void> {
+export async function ended(
+  root: HTMLElement,
+  t: Translate,
+  run: RunDocument,
+  started: StartedRun,
+  identity: Identity,
+  why = "",
+): Promise<void> {
   if (run.status === "withdrawn") return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn") });
   const done = await persistently(root, t, () => completed(started.run_token));
   // On a laboratory's computer the next person comes by the same link.

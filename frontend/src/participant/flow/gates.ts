@@ -43,8 +43,10 @@ export function findings(found: Abilities, gates: Gates): GateFinding[] {
   if (found.touch_only && !gates.allow_touch) add("gate_touch", true);
   if (tooSmall(found, gates)) {
     add("gate_screen", true, {
-      width: gates.minimum_width_px, height: gates.minimum_height_px,
-      have_width: found.screen_width_px, have_height: found.screen_height_px,
+      width: gates.minimum_width_px,
+      height: gates.minimum_height_px,
+      have_width: found.screen_width_px,
+      have_height: found.screen_height_px,
     });
   }
   if (found.secure && found.video && !found.web_codecs) add("gate_video", false);
@@ -58,5 +60,7 @@ function tooSmall(found: Abilities, gates: Gates): boolean {
   const long = Math.max(found.screen_width_px, found.screen_height_px);
   const short = Math.min(found.screen_width_px, found.screen_height_px);
   // A tablet held upright can be turned, so only the two sides count.
-  return long < Math.max(gates.minimum_width_px, gates.minimum_height_px) || short < Math.min(gates.minimum_width_px, gates.minimum_height_px);
+  return (
+    long < Math.max(gates.minimum_width_px, gates.minimum_height_px) || short < Math.min(gates.minimum_width_px, gates.minimum_height_px)
+  );
 }

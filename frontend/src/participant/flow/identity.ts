@@ -22,7 +22,11 @@ export class Identity {
   private own: string | null = null;
 
   /** A preview belongs to its tab; people recruited by name share no run even on one computer. */
-  constructor(link_token: string, kind: LinkDocument["kind"], private readonly search: string) {
+  constructor(
+    link_token: string,
+    kind: LinkDocument["kind"],
+    private readonly search: string,
+  ) {
     this.key = storageKey("palpebra", link_token, search);
     this.storage = storageOf(kind === "preview" ? "sessionStorage" : "localStorage");
   }
@@ -67,7 +71,9 @@ function uuid(): string {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   bytes[6] = (bytes[6]! & 0x0f) | 0x40;
   bytes[8] = (bytes[8]! & 0x3f) | 0x80;
-  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("").replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0"))
+    .join("")
+    .replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
 export function storageOf(name: "localStorage" | "sessionStorage"): Storage | null {

@@ -5,7 +5,11 @@
 import type { AssignedTrial, Calibration, LinkDocument, RatingBody, Receipt, RunDocument, StartedRun } from "../../api/participant";
 import type { OutboxItem } from "../outbox/store";
 
-export interface Kept { link: LinkDocument; started: StartedRun; run: RunDocument }
+export interface Kept {
+  link: LinkDocument;
+  started: StartedRun;
+  run: RunDocument;
+}
 type Write = Pick<OutboxItem, "kind" | "path" | "body">;
 
 const RUN = "/api/run/";
@@ -13,7 +17,10 @@ const RUN = "/api/run/";
 export class KeptVisit {
   private kept: Kept | null = null;
 
-  constructor(private readonly key: string, private readonly storage: Storage | null) {}
+  constructor(
+    private readonly key: string,
+    private readonly storage: Storage | null,
+  ) {}
 
   /** The visit kept here; null where there is none, or where the server must be asked before going on. */
   read(now: number = Date.now()): Kept | null {

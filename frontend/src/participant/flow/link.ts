@@ -41,9 +41,18 @@ export const startRun = (link_token: string, body: object): Promise<StartedRun> 
   call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body });
 
 const REFUSALS: Record<string, MessageKey> = {
-  link_unknown: "link_unknown", study_closed: "link_closed", run_too_old: "run_too_old", run_left: "run_left",
-  study_full: "link_full", link_expired: "link_expired", study_paused: "link_paused", closed: "link_closed",
-  expired: "link_expired", full: "link_full", paused: "link_paused", used: "link_used",
+  link_unknown: "link_unknown",
+  study_closed: "link_closed",
+  run_too_old: "run_too_old",
+  run_left: "run_left",
+  study_full: "link_full",
+  link_expired: "link_expired",
+  study_paused: "link_paused",
+  closed: "link_closed",
+  expired: "link_expired",
+  full: "link_full",
+  paused: "link_paused",
+  used: "link_used",
 };
 
 /** Tell why this link leads nowhere: by the link's status or the server's refusal. */
@@ -61,7 +70,12 @@ export function showClosedGate(root: HTMLElement, t: Translate, link_token: stri
 }
 
 /** The link, or what an earlier visit kept of it and its run where the server does not answer. */
-export async function reach(root: HTMLElement, t: Translate, link_token: string, kept: Kept | null): Promise<{ link: LinkDocument; kept: Kept | null }> {
+export async function reach(
+  root: HTMLElement,
+  t: Translate,
+  link_token: string,
+  kept: Kept | null,
+): Promise<{ link: LinkDocument; kept: Kept | null }> {
   if (!kept) return { link: await persistently(root, t, () => fetchLink(link_token)), kept };
   try {
     return { link: await fetchLink(link_token, KEPT_WAIT_MS), kept: null };

@@ -30,7 +30,11 @@ export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocum
   unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);
   const session: Session = {
-    link, run, root, outbox, screen,
+    link,
+    run,
+    root,
+    outbox,
+    screen,
     language: run.language,
     t: translator(run.language),
     events: new EventLog(outbox),

@@ -1,7 +1,10 @@
 /** Clips that did not run as declared, waiting to be shown again at the end of their block. */
 import type { AssignedTrial } from "../../api/participant";
 
-export interface Replay { trial: AssignedTrial; play: number }
+export interface Replay {
+  trial: AssignedTrial;
+  play: number;
+}
 
 export class Replays {
   private readonly queue: Replay[] = [];

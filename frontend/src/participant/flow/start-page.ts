@@ -16,7 +16,11 @@ export function startPage(root: HTMLElement, link: LinkDocument, language: strin
       const picker = link.study.languages.length > 1 ? languagePicker(link.study.languages, chosen, t("choose_language"), draw) : null;
       const preview = link.kind === "preview" ? h("p", { class: "help" }, t("preview_note")) : null;
       const start = button(t("start_study"), () => resolve(chosen));
-      showPage(display, { title: link.study.title, body: [h("p", { class: "lead" }, t("minutes", { minutes: Math.ceil(link.study.expected_minutes) })), preview, picker], actions: [start] });
+      showPage(display, {
+        title: link.study.title,
+        body: [h("p", { class: "lead" }, t("minutes", { minutes: Math.ceil(link.study.expected_minutes) })), preview, picker],
+        actions: [start],
+      });
     };
     draw(language);
   });

@@ -66,12 +66,13 @@ function middle(session: Session): Node[] {
 }
 
 function blockIsOpen(session: Session, block: number): boolean {
-  return session.run.trials.some((one) => one.block === block && one.kind !== "practice" && (!one.answered || one.plays_done < one.plays_wanted));
+  return session.run.trials.some(
+    (one) => one.block === block && one.kind !== "practice" && (!one.answered || one.plays_done < one.plays_wanted),
+  );
 }
 
 function ending(session: Session): Node[] {
-  return openForms(session, "after").map((form) =>
-    stageNode(session, "forms_after", trial(formPage(session), { eyebrow: "", form })));
+  return openForms(session, "after").map((form) => stageNode(session, "forms_after", trial(formPage(session), { eyebrow: "", form })));
 }
 
 function openForms({ run }: Session, when: Form["when"]): Form[] {

@@ -10,8 +10,14 @@ import { events, type Batch, nextBatch } from "./batch";
 import type { OutboxItem, OutboxStore } from "./store";
 
 export type Outcome = { accepted: true; body: unknown } | { accepted: false; refused: Refused };
-export interface Sent { id: string; receipt: Promise<Outcome> }
-export interface OutboxState { pending: number; failures: number }
+export interface Sent {
+  id: string;
+  receipt: Promise<Outcome>;
+}
+export interface OutboxState {
+  pending: number;
+  failures: number;
+}
 type Send = (method: string, path: string, options: { token: string; body: unknown }) => Promise<Answer>;
 
 export interface OutboxOptions {
@@ -38,7 +44,10 @@ export class Outbox {
   private idle: (() => void)[] = [];
   private run: { run_id: string; token: string } | null = null;
 
-  constructor(private readonly store: OutboxStore, private readonly options: OutboxOptions = {}) {}
+  constructor(
+    private readonly store: OutboxStore,
+    private readonly options: OutboxOptions = {},
+  ) {}
 
   get durable(): boolean {
     return this.store.durable && !this.storeFailed;

@@ -13,7 +13,10 @@ const H264 = "avc1.640028";
 /** True where the browser decodes H.264 the way its clips will be played. */
 export async function playsH264(): Promise<boolean> {
   if (!hasWebCodecs()) return document.createElement("video").canPlayType(`video/mp4; codecs="${H264}"`) !== "";
-  return VideoDecoder.isConfigSupported({ codec: H264, codedWidth: 960, codedHeight: 360 }).then(({ supported }) => supported === true, () => false);
+  return VideoDecoder.isConfigSupported({ codec: H264, codedWidth: 960, codedHeight: 360 }).then(
+    ({ supported }) => supported === true,
+    () => false,
+  );
 }
 
 /** True where any way to show clips exists. */

@@ -1,7 +1,12 @@
 /** A clip's bytes to its frames as pictures, all of them, before it is shown. Runs in the worker. */
 import { BufferSource, EncodedPacketSink, Input, MP4 } from "mediabunny";
 
-export interface DecodedClip { bitmaps: ImageBitmap[]; fps: number; width: number; height: number }
+export interface DecodedClip {
+  bitmaps: ImageBitmap[];
+  fps: number;
+  width: number;
+  height: number;
+}
 
 const LONGEST_CLIP_FRAMES = 900;
 
@@ -19,15 +24,15 @@ export async function decodeClip(bytes: ArrayBuffer, declared_fps: number | null
   return { bitmaps: frames.map(({ bitmap }) => bitmap), fps, width: first.bitmap.width, height: first.bitmap.height };
 }
 
-interface Frame { timestamp: number; bitmap: ImageBitmap }
+interface Frame {
+  timestamp: number;
+  bitmap: ImageBitmap;
+}
 
 async function decodeAll(config: VideoDecoderConfig, sink: EncodedPacketSink): Promise<Frame[]> {
   const pending: Promise<Frame>[] = [];
   let problem: DOMException | null = null;
-  const decoder = new VideoDecoder({
-    output: (frame) => pending.push(pictureOf(frame)),
-    error: (error) => (problem = error),
-  });
+  const decoder = new VideoDecoder({ output: (frame) => pending.push(pictureOf(frame)), error: (error) => (problem = error) });
   try {
     decoder.configure(config);
     for await (const packet of sink.packets()) {

@@ -1,9 +1,17 @@
 /** What shows clips: the worker where the browser has WebCodecs, else an ordinary video element. */
 import type { Showing } from "./record";
 
-export interface Prepared { frames: number; width: number; height: number; fps: number }
+export interface Prepared {
+  frames: number;
+  width: number;
+  height: number;
+  fps: number;
+}
 export type ShownClip = Omit<Showing, "key_at_ms" | "focus_lost">;
-export interface PlayOptions { fixation_ms: number; refresh_ms: number }
+export interface PlayOptions {
+  fixation_ms: number;
+  refresh_ms: number;
+}
 
 /** The clip cannot be decoded or drawn here. */
 export class ClipBroken extends Error {

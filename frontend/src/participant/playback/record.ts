@@ -14,7 +14,10 @@ export interface Showing {
   focus_lost: number;
 }
 
-export interface Screen { refresh_rate_hz: number | null; device_pixel_ratio: number }
+export interface Screen {
+  refresh_rate_hz: number | null;
+  device_pixel_ratio: number;
+}
 
 const ASSUMED_REFRESH_MS = 1000 / 60;
 /** Scheduling jitter of a time stamp that is no lateness. */
@@ -37,8 +40,7 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
     stalls: sum(showings.map((showing) => showing.stalls)),
     focus_lost: sum(showings.map((showing) => showing.focus_lost)),
     ...screen,
-    drawn: showings.flatMap(({ drawn, key_at_ms }) =>
-      drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),
+    drawn: showings.flatMap(({ drawn, key_at_ms }) => drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),
   };
 }
 
@@ -56,5 +58,4 @@ function gapsOf(drawn: Showing["drawn"]): number[] {
 const distinct = (drawn: Showing["drawn"]): number => new Set(drawn.map(([index]) => index)).size;
 const sum = (numbers: number[]): number => numbers.reduce((total, number) => total + number, 0);
 const round = (ms: number): number => Math.round(ms * 100) / 100;
-const worst = (showings: Showing[]): PlaybackMethod =>
-  showings.find((showing) => showing.method !== "webcodecs")?.method ?? "webcodecs";
+const worst = (showings: Showing[]): PlaybackMethod => showings.find((showing) => showing.method !== "webcodecs")?.method ?? "webcodecs";

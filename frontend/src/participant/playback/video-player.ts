@@ -8,7 +8,9 @@ import { ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type Show
 const ASSUMED_FPS = 30;
 const LOAD_LIMIT_MS = 20_000;
 
-interface Loaded extends Prepared { address: string }
+interface Loaded extends Prepared {
+  address: string;
+}
 
 export class VideoPlayer implements ClipPlayer {
   readonly method = "video";

@@ -4,7 +4,10 @@ import type { FromWorker, ToWorker } from "./protocol";
 
 const DECODE_LIMIT_MS = 20_000;
 
-interface Waiting { resolve: (message: FromWorker) => void; reject: (error: Error) => void }
+interface Waiting {
+  resolve: (message: FromWorker) => void;
+  reject: (error: Error) => void;
+}
 
 export class WorkerPlayer implements ClipPlayer {
   readonly method = "webcodecs";
@@ -34,7 +37,10 @@ export class WorkerPlayer implements ClipPlayer {
   }
 
   blank(sha256: string): void {
-    void this.prepared.get(sha256)?.then(({ width, height }) => this.tell({ type: "blank", width, height }), () => {});
+    void this.prepared.get(sha256)?.then(
+      ({ width, height }) => this.tell({ type: "blank", width, height }),
+      () => {},
+    );
   }
 
   async play(sha256: string, options: PlayOptions): Promise<ShownClip> {

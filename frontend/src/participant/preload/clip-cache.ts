@@ -3,7 +3,11 @@ import { ClipUnavailable, fetchClip, type ClipSource } from "./fetch-clip";
 
 const AT_ONCE = 4;
 
-export interface Progress { done: number; total: number; failed: ClipUnavailable[] }
+export interface Progress {
+  done: number;
+  total: number;
+  failed: ClipUnavailable[];
+}
 type Fetch = (source: ClipSource, options: { signal?: AbortSignal }) => Promise<ArrayBuffer>;
 
 export class ClipCache {
@@ -25,10 +29,13 @@ export class ClipCache {
     report({ done, total: wanted.length, failed });
     const worker = async (): Promise<void> => {
       for (let next = queue.shift(); next; next = queue.shift()) {
-        await this.one(next, signal).then(() => (done += 1), (error: unknown) => {
-          if (!(error instanceof ClipUnavailable)) throw error;
-          failed.push(error);
-        });
+        await this.one(next, signal).then(
+          () => (done += 1),
+          (error: unknown) => {
+            if (!(error instanceof ClipUnavailable)) throw error;
+            failed.push(error);
+          },
+        );
         report({ done, total: wanted.length, failed });
       }
     };

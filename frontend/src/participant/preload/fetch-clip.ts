@@ -1,6 +1,9 @@
 /** One clip over the network: stopped where no byte comes for a while, tried again, and its hash checked. */
 
-export interface ClipSource { clip_sha256: string; clip_url: string }
+export interface ClipSource {
+  clip_sha256: string;
+  clip_url: string;
+}
 export interface FetchOptions {
   attempts?: number;
   /** A transfer without a byte for so long is given up and tried again. */
@@ -12,7 +15,10 @@ export interface FetchOptions {
 export type ClipFault = "offline" | "missing" | "corrupt";
 export class ClipUnavailable extends Error {
   override name = "ClipUnavailable";
-  constructor(readonly sha256: string, readonly fault: ClipFault) {
+  constructor(
+    readonly sha256: string,
+    readonly fault: ClipFault,
+  ) {
     super(`clip ${sha256.slice(0, 12)}: ${fault}`);
   }
 }

@@ -13,10 +13,11 @@
     var report = new XMLHttpRequest();
     report.open("POST", "/api/unsupported");
     report.setRequestHeader("Content-Type", "application/json");
-    report.send(
-      JSON.stringify({ link_token: parts[parts.length - 1], reason: "old_browser", data: { user_agent: navigator.userAgent } }),
-    );
+    report.send(JSON.stringify({ link_token: parts[parts.length - 1], reason: "old_browser", data: { user_agent: navigator.userAgent } }));
   }
-  if (modules) window.addEventListener("load", function () { setTimeout(failed, 8000); });
+  if (modules)
+    window.addEventListener("load", function () {
+      setTimeout(failed, 8000);
+    });
   else failed();
 })();

@@ -1,6 +1,8 @@
 /** Whether the page had the participant's window all the time. */
 
-export interface Watch { stop: () => number }
+export interface Watch {
+  stop: () => number;
+}
 
 /** From now until `stop`, which tells how often the page was hidden or lost focus meanwhile. */
 export function watchFocus(): Watch {

@@ -19,7 +19,10 @@ export function measureRefreshRate(): Promise<number | null> {
 
 /** Null where there are too few stamps to tell, for instance in a hidden page. */
 export function refreshRate(stamps: readonly number[]): number | null {
-  const gaps = stamps.slice(1).map((stamp, place) => stamp - (stamps[place] ?? stamp)).sort((a, b) => a - b);
+  const gaps = stamps
+    .slice(1)
+    .map((stamp, place) => stamp - (stamps[place] ?? stamp))
+    .sort((a, b) => a - b);
   const median = gaps[Math.floor(gaps.length / 2)];
   return gaps.length < 10 || !median ? null : Math.round((1000 / median) * 10) / 10;
 }

@@ -46,9 +46,7 @@ export function clipHeight(trial: AssignedTrial, width: number): number {
   return trial.width_px && trial.height_px ? (width * trial.height_px) / trial.width_px : width / 2;
 }
 
-export function calibrationBody(
-  px_per_mm: number, method: Calibration["method"], viewing_distance_mm: number | null,
-): Calibration {
+export function calibrationBody(px_per_mm: number, method: Calibration["method"], viewing_distance_mm: number | null): Calibration {
   return {
     px_per_mm: Math.round(px_per_mm * 10_000) / 10_000,
     method,

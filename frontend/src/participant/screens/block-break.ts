@@ -7,8 +7,14 @@ import { INT, plugin, type PluginClass } from "../jspsych";
 import { counted, type Session } from "../session";
 import { choose, stopButton } from "./support";
 
-interface Parameters { block: number; blocks: number; seconds_min: number }
-interface Data { rested_ms: number }
+interface Parameters {
+  block: number;
+  blocks: number;
+  seconds_min: number;
+}
+interface Data {
+  rested_ms: number;
+}
 
 export function blockBreak(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
@@ -40,7 +46,10 @@ async function rest(session: Session, display: HTMLElement, { block, blocks, sec
   const wait = h("p", { class: "status", role: "status" });
   const footer = h("footer", { class: "actions" });
   const text = markdown(run.texts.block_break || `# ${t("break_part", { block, blocks })}`);
-  const section = showPage(display, { eyebrow: t("break_part", { block, blocks }), body: [h("div", { class: "prose" }, ...text), bar.element, count, wait, footer] });
+  const section = showPage(display, {
+    eyebrow: t("break_part", { block, blocks }),
+    body: [h("div", { class: "prose" }, ...text), bar.element, count, wait, footer],
+  });
   section.classList.add("break");
   section.append(stopButton(session));
   await countDown(session, wait, footer, seconds_min);

@@ -10,9 +10,18 @@ import { measureDistance } from "./distance";
 import { CHECK_LINE_MM, lengthField, measuredLinePx, rulerLine } from "./ruler";
 import { choose, noDevice, saveShown, screenOut, stopButton } from "./support";
 
-interface Parameters { eyebrow: string; changed: boolean }
-interface Data { px_per_mm: number | null; method: string }
-interface Measured { px_per_mm: number; method: Calibration["method"] }
+interface Parameters {
+  eyebrow: string;
+  changed: boolean;
+}
+interface Data {
+  px_per_mm: number | null;
+  method: string;
+}
+interface Measured {
+  px_per_mm: number;
+  method: Calibration["method"];
+}
 
 const SIMULATED_PX_PER_MM = 96 / 25.4;
 
@@ -100,7 +109,11 @@ async function checked(session: Session, display: HTMLElement, eyebrow: string, 
   const footer = h("footer", { class: "actions" });
   const text = h("p", {}, t("ruler_check_text", { length: length_mm }));
   page(session, display, eyebrow, "ruler_check_title", [text, rulerLine(length_mm * measured.px_per_mm), footer]);
-  const choices = [{ label: t("ruler_ok"), value: "ok" }, { label: t("ruler_none"), value: "ok" }, { label: t("ruler_differs"), value: "no" }];
+  const choices = [
+    { label: t("ruler_ok"), value: "ok" },
+    { label: t("ruler_none"), value: "ok" },
+    { label: t("ruler_differs"), value: "no" },
+  ];
   return (await choose(session, footer, choices)) === "ok" ? measured : "again";
 }
 
@@ -112,7 +125,10 @@ async function byRuler(session: Session, display: HTMLElement, eyebrow: string):
   page(session, display, eyebrow, "ruler_title", [h("p", {}, t("ruler_text")), rulerLine(line_px), field.element, footer]);
   for (;;) {
     footer.replaceChildren();
-    const step = await choose(session, footer, [{ label: t("continue"), value: "measured" }, { label: t("use_card"), value: "other" }]);
+    const step = await choose(session, footer, [
+      { label: t("continue"), value: "measured" },
+      { label: t("use_card"), value: "other" },
+    ]);
     if (step === "other") return "other";
     const length_mm = field.value();
     if (length_mm !== null) return { px_per_mm: line_px / length_mm, method: "ruler" };

@@ -13,7 +13,10 @@ const START_PX = (CARD_WIDTH_MM * 96) / 25.4;
 /** A narrower window (a phone) cannot hold a card lying down, so there it stands upright. */
 const UPRIGHT_BELOW_PX = 600;
 
-export interface CardView { element: HTMLElement; px_per_mm: () => number }
+export interface CardView {
+  element: HTMLElement;
+  px_per_mm: () => number;
+}
 
 export function cardView(t: Translate, start_px_per_mm: number | null): CardView {
   const upright = window.innerWidth < UPRIGHT_BELOW_PX;
@@ -23,7 +26,13 @@ export function cardView(t: Translate, start_px_per_mm: number | null): CardView
   const id = uniqueId("card");
   const slider = h("input", { type: "range", id, min: SMALLEST_PX, max: Math.round(largest), step: 1 });
   const corner = h("span", { class: "card-corner", "aria-hidden": "true" });
-  const card = h("div", { class: upright ? "card card-upright" : "card" }, h("span", { class: "card-chip" }), h("span", { class: "card-lines" }), corner);
+  const card = h(
+    "div",
+    { class: upright ? "card card-upright" : "card" },
+    h("span", { class: "card-chip" }),
+    h("span", { class: "card-lines" }),
+    corner,
+  );
   const set = (next: number): void => {
     length = Math.min(largest, Math.max(SMALLEST_PX, next));
     const sides = [length, length * SHAPE];
@@ -34,9 +43,21 @@ export function cardView(t: Translate, start_px_per_mm: number | null): CardView
   slider.addEventListener("input", () => set(Number(slider.value)));
   dragCorner(corner, card, (width) => set(upright ? width / SHAPE : width));
   set(length);
-  const row = h("div", { class: "row" }, button(t("card_smaller"), () => set(length - 1), "quiet"), slider, button(t("card_larger"), () => set(length + 1), "quiet"));
-  const element = h("div", { class: "card-area" }, h("div", { class: "card-space" }, card),
-    h("label", { for: id, class: "help" }, t("card_slider")), row, h("p", { class: "help" }, t("card_hint")));
+  const row = h(
+    "div",
+    { class: "row" },
+    button(t("card_smaller"), () => set(length - 1), "quiet"),
+    slider,
+    button(t("card_larger"), () => set(length + 1), "quiet"),
+  );
+  const element = h(
+    "div",
+    { class: "card-area" },
+    h("div", { class: "card-space" }, card),
+    h("label", { for: id, class: "help" }, t("card_slider")),
+    row,
+    h("p", { class: "help" }, t("card_hint")),
+  );
   return { element, px_per_mm: () => length / CARD_WIDTH_MM };
 }
 

@@ -6,8 +6,12 @@ import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 import { saveShown } from "./support";
 
-interface Parameters { eyebrow: string }
-interface Data { agreed: boolean }
+interface Parameters {
+  eyebrow: string;
+}
+interface Data {
+  agreed: boolean;
+}
 
 export function consent(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
@@ -39,5 +43,9 @@ function showConsent(session: Session, display: HTMLElement, eyebrow: string, do
     void saveShown(session, status, session.api.consent()).then((outcome) => (outcome.accepted ? done() : (go.disabled = false)));
   });
   const agree = h("label", { class: "tick", for: box.id }, box, h("span", {}, t("consent_agree")));
-  showPage(display, { eyebrow, body: [h("div", { class: "prose" }, ...markdown(session.run.texts.consent)), agree, alert, status], actions: [go] });
+  showPage(display, {
+    eyebrow,
+    body: [h("div", { class: "prose" }, ...markdown(session.run.texts.consent)), agree, alert, status],
+    actions: [go],
+  });
 }

@@ -27,7 +27,7 @@ export function distanceFrom(separation_px: number, px_per_mm: number): number {
 export async function measureDistance(session: Session, display: HTMLElement, px_per_mm: number): Promise<number> {
   if (distanceFrom(window.innerWidth - SIDES_PX, px_per_mm) < NEEDED_MM) return typed(session, display);
   const found: number[] = [];
-  for (let remark = ""; found.length < ROUNDS; ) {
+  for (let remark = ""; found.length < ROUNDS;) {
     const separation = await oneRound(session, display, px_per_mm, found.length + 1, remark);
     if (separation === "type") return typed(session, display);
     const distance = separation === null ? 0 : distanceFrom(separation, px_per_mm);
@@ -38,7 +38,13 @@ export async function measureDistance(session: Session, display: HTMLElement, px
   return found.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0;
 }
 
-async function oneRound(session: Session, display: HTMLElement, px_per_mm: number, round: number, remark: string): Promise<number | "type" | null> {
+async function oneRound(
+  session: Session,
+  display: HTMLElement,
+  px_per_mm: number,
+  round: number,
+  remark: string,
+): Promise<number | "type" | null> {
   const { t } = session;
   const dot = h("span", { class: "blind-dot" });
   const field = h("div", { class: "blind-field", dir: "ltr", "aria-hidden": "true" }, dot, h("span", { class: "blind-square" }));
@@ -46,10 +52,23 @@ async function oneRound(session: Session, display: HTMLElement, px_per_mm: numbe
   const status = statusLine();
   status.textContent = remark;
   const body = [h("p", {}, t("distance_text", { times: ROUNDS })), field, status, footer];
-  const section = showPage(display, { title: t("distance_title"), eyebrow: t("distance_round", { round, times: ROUNDS }), body, wide: true });
+  const section = showPage(display, {
+    title: t("distance_title"),
+    eyebrow: t("distance_round", { round, times: ROUNDS }),
+    body,
+    wide: true,
+  });
   section.classList.add("calibration");
   section.append(stopButton(session));
-  const step = await choose(session, footer, [{ label: t("distance_start"), value: "go" }, { label: t("distance_type"), value: "type", kind: "plain" }], true);
+  const step = await choose(
+    session,
+    footer,
+    [
+      { label: t("distance_start"), value: "go" },
+      { label: t("distance_type"), value: "type", kind: "plain" },
+    ],
+    true,
+  );
   if (step === "type") return "type";
   footer.replaceChildren();
   return moveDot(session, dot, field, footer, START_MM * px_per_mm);

@@ -12,7 +12,12 @@ export interface FieldView {
   check(): string | null;
   focus(): void;
 }
-interface Control { node: HTMLElement; grouped: boolean; answer: () => FieldAnswer; fault: () => string | null }
+interface Control {
+  node: HTMLElement;
+  grouped: boolean;
+  answer: () => FieldAnswer;
+  fault: () => string | null;
+}
 
 export function fieldView(field: FormField, language: string, t: Translate): FieldView {
   const ids = { control: uniqueId("field"), help: uniqueId("help"), fault: uniqueId("fault") };
@@ -85,7 +90,13 @@ function choiceControl(options: { value: string; label: string }[], several: boo
 function likertControl(points: number, low: string, high: string, name: string): Control {
   const inputs = Array.from({ length: points }, (_, place) => h("input", { type: "radio", name, value: place + 1 }));
   const steps = inputs.map((input, place) => h("label", { class: "step" }, input, h("span", {}, place + 1)));
-  const node = h("div", { class: "likert" }, h("span", { class: "end" }, low), h("div", { class: "steps" }, ...steps), h("span", { class: "end" }, high));
+  const node = h(
+    "div",
+    { class: "likert" },
+    h("span", { class: "end" }, low),
+    h("div", { class: "steps" }, ...steps),
+    h("span", { class: "end" }, high),
+  );
   const answer = (): number | null => Number(inputs.find((input) => input.checked)?.value ?? 0) || null;
   return { node, grouped: true, answer, fault: () => null };
 }

@@ -10,8 +10,12 @@ import { STRING, plugin, type PluginClass } from "../jspsych";
 import { leaveFullScreen } from "../screen/full-screen";
 import type { Session } from "../session";
 
-interface Parameters { token: string }
-interface Data { completion_code: string }
+interface Parameters {
+  token: string;
+}
+interface Data {
+  completion_code: string;
+}
 
 /** The server still lacks ratings or a form: the run must be taken up again, and leads to them. */
 export class AnswersMissing extends Error {
@@ -65,19 +69,47 @@ export async function completed(token: string): Promise<Completion> {
 }
 
 /** The last page, also of who is screened out. It lies outside the timeline, which clears what its screens have shown. */
-export function showCompletion(session: Pick<Session, "t" | "run">, display: HTMLElement, done: Completion, extra: HTMLElement[] = [], why = ""): void {
+export function showCompletion(
+  session: Pick<Session, "t" | "run">,
+  display: HTMLElement,
+  done: Completion,
+  extra: HTMLElement[] = [],
+  why = "",
+): void {
   const { t, run } = session;
   const out = done.status === "screened_out";
-  const code = done.completion_code && h("div", { class: "code" }, h("p", { class: "help" }, t(out ? "out_code" : "done_code")), codeRow(t("done_copy"), t("done_copied"), done.completion_code));
+  const code =
+    done.completion_code &&
+    h(
+      "div",
+      { class: "code" },
+      h("p", { class: "help" }, t(out ? "out_code" : "done_code")),
+      codeRow(t("done_copy"), t("done_copied"), done.completion_code),
+    );
   const back = done.redirect_url && h("a", { class: "button primary", href: done.redirect_url, rel: "noreferrer" }, t("done_return"));
   const text = out ? run.texts.screened_out || `# ${t("screened_out_title")}\n\n${t("screened_out")}` : run.texts.debrief;
   const prose = h("div", { class: "prose" }, ...markdown(text));
-  showPage(display, { body: [why && h("p", { role: "alert" }, why), prose, code, h("p", { class: "status", role: "status" }, t(out ? "close" : "done_close"))], actions: [back, ...extra] });
+  showPage(display, {
+    body: [
+      why && h("p", { role: "alert" }, why),
+      prose,
+      code,
+      h("p", { class: "status", role: "status" }, t(out ? "close" : "done_close")),
+    ],
+    actions: [back, ...extra],
+  });
 }
 
 function codeRow(copy: string, copied: string, code: string): HTMLElement {
-  const press = button(copy, () => {
-    void navigator.clipboard?.writeText(code).then(() => (press.textContent = copied), () => {});
-  }, "quiet");
+  const press = button(
+    copy,
+    () => {
+      void navigator.clipboard?.writeText(code).then(
+        () => (press.textContent = copied),
+        () => {},
+      );
+    },
+    "quiet",
+  );
   return h("p", { class: "row" }, h("output", {}, code), press);
 }

@@ -9,8 +9,13 @@ import { fieldView, type FieldView } from "./fields";
 import { simulatedAnswer, fillIn } from "./simulated-form";
 import { saveShown, stopButton } from "./support";
 
-interface Parameters { eyebrow: string; form: Form }
-interface Data { answers: FormAnswers }
+interface Parameters {
+  eyebrow: string;
+  form: Form;
+}
+interface Data {
+  answers: FormAnswers;
+}
 
 export function formPage(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
@@ -44,9 +49,14 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
     go.disabled = true;
     const answers = answersOf(views);
     void saveShown(session, status, session.api.form(form.name, answers)).then((outcome) =>
-      outcome.accepted ? done({ answers }) : (go.disabled = false));
+      outcome.accepted ? done({ answers }) : (go.disabled = false),
+    );
   });
-  const body = h("form", { class: "form", novalidate: true, onsubmit: (event) => (event.preventDefault(), go.click()) }, ...views.map((view) => view.element));
+  const body = h(
+    "form",
+    { class: "form", novalidate: true, onsubmit: (event) => (event.preventDefault(), go.click()) },
+    ...views.map((view) => view.element),
+  );
   const section = showPage(display, { title: pick(form.title, language), eyebrow, body: [body, alert, status], actions: [go] });
   section.append(stopButton(session));
 }

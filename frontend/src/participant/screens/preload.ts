@@ -9,8 +9,15 @@ import type { ClipSource } from "../preload/fetch-clip";
 import type { Session } from "../session";
 import { choose, stopButton } from "./support";
 
-interface Parameters { eyebrow: string; trials: AssignedTrial[] }
-interface Data { clips: number; failed: number; waited_ms: number }
+interface Parameters {
+  eyebrow: string;
+  trials: AssignedTrial[];
+}
+interface Data {
+  clips: number;
+  failed: number;
+  waited_ms: number;
+}
 
 export function sourcesOf(trials: readonly AssignedTrial[]): ClipSource[] {
   return trials.flatMap(({ clip_sha256, clip_url }) => (clip_sha256 && clip_url ? [{ clip_sha256, clip_url }] : []));

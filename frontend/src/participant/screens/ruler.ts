@@ -18,13 +18,23 @@ export function rulerLine(length_px: number): HTMLElement {
   return h("div", { class: "ruler-space" }, line);
 }
 
-export interface LengthField { element: HTMLElement; value: () => number | null }
+export interface LengthField {
+  element: HTMLElement;
+  value: () => number | null;
+}
 
 /** A field for a length in mm; `value` is null, and the reason is shown, where it cannot be one. */
 export function lengthField(t: Translate): LengthField {
   const id = uniqueId("length");
   const fault = h("p", { class: "fault", id: `${id}-fault`, role: "alert" });
-  const input = h("input", { id, type: "text", inputmode: "decimal", class: "short", autocomplete: "off", "aria-describedby": `${id}-fault` });
+  const input = h("input", {
+    id,
+    type: "text",
+    inputmode: "decimal",
+    class: "short",
+    autocomplete: "off",
+    "aria-describedby": `${id}-fault`,
+  });
   const element = h("div", { class: "field" }, h("label", { for: id }, t("ruler_length")), input, fault);
   return {
     element,

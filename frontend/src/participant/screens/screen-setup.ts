@@ -6,8 +6,13 @@ import { canFullScreen, enterFullScreen, isFullScreen } from "../screen/full-scr
 import type { Session } from "../session";
 import { choose, noDevice, screenOut, stopButton } from "./support";
 
-interface Parameters { eyebrow: string; again: boolean }
-interface Data { full_screen: boolean }
+interface Parameters {
+  eyebrow: string;
+  again: boolean;
+}
+interface Data {
+  full_screen: boolean;
+}
 
 /** True where the page must ask: full screen is wanted and lost, or the window is too small. */
 export function needsScreenSetup(session: Session): boolean {
@@ -64,13 +69,16 @@ function settled(): Promise<void> {
 async function askRoom(session: Session, display: HTMLElement, eyebrow: string): Promise<void> {
   const { t, run } = session;
   const values = {
-    width: run.display.minimum_width_px, height: run.display.minimum_height_px,
-    have_width: window.innerWidth, have_height: window.innerHeight,
+    width: run.display.minimum_width_px,
+    height: run.display.minimum_height_px,
+    have_width: window.innerWidth,
+    have_height: window.innerHeight,
   };
   const status = statusLine();
   const footer = h("footer", { class: "actions" });
-  showPage(display, { title: t("window_small_title"), eyebrow, body: [h("p", {}, t("window_small", values)), status, footer] })
-    .append(stopButton(session));
+  showPage(display, { title: t("window_small_title"), eyebrow, body: [h("p", {}, t("window_small", values)), status, footer] }).append(
+    stopButton(session),
+  );
   const choices = [{ label: t("try_again"), value: true }, ...noDevice(session, false)];
   if (!(await choose(session, footer, choices))) await screenOut(session, "window_small", values);
 }

@@ -4,8 +4,12 @@ import { showPage } from "../../ui/page";
 import { BOOL, INT, plugin, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 
-interface Parameters { limit_ms: number }
-interface Data { settled: boolean }
+interface Parameters {
+  limit_ms: number;
+}
+interface Data {
+  settled: boolean;
+}
 const SEEN_MS = 250;
 
 export function settle(session: Session): PluginClass<Parameters> {
@@ -14,9 +18,12 @@ export function settle(session: Session): PluginClass<Parameters> {
     parameters: { limit_ms: { type: INT, description: "longest wait in ms; what comes later joins the next block" } },
     data: { settled: { type: BOOL, description: "true where the server had everything" } },
     async show(display, { limit_ms }) {
-      const say = setTimeout(() => {
-        showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, session.t("saving_offline"))] });
-      }, SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8));
+      const say = setTimeout(
+        () => {
+          showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, session.t("saving_offline"))] });
+        },
+        SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8),
+      );
       const settled = await session.outbox.drained(limit_ms);
       clearTimeout(say);
       return { settled };

@@ -10,8 +10,16 @@ export function openStopDialog(session: Session): void {
   const close = (): void => dialog.remove();
   const pause = (): void => (close(), end(session, "paused"));
   const withdraw = (): void => (close(), void withdrawn(session));
-  dialog.append(h("h2", { id: "stop-title" }, t("stop_title")), h("div", { class: "stack" },
-    button(t("stop_continue"), close), button(t("stop_later"), pause, "quiet"), button(t("stop_withdraw"), withdraw, "quiet")));
+  dialog.append(
+    h("h2", { id: "stop-title" }, t("stop_title")),
+    h(
+      "div",
+      { class: "stack" },
+      button(t("stop_continue"), close),
+      button(t("stop_later"), pause, "quiet"),
+      button(t("stop_withdraw"), withdraw, "quiet"),
+    ),
+  );
   dialog.addEventListener("close", close);
   session.root.append(dialog);
   dialog.showModal();

@@ -14,7 +14,11 @@ export function screenSignal(session: Session): { signal: AbortSignal; done: () 
   return { signal: AbortSignal.any([own.signal, session.over.signal]), done: () => own.abort() };
 }
 
-export interface Choice<Value> { label: string; value: Value; kind?: "primary" | "quiet" | "plain" }
+export interface Choice<Value> {
+  label: string;
+  value: Value;
+  kind?: "primary" | "quiet" | "plain";
+}
 
 /** Buttons for `choices`; resolves with the one pressed. Enter presses the first where no field has the focus. */
 export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], withSpace = false): Promise<Value> {
@@ -55,5 +59,9 @@ export async function screenOut(session: Session, reason: string, data: object):
 
 /** The quiet way out, in the corner of pages between the trials. */
 export function stopButton(session: Session): HTMLElement {
-  return h("div", { class: "corner" }, button(session.t("stop"), () => void session.root.dispatchEvent(new CustomEvent("stop")), "plain"));
+  return h(
+    "div",
+    { class: "corner" },
+    button(session.t("stop"), () => void session.root.dispatchEvent(new CustomEvent("stop")), "plain"),
+  );
 }

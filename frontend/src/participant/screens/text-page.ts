@@ -6,8 +6,15 @@ import { plugin, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 import { choose, stopButton } from "./support";
 
-export interface TextPageParameters { eyebrow: string; text: string; action: string; remarks: string }
-export interface TextPageData { read_ms: number }
+export interface TextPageParameters {
+  eyebrow: string;
+  text: string;
+  action: string;
+  remarks: string;
+}
+export interface TextPageData {
+  read_ms: number;
+}
 
 export function textPage(session: Session): PluginClass<TextPageParameters> {
   return plugin<TextPageParameters, TextPageData>({

@@ -11,8 +11,12 @@ import type { Session } from "../session";
 import { askScale, type Rated } from "./clip-rating/scale";
 import { saveRating } from "./save-rating";
 
-interface Parameters { trial: AssignedTrial }
-interface Data { response: number }
+interface Parameters {
+  trial: AssignedTrial;
+}
+interface Data {
+  response: number;
+}
 
 export function attentionCheck(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
@@ -34,7 +38,12 @@ async function check(session: Session, display: HTMLElement, trial: AssignedTria
   const below = h("div", { class: "below" });
   const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
   display.replaceChildren(section);
-  const question = h("div", { class: "question" }, h("h1", { class: "eyebrow" }, session.t("attention_title")), ...markdown(trial.prompt ?? ""));
+  const question = h(
+    "div",
+    { class: "question" },
+    h("h1", { class: "eyebrow" }, session.t("attention_title")),
+    ...markdown(trial.prompt ?? ""),
+  );
   const shown_at_ms = absoluteNow();
   const rating = { ...session.run.trial, comment: false };
   const answer = askScale(below, { trial: rating, language: session.language, t: session.t, signal, question });

@@ -5,7 +5,11 @@ import type { Session } from "../session";
 import { attentionCheck } from "./attention-check";
 import { clipRating, placeIn } from "./clip-rating/plugin";
 
-export interface Showable { trial: AssignedTrial; play: number; next: AssignedTrial | null }
+export interface Showable {
+  trial: AssignedTrial;
+  play: number;
+  next: AssignedTrial | null;
+}
 type Maker = (session: Session, what: () => Showable) => Node;
 
 const kinds: Record<ClipRating["kind"], Maker> = {

@@ -17,8 +17,20 @@ import { showOnce, type Shown, waitForStart } from "./showing";
 import { simulatedRating } from "./simulated";
 import { stage, type Stage } from "./stage";
 
-export interface ClipRatingParameters { trial: AssignedTrial; play: number; next: AssignedTrial | null; number: number; total: number }
-export interface ClipRatingData { response: number | null; rt: number | null; frames_missing: number | null; key_to_first_frame_ms: number | null; again: boolean }
+export interface ClipRatingParameters {
+  trial: AssignedTrial;
+  play: number;
+  next: AssignedTrial | null;
+  number: number;
+  total: number;
+}
+export interface ClipRatingData {
+  response: number | null;
+  rt: number | null;
+  frames_missing: number | null;
+  key_to_first_frame_ms: number | null;
+  again: boolean;
+}
 
 export function clipRating(session: Session): PluginClass<ClipRatingParameters> {
   return plugin<ClipRatingParameters, ClipRatingData>({
@@ -79,7 +91,12 @@ async function watchAndRate(session: Session, place: Stage, parameters: ClipRati
   return body;
 }
 
-async function watch(session: Session, place: Stage, { number, total, play, trial }: ClipRatingParameters, sha256: string): Promise<Shown[]> {
+async function watch(
+  session: Session,
+  place: Stage,
+  { number, total, play, trial }: ClipRatingParameters,
+  sha256: string,
+): Promise<Shown[]> {
   const { t } = session;
   const { views } = session.run.trial;
   const showings: Shown[] = [];
@@ -98,7 +115,11 @@ async function watch(session: Session, place: Stage, { number, total, play, tria
 
 async function rate(session: Session, place: Stage): Promise<Rated> {
   const { signal, done } = screenSignal(session);
-  const { run: { trial }, language, t } = session;
+  const {
+    run: { trial },
+    language,
+    t,
+  } = session;
   const question = h("h1", { class: "question" }, pick(trial.scale.question, language));
   const rated = await askScale(place.below, { trial, language, t, signal, question });
   done();
@@ -107,7 +128,8 @@ async function rate(session: Session, place: Stage): Promise<Rated> {
 
 function ratingBody(session: Session, { trial, play }: ClipRatingParameters, showings: Shown[], rated: Rated): RatingBody {
   const last = showings.at(-1);
-  const since = (start: number | undefined): number | null => (start === undefined ? null : Math.round((rated.answered_at_ms - start) * 100) / 100);
+  const since = (start: number | undefined): number | null =>
+    start === undefined ? null : Math.round((rated.answered_at_ms - start) * 100) / 100;
   return {
     trial_index: trial.trial_index,
     play,
@@ -124,8 +146,15 @@ function ratingBody(session: Session, { trial, play }: ClipRatingParameters, sho
 
 function emptyBody(session: Session, { trial, play }: ClipRatingParameters): RatingBody {
   return {
-    trial_index: trial.trial_index, play, response: null, rt: null, rt_from_first_frame: null,
-    time_elapsed: session.clock.elapsed(), changes: 0, comment: null, answered_at_client: new Date().toISOString(),
+    trial_index: trial.trial_index,
+    play,
+    response: null,
+    rt: null,
+    rt_from_first_frame: null,
+    time_elapsed: session.clock.elapsed(),
+    changes: 0,
+    comment: null,
+    answered_at_client: new Date().toISOString(),
     playback: { ...playbackRecord(trial.clip_sha256, [], session.screen.record()), frames_missing: trial.frames ?? 0 },
   };
 }
@@ -145,4 +174,3 @@ function actTrial(display: HTMLElement): void {
     press?.click();
   }, 250);
 }
-

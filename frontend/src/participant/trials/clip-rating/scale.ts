@@ -6,8 +6,19 @@ import { listenKeys } from "../../../ui/keys";
 import { button } from "../../../ui/page";
 import { keyFor, valueOf } from "./scale-keys";
 
-export interface Rated { response: number; answered_at_ms: number; changes: number; comment: string | null }
-export interface ScaleOptions { trial: ClipRating; language: string; t: Translate; signal: AbortSignal; question: HTMLElement }
+export interface Rated {
+  response: number;
+  answered_at_ms: number;
+  changes: number;
+  comment: string | null;
+}
+export interface ScaleOptions {
+  trial: ClipRating;
+  language: string;
+  t: Translate;
+  signal: AbortSignal;
+  question: HTMLElement;
+}
 
 const SEEN_MS = 140;
 
@@ -24,7 +35,11 @@ class ScaleView {
   private changes = 0;
   private over = false;
 
-  constructor(place: HTMLElement, private readonly options: ScaleOptions, private readonly resolve: (rated: Rated) => void) {
+  constructor(
+    place: HTMLElement,
+    private readonly options: ScaleOptions,
+    private readonly resolve: (rated: Rated) => void,
+  ) {
     const { trial, t, signal } = options;
     this.keys = this.makeKeys();
     this.comment = trial.comment ? h("textarea", { rows: 2, maxlength: 2000, id: uniqueId("comment") }) : null;
@@ -44,15 +59,34 @@ class ScaleView {
       const end = value === scale.minimum ? pick(scale.low, language) : value === scale.maximum ? pick(scale.high, language) : "";
       const label = t("rating_key", { value, maximum: scale.maximum }) + (end ? `, ${end}` : "");
       const onclick = (event: Event): void => this.choose(value, event.timeStamp);
-      return h("button", { type: "button", class: "key", "aria-label": label, "aria-pressed": "false", "data-value": value, onclick }, value);
+      return h(
+        "button",
+        { type: "button", class: "key", "aria-label": label, "aria-pressed": "false", "data-value": value, onclick },
+        value,
+      );
     });
   }
 
   private layout(): HTMLElement[] {
-    const { trial: { scale }, language, question, t } = this.options;
+    const {
+      trial: { scale },
+      language,
+      question,
+      t,
+    } = this.options;
     question.id = uniqueId("question");
-    const ends = h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, pick(scale.low, language)), h("span", {}, pick(scale.high, language)));
-    const group = h("div", { class: "scale", role: "group", "aria-labelledby": question.id, tabindex: -1 }, h("div", { class: "keys" }, ...this.keys), ends);
+    const ends = h(
+      "div",
+      { class: "ends", "aria-hidden": "true" },
+      h("span", {}, pick(scale.low, language)),
+      h("span", {}, pick(scale.high, language)),
+    );
+    const group = h(
+      "div",
+      { class: "scale", role: "group", "aria-labelledby": question.id, tabindex: -1 },
+      h("div", { class: "keys" }, ...this.keys),
+      ends,
+    );
     group.style.setProperty("--points", String(this.keys.length));
     const more = this.comment && h("div", { class: "field comment" }, h("label", { for: this.comment.id }, t("comment")), this.comment);
     const confirm = this.confirm && h("div", { class: "actions" }, this.confirm);
@@ -88,7 +122,12 @@ class ScaleView {
     const chosen = this.chosen;
     if (!chosen || this.over) return;
     this.over = true;
-    const rated = { response: chosen.value, answered_at_ms: chosen.at_ms, changes: this.changes, comment: this.comment?.value.trim() || null };
+    const rated = {
+      response: chosen.value,
+      answered_at_ms: chosen.at_ms,
+      changes: this.changes,
+      comment: this.comment?.value.trim() || null,
+    };
     // Long enough to see the key go down; the time of the answer is already taken.
     setTimeout(() => this.resolve(rated), SEEN_MS);
   }

@@ -8,7 +8,9 @@ import { screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
 import type { Stage } from "./stage";
 
-export interface Shown extends Showing { early_keys: number }
+export interface Shown extends Showing {
+  early_keys: number;
+}
 
 const FALLBACK_REFRESH_MS = 1000 / 60;
 
@@ -36,13 +38,22 @@ export function waitForStart(session: Session, place: Stage, prompt: string, not
 
 /** Play the prepared clip once, with nothing else on the screen. */
 export async function showOnce(session: Session, place: Stage, sha256: string, key_at_ms: number): Promise<Shown> {
-  const { run: { trial }, player, screen, t } = session;
+  const {
+    run: { trial },
+    player,
+    screen,
+    t,
+  } = session;
   const { signal, done } = screenSignal(session);
   let early_keys = 0;
-  document.addEventListener("keydown", (event) => {
-    if (!event.repeat && event.key.length === 1) early_keys += 1;
-    if (event.key === " ") event.preventDefault();
-  }, { signal });
+  document.addEventListener(
+    "keydown",
+    (event) => {
+      if (!event.repeat && event.key.length === 1) early_keys += 1;
+      if (event.key === " ") event.preventDefault();
+    },
+    { signal },
+  );
   place.setPlaying(true);
   place.below.replaceChildren(h("p", { class: "spoken", role: "status" }, t("clip_playing")));
   const focus = watchFocus();

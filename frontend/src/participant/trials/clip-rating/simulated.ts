@@ -10,8 +10,15 @@ export async function simulatedRating(session: Session, { trial, play }: ClipRat
   const response = minimum + Math.floor(Math.random() * (maximum - minimum + 1));
   const rt = 400 + Math.round(Math.random() * 1_200);
   const body: RatingBody = {
-    trial_index: trial.trial_index, play, response, rt, rt_from_first_frame: rt + 1_500,
-    time_elapsed: session.clock.elapsed(), changes: 0, comment: null, answered_at_client: new Date().toISOString(),
+    trial_index: trial.trial_index,
+    play,
+    response,
+    rt,
+    rt_from_first_frame: rt + 1_500,
+    time_elapsed: session.clock.elapsed(),
+    changes: 0,
+    comment: null,
+    answered_at_client: new Date().toISOString(),
     playback: playbackRecord(trial.clip_sha256, [], session.screen.record()),
   };
   await saveRating(session, trial, body);
