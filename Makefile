@@ -25,7 +25,7 @@ check: setup-test ## lint and type-check everything, import rules, lock files, k
 	@$(BIN)/mypy
 	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools
 	@$(BIN)/lint-imports
-	@cd frontend && npm run --silent typecheck && npm run --silent api -- --check
+	@cd frontend && npm run --silent typecheck && npm run --silent lint && npm run --silent api -- --check
 	@$(BIN)/python tools/check_lock_files.py
 	@$(BIN)/python tools/audit.py
 
@@ -35,8 +35,9 @@ setup:
 setup-test:
 	@$(PYTHON) tools/setup.py test
 
-format: ## rewrite the Python in the house format
+format: setup-test ## rewrite Python and TypeScript in the house format
 	@$(BIN)/ruff format -q . && $(BIN)/ruff check --fix -q .
+	@cd frontend && npm run --silent format
 
 lock: ## resolve the Python dependencies again, with hashes
 	@$(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o requirements.lock

@@ -6,16 +6,14 @@ import type { components } from "./schema";
 
 type Schemas = components["schemas"];
 
-export type Translated = Record<string, string>;
+type Translated = Record<string, string>;
 export type LinkDocument = Schemas["LinkState"];
 export type Gates = Schemas["Gates"];
 export type StartedRun = Schemas["RunStarted"];
 export type AssignedTrial = Schemas["TrialInfo"];
-export type TrialKind = AssignedTrial["kind"];
 export type Stage = Schemas["StageChange"]["stage"];
 export type Calibration = Required<Schemas["CalibrationState"]>;
 export type Receipt = Schemas["Receipt"];
-export type Verdict = Receipt["verdict"];
 export type RatingBody = Required<Omit<Schemas["RatingIn"], "playback">> & { playback: PlaybackRecord };
 export type Completion = Schemas["Completion"];
 
@@ -43,7 +41,7 @@ export interface RunDocument extends Omit<Schemas["RunState"], "texts" | "forms"
   display: Gates & { background: string };
 }
 
-export interface Texts {
+interface Texts {
   consent: string;
   instructions: string;
   practice: string;
@@ -76,28 +74,28 @@ interface FieldBase {
   help?: Translated | null;
   required: boolean;
 }
-export interface TextField extends FieldBase {
+interface TextField extends FieldBase {
   type: "text";
   max_length: number;
 }
-export interface NumberField extends FieldBase {
+interface NumberField extends FieldBase {
   type: "number";
   minimum: number;
   maximum: number;
 }
-export interface Option {
+interface Option {
   value: string;
   label: Translated;
 }
-export interface ChoiceField extends FieldBase {
+interface ChoiceField extends FieldBase {
   type: "choice";
   options: Option[];
 }
-export interface MultipleChoiceField extends FieldBase {
+interface MultipleChoiceField extends FieldBase {
   type: "multiple_choice";
   options: Option[];
 }
-export interface LikertField extends FieldBase {
+interface LikertField extends FieldBase {
   type: "likert";
   points: number;
   low: Translated;

@@ -14,11 +14,6 @@ export function translator(language: string): Translate {
   return (key, values = {}) => messages[key].replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
 }
 
-/** True where the page speaks `language` itself, not only the study's texts. */
-export function isShipped(language: string): boolean {
-  return (catalogues[language] ?? catalogues[language.slice(0, 2)]) !== undefined;
-}
-
 export function direction(language: string): "rtl" | "ltr" {
   return RIGHT_TO_LEFT.has(language.slice(0, 2)) ? "rtl" : "ltr";
 }

@@ -3,10 +3,10 @@
 import type { Grey } from "./grey";
 
 export const FRAMES_WANTED = 20;
-export const MOST_CANDIDATES = 120;
+const MAX_CANDIDATES = 120;
 
 /** Frame numbers spread evenly over a video, first and last among them. */
-export function candidateFrames(frameCount: number, most = MOST_CANDIDATES): number[] {
+export function candidateFrames(frameCount: number, most = MAX_CANDIDATES): number[] {
   const count = Math.min(frameCount, most);
   if (count < 2) return frameCount > 0 ? [0] : [];
   return Array.from({ length: count }, (_, place) => Math.round((place * (frameCount - 1)) / (count - 1)));

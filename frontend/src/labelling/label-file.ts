@@ -56,7 +56,7 @@ function objectOf(name: string, text: string): Record<string, unknown> {
   try {
     found = JSON.parse(text);
   } catch (error) {
-    throw new LabelProblem(`${name}: not a label file in JSON (${error instanceof Error ? error.message : error})`);
+    throw new LabelProblem(`${name}: not a label file in JSON (${error instanceof Error ? error.message : String(error)})`);
   }
   if (typeof found !== "object" || found === null || Array.isArray(found)) {
     throw new LabelProblem(`${name}: expected a JSON object with 'image_size_px' and 'frames'`);

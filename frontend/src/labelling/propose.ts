@@ -88,7 +88,7 @@ function searchFinely(
 }
 
 function centreOf(eye: Shape): Point {
-  const [sumX, sumY] = eye.reduce(([x, y], point): Point => [x + point[0], y + point[1]], [0, 0] as Point);
+  const [sumX, sumY] = eye.reduce<Point>(([x, y], point) => [x + point[0], y + point[1]], [0, 0]);
   return [sumX / eye.length, sumY / eye.length];
 }
 

@@ -113,7 +113,7 @@ export function parseReview(name: string, text: string): ReviewRow[] {
 }
 
 /** Greatest distance in frames between a decision's minimum and its blink's. */
-export function matchFrames(fps: number): number {
+function matchFrames(fps: number): number {
   return Math.max(1, (MATCH_FRAMES * fps) / PAPER_FPS);
 }
 

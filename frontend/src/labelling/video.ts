@@ -7,7 +7,7 @@ import type { Size } from "./points";
 const THUMBNAIL_PX = 64;
 
 /** The video cannot be used; the message says why. */
-export class VideoProblem extends Error {
+class VideoProblem extends Error {
   override name = "VideoProblem";
 }
 
@@ -39,7 +39,7 @@ async function opened(name: string, input: Input): Promise<OpenedVideo> {
   if (track === null) throw new VideoProblem(`${name}: expected a video stream, the file has none`);
   if (!(await track.canDecode())) {
     throw new VideoProblem(
-      `${name}: this browser cannot decode ${track.codec ?? "its codec"}; ` +
+      `${name}: this browser cannot decode ${(await track.getCodec()) ?? "its codec"}; ` +
         "convert it without loss, for example with ffmpeg -i in -c:v libx264 -crf 0 out.mp4",
     );
   }
@@ -102,8 +102,9 @@ function copied(picture: CanvasImageSource, width: number, height: number): HTML
 
 /** Grey values of a whole canvas. */
 export function greyOfCanvas(canvas: HTMLCanvasElement | OffscreenCanvas): Grey {
-  const context = canvas.getContext("2d", { willReadFrequently: true }) as
-    CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D | null;
+  const context: CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D | null = canvas.getContext("2d", {
+    willReadFrequently: true,
+  });
   if (context === null) throw new VideoProblem("this browser gives no canvas to draw in");
   return greyOf(context.getImageData(0, 0, canvas.width, canvas.height));
 }

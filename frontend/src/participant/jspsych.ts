@@ -55,7 +55,7 @@ export function plugin<Parameters extends object, Data extends object>(screen: S
 
 type OrFunction<Parameters> = { [Name in keyof Parameters]: Parameters[Name] | (() => Parameters[Name]) };
 export type Node = { type: PluginClass<never> } | Branch;
-export interface Branch {
+interface Branch {
   timeline: Node[];
   conditional_function?: () => boolean;
   loop_function?: () => boolean;

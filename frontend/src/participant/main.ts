@@ -64,7 +64,10 @@ async function visit(entry: Entry): Promise<void> {
   const identity = new Identity(link_token, link.kind, location.search);
   // A visit that this browser or this personal link has begun may go on though no new one may begin.
   const returns = kept !== null || identity.isKnown || link.resumable;
-  if (link.status !== "open" && !returns) return showRefusal(root, t, link.status);
+  if (link.status !== "open" && !returns) {
+    showRefusal(root, t, link.status);
+    return;
+  }
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
   const found = await abilities(store.durable);
   const list = findings(found, link.gates);
@@ -89,10 +92,16 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
   const explain = (): void => showClosedGate(root, t, link_token, closed, found);
   // A run begun in another browser is left to that one: starting it here would take it over.
   const elsewhere = returns && !identity.isKnown;
-  if (!link.screens_devices || kept || elsewhere) return explain();
+  if (!link.screens_devices || kept || elsewhere) {
+    explain();
+    return;
+  }
   const started = await begun(entry, identity, language);
   const before = await persistently(root, t, () => fetchRun(started.run_token));
-  if (before.status === "active" && before.consented_at) return explain();
+  if (before.status === "active" && before.consented_at) {
+    explain();
+    return;
+  }
   if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, found));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
   await ended(root, t, run, started, identity, t(closed.reason, closed.values));
@@ -170,7 +179,10 @@ async function play(session: Session, started: StartedRun, durable: boolean): Pr
     over.abort();
     outbox.stop();
   };
-  root.addEventListener("tab-taken", () => (session.events.add("second_tab"), end()));
+  root.addEventListener("tab-taken", () => {
+    session.events.add("second_tab");
+    end();
+  });
   root.addEventListener("taken-over", end);
   root.addEventListener("stop", () => openStopDialog(session));
   watch(session);

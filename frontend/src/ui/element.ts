@@ -15,13 +15,13 @@ export function h<Tag extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-export function setAttribute(element: Element, name: string, value: Attributes[string]): void {
+function setAttribute(element: Element, name: string, value: Attributes[string]): void {
   if (typeof value === "function") element.addEventListener(name.replace(/^on/, ""), value);
   else if (value === false || value === null || value === undefined) element.removeAttribute(name);
   else element.setAttribute(name, value === true ? "" : String(value));
 }
 
-export function append(parent: Element, children: Child[]): void {
+function append(parent: Element, children: Child[]): void {
   for (const child of children) {
     if (child === null || child === undefined || child === false) continue;
     parent.append(typeof child === "number" ? String(child) : child);

@@ -44,7 +44,7 @@ function startOf(line: string, open: Block | null): Block | null {
 
 function continued(open: Block | null, text: string, blocks: Block[]): Block {
   if (open?.kind === "paragraph") open.text += ` ${text}`;
-  else if (open?.kind === "list") open.items[open.items.length - 1] += ` ${text}`;
+  else if (open?.kind === "list") open.items.push(`${open.items.pop() ?? ""} ${text}`);
   else {
     const paragraph: Block = { kind: "paragraph", text };
     blocks.push(paragraph);
@@ -56,7 +56,7 @@ function continued(open: Block | null, text: string, blocks: Block[]): Block {
 const INLINE = /\*\*(.+?)\*\*|__(.+?)__|\*(.+?)\*|`(.+?)`|\[([^\]]+)\]\(([^)\s]+)\)/;
 const SAFE_ADDRESS = /^(https?:\/\/|mailto:)/i;
 
-export function inline(text: string): Child[] {
+function inline(text: string): Child[] {
   const found = INLINE.exec(text);
   if (!found) return [text];
   const [whole, bold, bold2, italic, code, label, address] = found;

@@ -109,7 +109,8 @@ describe("the visit kept for a reload without a server", () => {
   it("gives away copies, so that what the page changes is not taken for accepted", () => {
     const [, storage] = kept();
     const [keeping] = kept(storage, null);
-    const given = keeping.read(NOW)!;
+    const given = keeping.read(NOW);
+    if (!given) throw new Error("expected the visit that was kept");
     applyWrite(given.run, rating(0));
     keeping.note(rating(1), {});
     expect(readAgain(storage)?.run.trials.map((one) => one.answered)).toEqual([false, true]);

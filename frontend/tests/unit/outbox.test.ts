@@ -12,11 +12,12 @@ type Reply = number | "silence";
 /** A server that answers as told, then with 200 for ever, and remembers what it stored. */
 function server(replies: Reply[] = []) {
   const got: { path: string; body: unknown; token: string }[] = [];
-  const send = async (_method: string, path: string, options: { token: string; body: unknown }): Promise<Answer> => {
+  const send = (_method: string, path: string, options: { token: string; body: unknown }): Promise<Answer> => {
     const reply = replies.shift() ?? 200;
-    if (reply === "silence") throw new NetworkError("no answer");
+    if (reply === "silence") return Promise.reject(new NetworkError("no answer"));
     got.push({ path, ...options });
-    return { status: reply, body: reply < 300 ? { receipt: path } : { error: { code: "refused", message: "no" } }, retry_after_s: null };
+    const body = reply < 300 ? { receipt: path } : { error: { code: "refused", message: "no" } };
+    return Promise.resolve({ status: reply, body, retry_after_s: null });
   };
   return { got, send };
 }
@@ -107,7 +108,7 @@ describe("outbox", () => {
     await Promise.all([outbox.putEvent({ id: "e1" }), outbox.put("PUT", "/a", {}), outbox.putEvent({ id: "e2" })]);
     await outbox.drained();
     expect(paths(got)).toContain("/a");
-    expect(got.at(-1)?.body).toEqual({ events: expect.arrayContaining([{ id: "e2" }]) });
+    expect((got.at(-1)?.body as { events: object[] }).events).toContainEqual({ id: "e2" });
   });
 
   it("goes on in memory, and says so, when the disk fails", async () => {

@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 import { ClipCache } from "../../src/participant/preload/clip-cache";
 import { ClipUnavailable, fetchClip, sha256 } from "../../src/participant/preload/fetch-clip";
 
-const bytes = new TextEncoder().encode("a clip").buffer as ArrayBuffer;
+const bytes = new TextEncoder().encode("a clip").buffer;
 const pause = (): Promise<void> => Promise.resolve();
 const reply = (body: ArrayBuffer | null, status = 200): Response => new Response(body, { status });
 
@@ -17,7 +17,9 @@ describe("one clip", () => {
       () => Promise.resolve(reply(new ArrayBuffer(3))),
       () => Promise.resolve(reply(bytes)),
     ];
-    const fetching = vi.spyOn(globalThis, "fetch").mockImplementation(() => (answers.shift() ?? answers[0])!());
+    const fetching = vi
+      .spyOn(globalThis, "fetch")
+      .mockImplementation(() => answers.shift()?.() ?? Promise.reject(new Error("expected three requests at most")));
     expect(new Uint8Array(await fetchClip(await source(), { pause }))).toEqual(new Uint8Array(bytes));
     expect(fetching.mock.calls.map(([, init]) => init?.cache)).toEqual(["default", "default", "reload"]);
   });
@@ -61,10 +63,9 @@ describe("the clips of a block", () => {
   });
 
   it("are told where they could not be had, and the others are here", async () => {
-    const cache = new ClipCache(async ({ clip_sha256 }) => {
-      if (clip_sha256 === "3") throw new ClipUnavailable("3", "missing");
-      return bytes;
-    });
+    const cache = new ClipCache(({ clip_sha256 }) =>
+      clip_sha256 === "3" ? Promise.reject(new ClipUnavailable("3", "missing")) : Promise.resolve(bytes),
+    );
     expect((await cache.load(sources)).map((failure) => failure.sha256)).toEqual(["3"]);
     expect(cache.get("4")).toBe(bytes);
     cache.keepOnly(sources.slice(0, 2));

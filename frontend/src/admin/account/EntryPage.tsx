@@ -2,7 +2,7 @@
 
 import { Button, Container, Paper, Stack, Title } from "@mantine/core";
 import type { UseMutationResult } from "@tanstack/react-query";
-import type { FormEvent, ReactNode } from "react";
+import type { SubmitEvent, ReactNode } from "react";
 import { ErrorAlert } from "../ui/Answer";
 
 export function EntryPage({ title, children }: { title: string; children: ReactNode }) {
@@ -24,7 +24,7 @@ interface FormProps<T> {
 
 /** Fields, the server's refusal where there is one, and the button that sends. */
 export function EntryForm<T>({ sending, button, children }: FormProps<T>) {
-  const submit = (event: FormEvent) => {
+  const submit = (event: SubmitEvent) => {
     event.preventDefault();
     sending.mutate();
   };

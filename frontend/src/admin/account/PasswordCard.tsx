@@ -1,5 +1,5 @@
 import { Button, Card, Stack, Title } from "@mantine/core";
-import { type FormEvent, useState } from "react";
+import { type SubmitEvent, useState } from "react";
 import { api, unwrap } from "../api";
 import { useChange } from "../ui/useChange";
 import { PasswordField } from "./fields";
@@ -15,7 +15,7 @@ export function PasswordCard() {
       setFresh("");
     },
   });
-  const submit = (event: FormEvent) => {
+  const submit = (event: SubmitEvent) => {
     event.preventDefault();
     change.mutate(undefined);
   };

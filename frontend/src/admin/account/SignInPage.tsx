@@ -49,6 +49,6 @@ export function SignInPage() {
 
 /** Where somebody wanted to go before they had to sign in; only within this site. */
 function usePageAskedFor(): string {
-  const { next } = useSearch({ strict: false }) as { next?: unknown };
+  const { next }: { next?: unknown } = useSearch({ strict: false });
   return typeof next === "string" && /^\/(?!\/)/.test(next) ? next : "/";
 }

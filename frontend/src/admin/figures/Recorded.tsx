@@ -9,13 +9,17 @@ import { Character } from "./Character";
 
 type Profile = Schemas["RecordedProfile"];
 
+function byEyes({ profiles }: Schemas["BlinkLibrary"]) {
+  return { pairs: profiles.filter(isPair), singles: profiles.filter((one) => !isPair(one)) };
+}
+
 export function Recorded({ library }: { library: Schemas["BlinkLibrary"] }) {
   const [kind, setKind] = useState("one");
-  const [pairs, singles] = [library.profiles.filter(isPair), library.profiles.filter((one) => !isPair(one))];
+  const { pairs, singles } = useMemo(() => byEyes(library), [library]);
   const shown = kind === "both" ? pairs : singles;
   const [chosen, setChosen] = useState("");
   const current = shown.find((profile) => profile.profile_id === chosen) ?? shown[0];
-  const aligned = useMemo(() => alignedPlot(shown, library.fps), [kind, library]);
+  const aligned = useMemo(() => alignedPlot(shown, library.fps), [shown, library.fps]);
   return (
     <Stack>
       <Text size="sm" maw={720}>

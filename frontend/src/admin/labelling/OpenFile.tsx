@@ -5,7 +5,7 @@ interface Props {
   accept: string;
   disabled?: boolean;
   primary?: boolean;
-  onOpen: (file: File) => void;
+  onOpen: (file: File) => Promise<void>;
 }
 
 /** A button that opens a file in the page; the file stays on this computer. */
@@ -16,7 +16,7 @@ export function OpenFile({ label, accept, disabled = false, primary = false, onO
       disabled={disabled}
       inputProps={{ "aria-label": label }}
       onChange={(file) => {
-        if (file !== null) onOpen(file);
+        if (file !== null) void onOpen(file);
       }}
     >
       {(button) => (

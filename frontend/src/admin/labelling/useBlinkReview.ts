@@ -1,6 +1,6 @@
 /** The work of the blink review page: a series, its blinks, and the decisions about them with undo. */
 
-import { useEffect, useMemo, useState } from "react";
+import { useMemo, useState } from "react";
 import { parseTable, type Table, TableProblem } from "../../labelling/csv";
 import { begun, changed, type History, redone, undone } from "../../labelling/history";
 import {
@@ -36,7 +36,7 @@ export function useBlinkReview() {
   const [reviewName, setReviewName] = useState("review.csv");
   const [column, setColumn] = useState<string | null>(null);
   const [chosenKey, setChosenKey] = useState<string | null>(null);
-  const [window, setWindow] = useState<Window>({ from: 0, to: 1 });
+  const [chosenWindow, setChosenWindow] = useState<{ of: string; window: Window } | null>(null);
   const decisions = history.now;
 
   const columns = useMemo(() => [...new Set(table?.blinks.map((blink) => blink.column))], [table]);
@@ -47,7 +47,14 @@ export function useBlinkReview() {
   const last = (values?.length ?? 1) - 1;
   const fps = table?.fps ?? 1;
 
-  useEffect(() => setWindow({ from: 0, to: Math.max(1, Math.min(last, FIRST_WINDOW_S * fps)) }), [last, fps]);
+  // A part of one recording means nothing in a recording of another length.
+  const recording = `${last} at ${fps}`;
+  const window = chosenWindow?.of === recording ? chosenWindow.window : firstWindow(last, fps);
+  const setWindow = (next: Window | ((before: Window) => Window)): void =>
+    setChosenWindow((before) => {
+      if (typeof next !== "function") return { of: recording, window: next };
+      return { of: recording, window: next(before?.of === recording ? before.window : firstWindow(last, fps)) };
+    });
 
   const reading = async (file: File, take: (name: string, text: string) => void): Promise<void> => {
     setProblem(null);
@@ -130,6 +137,10 @@ export function useBlinkReview() {
       setSaved(decisions);
     },
   };
+}
+
+function firstWindow(last: number, fps: number): Window {
+  return { from: 0, to: Math.max(1, Math.min(last, FIRST_WINDOW_S * fps)) };
 }
 
 interface Read {

@@ -1,6 +1,6 @@
 /** The work of the labelling page: a video, its labels with undo, and the start shape of each new frame. */
 
-import { useCallback, useEffect, useRef, useState } from "react";
+import { useCallback, useEffect, useEffectEvent, useRef, useState } from "react";
 import { candidateFrames, farthestPictures, FRAMES_WANTED } from "../../labelling/choose-frames";
 import type { Grey } from "../../labelling/grey";
 import { begun, changed, type History, redone, undone } from "../../labelling/history";
@@ -139,16 +139,19 @@ export function useLabelling() {
   }, [video, current]);
 
   const labelled = frames.has(current);
+  // The frames count as they are when a new frame is opened: a start shape does not change under the hand.
+  const propose = useEffectEvent((opened: OpenedVideo, shownPicture: { number: number; canvas: HTMLCanvasElement }) =>
+    startShape(opened, shownPicture, acceptedOf(frames), eyes, greys.current),
+  );
   useEffect(() => {
     if (video === null || picture === null || picture.number !== current || labelled) return;
     let wanted = true;
-    startShape(video, picture, acceptedOf(frames), eyes, greys.current)
+    propose(video, picture)
       .then((found) => wanted && setStart(found))
       .catch((error: unknown) => wanted && setProblem(message(error)));
     return () => {
       wanted = false;
     };
-    // The frames count as they are when a new frame is opened: a start shape does not change under the hand.
   }, [video, picture, current, labelled, eyes]);
 
   const shown = frames.get(current)?.shape ?? (start?.number === current ? start.shape : null);

@@ -1,6 +1,6 @@
 /** Keys of a page. They rest while a person types into a field. */
 
-import { useEffect, useRef } from "react";
+import { useEffect, useEffectEvent } from "react";
 
 export type Shortcuts = Readonly<Record<string, (event: KeyboardEvent) => void>>;
 
@@ -16,15 +16,14 @@ function isTyping(target: EventTarget | null): boolean {
 }
 
 export function useShortcuts(shortcuts: Shortcuts): void {
-  const latest = useRef(shortcuts);
-  latest.current = shortcuts;
+  const pressed = useEffectEvent((event: KeyboardEvent): void => {
+    const action = shortcuts[nameOf(event)];
+    if (action === undefined || event.defaultPrevented || event.altKey || isTyping(event.target)) return;
+    event.preventDefault();
+    action(event);
+  });
   useEffect(() => {
-    const press = (event: KeyboardEvent): void => {
-      const action = latest.current[nameOf(event)];
-      if (action === undefined || event.defaultPrevented || event.altKey || isTyping(event.target)) return;
-      event.preventDefault();
-      action(event);
-    };
+    const press = (event: KeyboardEvent): void => pressed(event);
     window.addEventListener("keydown", press);
     return () => window.removeEventListener("keydown", press);
   }, []);

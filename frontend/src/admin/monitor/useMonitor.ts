@@ -37,7 +37,7 @@ export function useMonitor(study: string): { snapshot: Snapshot | null; connecte
  * Listen until the returned function is called. A browser comes back by itself where a stream ends, but gives
  * up where it is refused (a proxy's 502 while the server restarts, say): then a new stream is tried.
  */
-export function listen(address: string, took: (fresh: Snapshot, first: boolean) => void, lost: () => void): () => void {
+function listen(address: string, took: (fresh: Snapshot, first: boolean) => void, lost: () => void): () => void {
   let source: EventSource | null = null;
   let again: ReturnType<typeof setTimeout> | undefined;
   const open = () => {

@@ -4,7 +4,7 @@ import { Link, useParams } from "@tanstack/react-router";
 import { api, unwrap } from "../api";
 import { useMay } from "../queries";
 import { Answer } from "../ui/Answer";
-import { when, words } from "../ui/format";
+import { plain, when, words } from "../ui/format";
 import { RunActions } from "./RunActions";
 import { TrialTable } from "./TrialTable";
 
@@ -80,7 +80,7 @@ function Facts({ title, values }: { title: string; values: Record<string, unknow
       </Title>
       {entries.map(([name, value]) => (
         <Text size="sm" key={name} className="wrap-anywhere">
-          {words(name)}: {typeof value === "object" ? JSON.stringify(value) : String(value)}
+          {words(name)}: {plain(value)}
         </Text>
       ))}
     </Card>

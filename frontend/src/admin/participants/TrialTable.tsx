@@ -69,7 +69,7 @@ function Ticks({ drawn }: { drawn: number[][] }) {
     <svg viewBox="0 0 220 12" width={220} height={12} role="img" aria-label={`${times.length} frames in ${length.toFixed(0)} ms`}>
       {times.map((time, place) => {
         const x = 1 + (218 * (time - start)) / length;
-        return <line key={`${String(place)}`} x1={x} x2={x} y1={1} y2={11} stroke="currentColor" strokeWidth={1} />;
+        return <line key={place} x1={x} x2={x} y1={1} y2={11} stroke="currentColor" strokeWidth={1} />;
       })}
     </svg>
   );

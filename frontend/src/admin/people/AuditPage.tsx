@@ -2,7 +2,7 @@ import { Stack, Text, Title } from "@mantine/core";
 import { useInfiniteQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { DataTable } from "../ui/DataTable";
-import { when, words } from "../ui/format";
+import { plain, when, words } from "../ui/format";
 import { PagedAnswer } from "../ui/PagedAnswer";
 
 const A_PAGE = 50;
@@ -45,6 +45,6 @@ export function AuditPage() {
 function detailWords(details: Record<string, unknown>): string {
   return Object.entries(details)
     .filter(([, value]) => value !== "" && value !== null)
-    .map(([name, value]) => `${words(name)}: ${typeof value === "object" ? JSON.stringify(value) : String(value)}`)
+    .map(([name, value]) => `${words(name)}: ${plain(value)}`)
     .join(", ");
 }

@@ -73,7 +73,7 @@ function Bars({ counts, lowest }: { counts: number[]; lowest: number }) {
       <title>{label}</title>
       {counts.map((count, place) => (
         <rect
-          key={`${String(place)}`}
+          key={place}
           x={14 * place}
           y={21 - (20 * count) / most}
           width={11}

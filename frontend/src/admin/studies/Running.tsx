@@ -18,7 +18,10 @@ const FIELDS = {
 type Field = keyof typeof FIELDS;
 
 function textsOf(recruiter: Record<string, unknown> | null): Record<Field | "redirect_url", string> {
-  const text = (name: string) => String(recruiter?.[name] ?? "");
+  const text = (name: string) => {
+    const value = recruiter?.[name];
+    return typeof value === "string" ? value : "";
+  };
   return {
     code_complete: text("code_complete"),
     code_screened_out: text("code_screened_out"),

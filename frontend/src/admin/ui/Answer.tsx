@@ -17,7 +17,7 @@ export function ErrorAlert({ error, retry }: { error: Error; retry?: () => void 
   );
 }
 
-export function Answer<T>({ of, children }: { of: UseQueryResult<T, Error>; children: (data: T) => ReactNode }) {
+export function Answer<T>({ of, children }: { of: UseQueryResult<T>; children: (data: T) => ReactNode }) {
   if (of.data !== undefined) return <>{children(of.data)}</>;
   if (of.error !== null) return <ErrorAlert error={of.error} retry={() => void of.refetch()} />;
   return (

@@ -45,3 +45,8 @@ export function languageName(code: string): string {
   const name = new Intl.DisplayNames(undefined, { type: "language", fallback: "none" }).of(code);
   return name === undefined ? code : `${name} (${code})`;
 }
+
+/** A value of any type as text: a list or an object as JSON. */
+export function plain(value: unknown): string {
+  return typeof value === "string" ? value : JSON.stringify(value);
+}

@@ -25,7 +25,10 @@ export function practiceNodes(session: Session): Node[] {
     trial(textPage(session), { eyebrow: "", text, action: t("continue"), remarks: "" }),
     {
       timeline: [preloadNode(session, trials), ...trialNodes(session, trials)],
-      on_timeline_start: () => (enterStage(session, "practice"), fetchAhead(session, trials, first)),
+      on_timeline_start: () => {
+        enterStage(session, "practice");
+        fetchAhead(session, trials, first);
+      },
     },
     trial(textPage(session), { eyebrow: "", text: `# ${t("practice_done_title")}`, action: t("start_study"), remarks }),
   ];
@@ -42,7 +45,10 @@ export function blockNodes(session: Session, block: number, next: number | null)
   return [
     {
       timeline: [preloadNode(session, trials), ...trialNodes(session, open), ...repetitions(session, block)],
-      on_timeline_start: () => (enterStage(session, "trials"), fetchAhead(session, trials, next)),
+      on_timeline_start: () => {
+        enterStage(session, "trials");
+        fetchAhead(session, trials, next);
+      },
     },
   ];
 }

@@ -19,6 +19,10 @@ export async function ended(
   if (run.status === "withdrawn") return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn") });
   const done = await persistently(root, t, () => completed(started.run_token));
   // On a laboratory's computer the next person comes by the same link.
-  const next = identity.isNamed ? [] : [button(t("new_visit"), () => (identity.forget(), location.reload()), "plain")];
+  const anew = (): void => {
+    identity.forget();
+    location.reload();
+  };
+  const next = identity.isNamed ? [] : [button(t("new_visit"), anew, "plain")];
   showCompletion({ t, run }, emptied(root), done, next, why);
 }

@@ -24,7 +24,7 @@ export interface Abilities {
 
 export async function abilities(storage: boolean): Promise<Abilities> {
   return {
-    secure: window.isSecureContext && "subtle" in (globalThis.crypto ?? {}),
+    secure: window.isSecureContext && "subtle" in globalThis.crypto,
     web_codecs: hasWebCodecs(),
     video: hasVideo(),
     h264: hasVideo() && (await playsH264()),

@@ -28,7 +28,7 @@ export function isNoAnswer(error: unknown): boolean {
   return error instanceof NetworkError || (error instanceof Refused && isTemporary(error.status));
 }
 
-export const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkDocument> =>
+const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkDocument> =>
   call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
 
 /** The run as the page sees it: practice is no block. */

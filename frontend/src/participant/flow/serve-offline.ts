@@ -2,5 +2,6 @@
 
 export function serveOffline(): void {
   // Private windows and some settings have none: a reload then needs the server.
-  void navigator.serviceWorker?.register("/service-worker.js", { scope: "/run/" }).catch(() => {});
+  if (!("serviceWorker" in navigator)) return;
+  void navigator.serviceWorker.register("/service-worker.js", { scope: "/run/" }).catch(() => {});
 }

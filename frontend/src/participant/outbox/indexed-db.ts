@@ -27,7 +27,7 @@ export class IndexedDbStore implements OutboxStore {
     const reading = this.database.transaction("outbox").objectStore("outbox").getAll() as IDBRequest<OutboxItem[]>;
     const items = await new Promise<OutboxItem[]>((resolve, reject) => {
       reading.onsuccess = () => resolve(reading.result);
-      reading.onerror = () => reject(reading.error);
+      reading.onerror = () => reject(failure(reading.error));
     });
     return items.sort((a, b) => a.sequence - b.sequence);
   }
@@ -48,11 +48,15 @@ export class IndexedDbStore implements OutboxStore {
       // "strict": the disk has it before the page says so; a crash of the machine then loses nothing either.
       const transaction = this.database.transaction(names, "readwrite", { durability: "strict" });
       transaction.oncomplete = () => resolve();
-      transaction.onerror = () => reject(transaction.error);
-      transaction.onabort = () => reject(transaction.error ?? new Error("IndexedDB aborted the write"));
+      transaction.onerror = () => reject(failure(transaction.error));
+      transaction.onabort = () => reject(failure(transaction.error));
       work((name) => transaction.objectStore(name));
     });
   }
+}
+
+function failure(error: DOMException | null): Error {
+  return error ?? new Error("IndexedDB gave up without a reason");
 }
 
 function createStores(database: IDBDatabase): void {

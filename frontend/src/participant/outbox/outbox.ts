@@ -119,15 +119,17 @@ export class Outbox {
   private async sendAll(): Promise<void> {
     if (this.running || this.stopped) return;
     this.running = true;
-    while (!this.stopped) {
-      const batch = nextBatch(this.queue);
-      if (!batch) break;
+    for (let batch = this.next(); batch; batch = this.next()) {
       const wait_ms = await this.sendOne(batch);
       this.changed();
       if (wait_ms > 0) await this.pause(wait_ms);
     }
     this.running = false;
     if (this.queue.length === 0) this.idle.splice(0).forEach((resolve) => resolve());
+  }
+
+  private next(): Batch | null {
+    return this.stopped ? null : nextBatch(this.queue);
   }
 
   /** Send one batch; returns how long to wait before the next. */

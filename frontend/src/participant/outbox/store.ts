@@ -27,16 +27,19 @@ export class MemoryStore implements OutboxStore {
   readonly durable = false;
   private readonly items = new Map<string, OutboxItem>();
 
-  async add(item: OutboxItem): Promise<void> {
+  add(item: OutboxItem): Promise<void> {
     this.items.set(item.id, item);
+    return Promise.resolve();
   }
-  async all(): Promise<OutboxItem[]> {
-    return [...this.items.values()].sort((a, b) => a.sequence - b.sequence);
+  all(): Promise<OutboxItem[]> {
+    return Promise.resolve([...this.items.values()].sort((a, b) => a.sequence - b.sequence));
   }
-  async remove(ids: string[]): Promise<void> {
+  remove(ids: string[]): Promise<void> {
     for (const id of ids) this.items.delete(id);
+    return Promise.resolve();
   }
-  async refuse(item: OutboxItem): Promise<void> {
+  refuse(item: OutboxItem): Promise<void> {
     this.items.delete(item.id);
+    return Promise.resolve();
   }
 }

@@ -16,7 +16,7 @@ export async function decodeClip(bytes: ArrayBuffer, declared_fps: number | null
   const track = await input.getPrimaryVideoTrack();
   if (!track) throw new Error("expected a video track, found none");
   const config = await track.getDecoderConfig();
-  if (!config) throw new Error(`expected a codec this browser knows, got ${track.codec ?? "an unknown one"}`);
+  if (!config) throw new Error(`expected a codec this browser knows, got ${(await track.getCodec()) ?? "an unknown one"}`);
   const frames = await decodeAll(config, new EncodedPacketSink(track));
   const first = frames[0];
   if (!first) throw new Error("expected at least one frame, got none");
@@ -31,16 +31,16 @@ interface Frame {
 
 async function decodeAll(config: VideoDecoderConfig, sink: EncodedPacketSink): Promise<Frame[]> {
   const pending: Promise<Frame>[] = [];
-  let problem: DOMException | null = null;
-  const decoder = new VideoDecoder({ output: (frame) => pending.push(pictureOf(frame)), error: (error) => (problem = error) });
+  const problems: DOMException[] = [];
+  const decoder = new VideoDecoder({ output: (frame) => pending.push(pictureOf(frame)), error: (error) => problems.push(error) });
   try {
     decoder.configure(config);
     for await (const packet of sink.packets()) {
-      if (problem) break;
+      if (problems.length > 0) break;
       decoder.decode(packet.toEncodedVideoChunk());
       if (pending.length > LONGEST_CLIP_FRAMES) throw new Error(`expected at most ${LONGEST_CLIP_FRAMES} frames, got more`);
     }
-    if (problem) throw problem;
+    if (problems[0]) throw problems[0];
     await decoder.flush();
   } finally {
     if (decoder.state !== "closed") decoder.close();

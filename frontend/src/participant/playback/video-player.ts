@@ -65,8 +65,14 @@ export class VideoPlayer implements ClipPlayer {
 function ready(video: HTMLVideoElement, address: string): Promise<void> {
   return new Promise((resolve, reject) => {
     const limit = setTimeout(() => reject(new ClipBroken("the video element did not load the clip in time")), LOAD_LIMIT_MS);
-    video.oncanplaythrough = () => (clearTimeout(limit), resolve());
-    video.onerror = () => (clearTimeout(limit), reject(new ClipBroken(video.error?.message ?? "the video element refused the clip")));
+    video.oncanplaythrough = () => {
+      clearTimeout(limit);
+      resolve();
+    };
+    video.onerror = () => {
+      clearTimeout(limit);
+      reject(new ClipBroken(video.error?.message ?? "the video element refused the clip"));
+    };
     Object.assign(video, { muted: true, preload: "auto", src: address });
   });
 }

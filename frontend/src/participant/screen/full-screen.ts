@@ -1,7 +1,7 @@
 /** Full screen as the page or the browser's own key makes it. */
 
 export function canFullScreen(): boolean {
-  return document.fullscreenEnabled === true;
+  return document.fullscreenEnabled;
 }
 
 export function isFullScreen(): boolean {

@@ -6,12 +6,15 @@ const LIMIT_MS = 3_000;
 export function measureRefreshRate(): Promise<number | null> {
   return new Promise((resolve) => {
     const stamps: number[] = [];
-    const done = (): void => resolve(refreshRate(stamps));
+    const done = (): void => {
+      clearTimeout(limit);
+      resolve(refreshRate(stamps));
+    };
     const limit = setTimeout(done, LIMIT_MS);
     const tick = (now: number): void => {
       stamps.push(now);
       if (stamps.length <= FRAMES) requestAnimationFrame(tick);
-      else (clearTimeout(limit), done());
+      else done();
     };
     requestAnimationFrame(tick);
   });

@@ -151,7 +151,7 @@ async function fits(session: Session, display: HTMLElement, measured: Measured):
   return false;
 }
 
-export function widestClip(trials: readonly AssignedTrial[], inter_ocular_mm: number, px_per_mm: number): number {
+function widestClip(trials: readonly AssignedTrial[], inter_ocular_mm: number, px_per_mm: number): number {
   const clips = trials.filter((trial) => trial.clip_sha256 !== null);
   return clips.reduce((widest, trial) => Math.max(widest, clipWidth(trial, inter_ocular_mm, px_per_mm)), 0);
 }

@@ -4,8 +4,8 @@ import { h, uniqueId } from "../../ui/element";
 import { button } from "../../ui/page";
 
 /** ISO/IEC 7810 ID-1. */
-export const CARD_WIDTH_MM = 85.6;
-export const CARD_HEIGHT_MM = 53.98;
+const CARD_WIDTH_MM = 85.6;
+const CARD_HEIGHT_MM = 53.98;
 const SHAPE = CARD_HEIGHT_MM / CARD_WIDTH_MM;
 const SMALLEST_PX = 120;
 const LARGEST_PX = 1_600;

@@ -81,7 +81,10 @@ function moveDot(session: Session, dot: HTMLElement, field: HTMLElement, footer:
     const room = field.clientWidth - 40;
     const began = performance.now();
     const separation = (): number => start_px + (performance.now() - began) * SPEED_PX_PER_MS;
-    const end = (value: number | null): void => (done(), resolve(value));
+    const end = (value: number | null): void => {
+      done();
+      resolve(value);
+    };
     const move = (): void => {
       if (signal.aborted) return;
       if (separation() > room) return end(null);

@@ -101,15 +101,14 @@ export function showCompletion(
 }
 
 function codeRow(copy: string, copied: string, code: string): HTMLElement {
-  const press = button(
-    copy,
-    () => {
-      void navigator.clipboard?.writeText(code).then(
-        () => (press.textContent = copied),
-        () => {},
-      );
-    },
-    "quiet",
-  );
-  return h("p", { class: "row" }, h("output", {}, code), press);
+  const row = h("p", { class: "row" }, h("output", {}, code));
+  // Pages without a secure connection have no clipboard.
+  if (!("clipboard" in navigator)) return row;
+  const write = async (): Promise<void> => {
+    await navigator.clipboard.writeText(code);
+    press.textContent = copied;
+  };
+  const press = button(copy, () => void write().catch(() => {}), "quiet");
+  row.append(press);
+  return row;
 }

@@ -54,7 +54,14 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
   });
   const body = h(
     "form",
-    { class: "form", novalidate: true, onsubmit: (event) => (event.preventDefault(), go.click()) },
+    {
+      class: "form",
+      novalidate: true,
+      onsubmit: (event) => {
+        event.preventDefault();
+        go.click();
+      },
+    },
     ...views.map((view) => view.element),
   );
   const section = showPage(display, { title: pick(form.title, language), eyebrow, body: [body, alert, status], actions: [go] });

@@ -8,7 +8,10 @@ export function openStopDialog(session: Session): void {
   const { t } = session;
   const dialog = h("dialog", { class: "dialog", "aria-labelledby": "stop-title" });
   const close = (): void => dialog.remove();
-  const pause = (): void => (close(), end(session, "paused"));
+  const pause = (): void => {
+    close();
+    end(session, "paused");
+  };
   const withdraw = (): void => (close(), void withdrawn(session));
   dialog.append(
     h("h2", { id: "stop-title" }, t("stop_title")),

@@ -24,7 +24,10 @@ export interface Choice<Value> {
 export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], withSpace = false): Promise<Value> {
   const { signal, done } = screenSignal(session);
   return new Promise((resolve) => {
-    const take = (value: Value): void => (done(), resolve(value));
+    const take = (value: Value): void => {
+      done();
+      resolve(value);
+    };
     const buttons = choices.map(({ label, value, kind }, place) => button(label, () => take(value), kind ?? (place ? "quiet" : "primary")));
     footer.append(...buttons);
     listenKeys((event) => {

@@ -12,7 +12,7 @@ export interface TextPageParameters {
   action: string;
   remarks: string;
 }
-export interface TextPageData {
+interface TextPageData {
   read_ms: number;
 }
 

@@ -8,7 +8,7 @@ import type { Stage } from "./stage";
 
 const SLOW_MS = 8_000;
 
-export function procedureRemark(showings: Shown[], rt_ms: number): MessageKey {
+function procedureRemark(showings: Shown[], rt_ms: number): MessageKey {
   if (showings.some((shown) => shown.focus_lost > 0)) return "feedback_focus";
   if (showings.some((shown) => shown.early_keys > 0)) return "feedback_key";
   return rt_ms > SLOW_MS ? "feedback_slow" : "feedback_good";
