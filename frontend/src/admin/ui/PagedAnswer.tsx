@@ -6,7 +6,7 @@ import type { ReactNode } from "react";
 import { ErrorAlert } from "./Answer";
 
 interface Props<Page> {
-  of: UseInfiniteQueryResult<InfiniteData<Page>, Error>;
+  of: UseInfiniteQueryResult<InfiniteData<Page>>;
   shown: number;
   /** How many there are on all pages, where the server says so. */
   total?: number | undefined;
