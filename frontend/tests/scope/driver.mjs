@@ -11,8 +11,13 @@ const options = {
     executablePath: program,
     ignoreDefaultArgs: ["--enable-automation"],
     args: [
-      "--no-sandbox", "--test-type", "--disable-gpu", "--no-first-run", "--disable-background-networking",
-      `--window-size=${SIZE}`, "--window-position=0,0",
+      "--no-sandbox",
+      "--test-type",
+      "--disable-gpu",
+      "--no-first-run",
+      "--disable-background-networking",
+      `--window-size=${SIZE}`,
+      "--window-position=0,0",
     ],
   },
   firefox: { browser: "firefox", executablePath: program, args: [`--width=${SIZE[0]}`, `--height=${SIZE[1]}`] },
@@ -61,6 +66,9 @@ const say = (message) => console.log(JSON.stringify(message));
 say({ answer: await browser.version() });
 for await (const line of createInterface({ input: process.stdin })) {
   const { command, ...values } = JSON.parse(line);
-  await commands[command](values).then((answer) => say({ answer }), (error) => say({ error: String(error) }));
+  await commands[command](values).then(
+    (answer) => say({ answer }),
+    (error) => say({ error: String(error) }),
+  );
 }
 await browser.close();
