@@ -17,6 +17,10 @@ Translated = dict[Language, str]
 """The same text in several languages, by language tag."""
 
 
+IMPLIED = "implied"
+"""Marks (in `Annotated`) the tag of the union member meant where no tag is given: it is not hashed."""
+
+
 class Declaration(BaseModel):
     """A frozen piece of a declaration; unknown keys are refused by name."""
 

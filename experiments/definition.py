@@ -16,9 +16,6 @@ from experiments.rules import (
     ScreeningRule,
 )
 
-# Declarations without these keys keep the hash they had before the keys existed.
-_LeftOutWhenEmpty = Field(exclude_if=lambda value: not value)
-
 
 class Level(Declaration):
     """One level of a within factor, with the label that participants never see but tables show."""
@@ -136,7 +133,7 @@ class Texts(Declaration):
     debrief: str
     practice: str = ""
     block_break: str = ""
-    screened_out: Annotated[str, _LeftOutWhenEmpty] = ""
+    screened_out: str = ""
 
 
 class AnalysisPlan(Declaration):
@@ -168,7 +165,7 @@ class Experiment(Declaration):
     session: Session = Session()
     playback: PlaybackRules = PlaybackRules()
     attention: AttentionChecks = AttentionChecks()
-    screening: Annotated[tuple[ScreeningRule, ...], _LeftOutWhenEmpty] = ()
+    screening: tuple[ScreeningRule, ...] = ()
     exclusions: tuple[ExclusionRule, ...] = ()
     forms: tuple[Form, ...] = ()
     texts: dict[Language, Texts]

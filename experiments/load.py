@@ -1,7 +1,5 @@
 """Read an experiment from TOML: shipped by name, or a file. Problems carry their line and a way out."""
 
-import hashlib
-import json
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -13,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
+from experiments.schema.upgrades import upgraded
 from experiments.toml_lines import line_of
 
 FOLDER = Path(__file__).parent
@@ -67,6 +66,12 @@ def parse_experiment(text: str, source: str = "definition") -> Experiment:
     except tomllib.TOMLDecodeError as error:
         line = getattr(error, "lineno", None) or _line_in(str(error))
         raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
+    number = data.pop("format", 1)
+    try:
+        data = upgraded(data, number)
+    except InputError as error:
+        path, _, message = str(error).partition(": ")
+        raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error
     try:
         return Experiment.model_validate(data)
     except ValidationError as error:
@@ -74,12 +79,6 @@ def parse_experiment(text: str, source: str = "definition") -> Experiment:
         details = sorted(error.errors(), key=lambda detail: detail["type"] == "missing")
         problems = [_problem(detail, text) for detail in details]
         raise DefinitionError(source, problems) from error
-
-
-def definition_sha256(experiment: Experiment) -> str:
-    """SHA-256 over the canonical JSON of a definition: equal for equal declarations, however written."""
-    canonical = json.dumps(experiment.model_dump(mode="json"), sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(canonical.encode("utf-8")).hexdigest()
 
 
 def _line_in(message: str) -> int | None:

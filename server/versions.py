@@ -8,6 +8,7 @@ from sqlalchemy import Connection, select
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
+from experiments.schema.stored import load_stored
 from server.models import Clip, StudyVersion, VersionClip
 
 _MOST_KEPT = 64
@@ -69,5 +70,5 @@ def _load(session: Session, version_id: int) -> LoadedVersion:
         sizes = (clip.frames, clip.fps, clip.bytes, clip.width_px, clip.height_px)
         clips[clip_id] = PlacedClip(clip.sha256, *sizes, width_mm)
         places[cell, exemplar] = clip_id
-    experiment = Experiment.model_validate(version.definition)
+    experiment = load_stored(version.definition)
     return LoadedVersion(experiment, version.inter_ocular_px, clips, places)

@@ -11,7 +11,7 @@ from analysis.synthetic.space import DesignSpace
 from experiments.columns import RATINGS
 from experiments.definition import Experiment
 from experiments.design import BlockSpec, ClipSpec, blocks, clips, exemplar_key
-from experiments.load import definition_sha256
+from experiments.schema.canonical import definition_sha256
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]

@@ -10,8 +10,9 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError, did_you_mean
-from experiments.load import definition_sha256, locate, parse_experiment
+from experiments.load import locate, parse_experiment
 from experiments.manifest import Manifest, read_manifest
+from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
 from server.cli_common import migrated_services, out
 from server.clock import now

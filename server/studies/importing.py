@@ -7,8 +7,8 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.load import definition_sha256
 from experiments.manifest import Manifest, check_files
+from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clips.store import ClipStore

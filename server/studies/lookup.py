@@ -5,6 +5,7 @@ from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
+from experiments.schema.stored import load_stored
 from server.errors import NotFound
 from server.models import Study, StudyVersion
 
@@ -43,7 +44,7 @@ def all_definitions(session: Session, study: Study) -> list[Experiment]:
 def _definition(version: StudyVersion) -> Experiment:
     # A definition with this hash never changes, so it is parsed once.
     if version.definition_sha256 not in _parsed:
-        _parsed[version.definition_sha256] = Experiment.model_validate(version.definition)
+        _parsed[version.definition_sha256] = load_stored(version.definition)
     return _parsed[version.definition_sha256]
 
 

@@ -12,8 +12,8 @@ import tomlkit
 from experiments.columns import RESERVED
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.load import definition_sha256
 from experiments.manifest import Clip, Manifest, file_sha256
+from experiments.schema.canonical import definition_sha256
 from server.studies.probe import NotAFilm, probe
 from server.studies.schemas import OwnClips
 from server.studies.uploads import plain_name

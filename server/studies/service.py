@@ -14,6 +14,7 @@ from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
+from experiments.schema.stored import load_stored
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
@@ -268,7 +269,7 @@ def detail(session: Session, name: str) -> StudyDetail:
     version = active_version(session, study)
     return StudyDetail(
         summary=summary(study, _counts(session)),
-        design=design_out(Experiment.model_validate(version.definition)),
+        design=design_out(load_stored(version.definition)),
         definition=version.definition,
         toml=version.definition_toml,
         definition_sha256=version.definition_sha256,

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.load import definition_sha256
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest, read_manifest
+from experiments.schema.canonical import definition_sha256
 from stimuli_builder.characters.writing import write_bytes
 from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips
 from stimuli_builder.clips.manifest_file import assemble, manifest_text

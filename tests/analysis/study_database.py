@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.definition import Experiment
-from experiments.load import definition_sha256
+from experiments.schema.canonical import definition_sha256
 from server import migrate
 from server.db import Database
 

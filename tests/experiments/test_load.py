@@ -4,12 +4,12 @@ from experiments.errors import InputError
 from experiments.load import (
     SHIPPED,
     DefinitionError,
-    definition_sha256,
     load_experiment,
     locate,
     parse_experiment,
 )
 from experiments.rules import ScreenFormAnswer
+from experiments.schema.canonical import definition_sha256
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")
 
@@ -127,8 +127,5 @@ def test_a_screening_rule_must_fit_the_forms(text: str, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_definition_without_screening_keeps_the_hash_it_had_before_there_was_any() -> None:
-    plain = load_experiment("exp1").model_dump(mode="json")
-    assert "screening" not in plain  # built clips carry the hash of this dump
-    assert "screened_out" not in plain["texts"]["en"]
+def test_a_screening_rule_changes_the_hash() -> None:
     assert definition_sha256(parse_experiment(screened())) != definition_sha256(load_experiment("exp1"))

@@ -12,8 +12,8 @@ import numpy as np
 
 from experiments import design
 from experiments.definition import Experiment
-from experiments.load import definition_sha256
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest
+from experiments.schema.canonical import definition_sha256
 
 BARCODE_CELL_PX, BARCODE_BITS = 16, 12
 BOX_HEAD_BYTES = 8

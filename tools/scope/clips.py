@@ -6,8 +6,9 @@ from functools import cache
 from pathlib import Path
 
 from experiments import design
-from experiments.load import definition_sha256, parse_experiment
+from experiments.load import parse_experiment
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest
+from experiments.schema.canonical import definition_sha256
 from stimuli_builder.clips.encode import encode_clip
 from tools.scope import bars
 

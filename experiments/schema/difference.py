@@ -1,0 +1,111 @@
+"""What an edit changes: key by key, and whether answers before and after may be pooled."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from experiments.definition import Experiment
+from experiments.schema.effects import Effect, effect_of
+
+TAGS = ("kind", "type", "rule")
+
+
+@dataclass(frozen=True)
+class Change:
+    """One key that differs.
+
+    Attributes
+    ----------
+    path: as the TOML has it, elements of lists by their name or number: `factors.speed.levels.fast.label`.
+    effect: `wording` or `measured`. before, after: the values; None where the key or element is not there.
+    """
+
+    path: str
+    effect: Effect
+    before: Any
+    after: Any
+
+    def __str__(self) -> str:
+        if self.before is None:
+            return f"{self.path} is new: {_short(self.after)}"
+        if self.after is None:
+            return f"{self.path} is gone: {_short(self.before)}"
+        return f"{self.path}: {_short(self.before)} becomes {_short(self.after)}"
+
+
+def difference(old: Experiment, new: Experiment) -> list[Change]:
+    """Every key that differs, what is measured first."""
+    before, after = old.model_dump(mode="json"), new.model_dump(mode="json")
+    changes = list(_changes(before, after, "", ""))
+    return sorted(changes, key=lambda change: change.effect == "wording")
+
+
+def changes_what_is_measured(changes: Sequence[Change]) -> bool:
+    """True where answers before and after must not be pooled: a new data series begins."""
+    return any(change.effect == "measured" for change in changes)
+
+
+def _changes(old: Any, new: Any, shown: str, path: str) -> Iterator[Change]:
+    if old == new:
+        return
+    if tag := _tag_that_differs(old, new):
+        effect = effect_of(_join(path, tag)) or "measured"
+        yield Change(_join(shown, tag), effect, old[tag], new[tag])
+    elif isinstance(old, dict) and isinstance(new, dict):
+        yield from _of_tables(old, new, shown, path)
+    elif _are_elements(old) and _are_elements(new):
+        yield from _of_lists(old, new, shown, path)
+    else:
+        # A path that no entry covers is kept apart: the safe side.
+        yield Change(shown, effect_of(path) or "measured", old, new)
+
+
+def _tag_that_differs(old: Any, new: Any) -> str | None:
+    """The key by which these are two members of a union: their other keys have nothing in common."""
+    if not (isinstance(old, dict) and isinstance(new, dict)):
+        return None
+    return next((tag for tag in TAGS if tag in old and tag in new and old[tag] != new[tag]), None)
+
+
+def _of_tables(old: dict[str, Any], new: dict[str, Any], shown: str, path: str) -> Iterator[Change]:
+    for key in dict.fromkeys((*old, *new)):
+        if key not in old or key not in new:
+            # Tables have all their keys, so this is a text, or a set of them, in one language only:
+            # nobody has read both.
+            yield Change(_join(shown, key), "wording", old.get(key), new.get(key))
+            continue
+        # Languages are no part of a path.
+        below = path if path == "texts" else _join(path, key)
+        yield from _changes(old[key], new[key], _join(shown, key), below)
+
+
+def _of_lists(old: list[Any], new: list[Any], shown: str, path: str) -> Iterator[Change]:
+    before, after = _by_name(old), _by_name(new)
+    for name in dict.fromkeys((*before, *after)):
+        if name in before and name in after:
+            yield from _changes(before[name], after[name], _join(shown, name), path)
+        else:
+            effect = effect_of(f"{path}.name") or "measured"
+            yield Change(_join(shown, name), effect, before.get(name), after.get(name))
+    if list(before) != list(after) and set(before) == set(after):
+        yield Change(shown, effect_of(f"{path}.name") or "measured", list(before), list(after))
+
+
+def _are_elements(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
+
+
+def _by_name(items: list[Any]) -> dict[str, Any]:
+    """Elements of a list by their name, the value of an option, or their number where they have neither."""
+    return {
+        str(item.get("name", item.get("value", number))): item for number, item in enumerate(items, start=1)
+    }
+
+
+def _join(path: str, key: str) -> str:
+    return f"{path}.{key}" if path else key
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,78 @@
+"""What an edit of each key does to the answers that are there already.
+
+`measured`: answers before and after are answers to something else, so a new data series begins. `wording`:
+they may be pooled. A key stands here by its path; one entry covers the keys below it that have none of their
+own. Keys under `trial` are declared by the kind of trial. A key that no entry covers fails a test.
+"""
+
+from collections.abc import Mapping
+from typing import Literal
+
+Effect = Literal["wording", "measured"]
+
+EFFECTS: Mapping[str, Effect] = {
+    "name": "measured",
+    "title": "wording",
+    "version": "wording",
+    "source": "wording",
+    "participants": "wording",
+    "languages": "wording",
+    # Names of levels make the cells; labels stand in tables and figures only.
+    "factors.name": "measured",
+    "factors.label": "wording",
+    "factors.levels.name": "measured",
+    "factors.levels.label": "wording",
+    "factors.levels.render": "measured",
+    "render": "measured",
+    "exemplars": "measured",
+    "blocks.split_by": "measured",
+    "blocks.repeats": "measured",
+    "blocks.order": "measured",
+    "blocks.trial_order": "measured",
+    "blocks.break_seconds_min": "wording",
+    "practice.trials": "measured",
+    # How large, on what ground and how steadily a clip is seen; but not which devices are turned away.
+    "display.inter_ocular_mm": "measured",
+    "display.calibrate": "measured",
+    "display.viewing_distance": "wording",
+    "display.full_screen": "measured",
+    "display.background": "measured",
+    "display.minimum_width_px": "wording",
+    "display.minimum_height_px": "wording",
+    "display.allow_touch": "wording",
+    "session": "wording",
+    # A play that counts by the one rule does not by the other.
+    "playback": "measured",
+    "attention": "wording",
+    # Who takes part and whose answers count: both are applied to the whole series, and reported with it.
+    "screening": "wording",
+    "exclusions": "wording",
+    "forms.name": "measured",
+    "forms.when": "wording",
+    "forms.title": "wording",
+    "forms.fields": "measured",
+    "forms.fields.label": "wording",
+    "forms.fields.help": "wording",
+    "forms.fields.required": "wording",
+    "forms.fields.max_length": "wording",
+    "forms.fields.options.label": "wording",
+    "texts": "wording",
+    "analysis": "wording",
+    "trial.kind": "measured",
+    "trial.scale": "measured",
+    "trial.views": "measured",
+    "trial.start": "measured",
+    "trial.fixation_ms": "measured",
+    "trial.confirm": "measured",
+    "trial.comment": "wording",
+    "trial.expected_seconds": "wording",
+}
+
+
+def effect_of(path: str, effects: Mapping[str, Effect] = EFFECTS) -> Effect | None:
+    """The effect of the key at `path`: its own entry, or that of the nearest table above; None where none."""
+    while path:
+        if path in effects:
+            return effects[path]
+        path = path.rpartition(".")[0]
+    return None

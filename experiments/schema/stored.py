@@ -1,0 +1,25 @@
+"""Read a declaration that a database holds, in whatever format it was stored."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.schema.upgrades import upgraded
+
+
+def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
+    """The declaration stored as JSON data of format `number`; InputError where it cannot be read."""
+    data = upgraded(definition, number)
+    try:
+        return Experiment.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        name = definition.get("name", "without a name")
+        raise InputError(
+            f"the stored definition {name} (format {number}) cannot be read: {place}: {first['msg']}; "
+            "use the version of this program that stored it, and report this"
+        ) from error
