@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.base import Declaration, Language, LevelName, Name, Translated
+from experiments.base import Declaration, Language, LevelName, Name
 from experiments.errors import did_you_mean
 from experiments.forms import Form
 from experiments.rendering import RenderOverrides, RenderSettings
@@ -15,6 +15,8 @@ from experiments.rules import (
     ScreenFormAnswer,
     ScreeningRule,
 )
+from experiments.trials import reserved_names
+from experiments.trials.union import AnyTrial
 
 
 class Level(Declaration):
@@ -69,39 +71,6 @@ class Practice(Declaration):
     """Practice trials before the first block; their clips are drawn over all cells by the run's seed."""
 
     trials: Annotated[int, Field(ge=0, le=50)] = 4
-
-
-class Scale(Declaration):
-    """The rating scale: whole numbers from `minimum` to `maximum` with labelled ends."""
-
-    minimum: int = 1
-    maximum: int = 7
-    question: Translated
-    low: Translated
-    high: Translated
-
-    @model_validator(mode="after")
-    def _ascending(self) -> Self:
-        if not 1 <= self.maximum - self.minimum <= 10:
-            raise ValueError(f"expected 2 to 11 scale points, got {self.minimum} to {self.maximum}")
-        return self
-
-
-class ClipRating(Declaration):
-    """The single-clip rating: start by key, one view (or `views`), answer after the clip's end."""
-
-    kind: Literal["clip_rating"] = "clip_rating"
-    scale: Scale
-    views: Annotated[int, Field(ge=1, le=10)] = 1
-    start: Literal["key", "fixation"] = "key"
-    fixation_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
-    confirm: bool = False
-    comment: bool = False
-    expected_seconds: Annotated[float, Field(gt=0)] = 6.0
-
-
-TrialKind = Annotated[ClipRating, Field(discriminator="kind")]
-"""What a trial is. A paired comparison would join this union."""
 
 
 class Display(Declaration):
@@ -160,7 +129,7 @@ class Experiment(Declaration):
     exemplars: Exemplars
     blocks: Blocks = Blocks()
     practice: Practice = Practice()
-    trial: TrialKind
+    trial: AnyTrial
     display: Display = Display()
     session: Session = Session()
     playback: PlaybackRules = PlaybackRules()
@@ -214,8 +183,6 @@ def _refuse_repeats(names: list[str], what: str) -> None:
 
 
 def _refuse_reserved(names: list[str]) -> None:
-    from experiments.columns import RESERVED
-
     for name in names:
-        if name in RESERVED:
+        if name in reserved_names():
             raise ValueError(f"factor '{name}' has the name of a ratings column; choose another")

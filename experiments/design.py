@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
-from experiments.definition import Experiment
 from experiments.rendering import RenderSettings
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
 
 
 @dataclass(frozen=True)
@@ -32,19 +35,19 @@ class BlockSpec:
     clips: tuple[ClipSpec, ...]
 
 
-def cells(experiment: Experiment) -> list[tuple[tuple[str, str], ...]]:
+def cells(experiment: "Experiment") -> list[tuple[tuple[str, str], ...]]:
     """Every combination of levels, last factor fastest."""
     names = [[(factor.name, level.name) for level in factor.levels] for factor in experiment.factors]
     return [tuple(combination) for combination in product(*names)]
 
 
-def clips(experiment: Experiment) -> list[ClipSpec]:
+def clips(experiment: "Experiment") -> list[ClipSpec]:
     """Every unique clip: cells times exemplars."""
     numbers = range(1, experiment.exemplars.per_cell + 1)
     return [ClipSpec(cell, number) for cell in cells(experiment) for number in numbers]
 
 
-def blocks(experiment: Experiment) -> list[BlockSpec]:
+def blocks(experiment: "Experiment") -> list[BlockSpec]:
     """Blocks in declared order, repeats included; a participant's order is drawn by the server."""
     every = clips(experiment)
     split = experiment.blocks.split_by
@@ -56,12 +59,12 @@ def blocks(experiment: Experiment) -> list[BlockSpec]:
     return single * experiment.blocks.repeats
 
 
-def trials_per_participant(experiment: Experiment) -> int:
+def trials_per_participant(experiment: "Experiment") -> int:
     """Rated trials of one participant, practice and attention checks not counted."""
     return sum(len(block.clips) for block in blocks(experiment))
 
 
-def expected_minutes(experiment: Experiment) -> float:
+def expected_minutes(experiment: "Experiment") -> float:
     """Expected length of a visit in minutes: trials times the declared seconds a trial."""
     seconds = (
         trials_per_participant(experiment) + experiment.practice.trials
@@ -69,7 +72,7 @@ def expected_minutes(experiment: Experiment) -> float:
     return round(seconds / 60, 1)
 
 
-def render_settings(experiment: Experiment, spec: ClipSpec) -> RenderSettings:
+def render_settings(experiment: "Experiment", spec: ClipSpec) -> RenderSettings:
     """The experiment's render settings with the overrides of this clip's levels, in factor order."""
     settings = experiment.render
     for factor_name, level_name in spec.levels:
@@ -78,7 +81,7 @@ def render_settings(experiment: Experiment, spec: ClipSpec) -> RenderSettings:
     return settings
 
 
-def exemplar_key(experiment: Experiment, spec: ClipSpec) -> str:
+def exemplar_key(experiment: "Experiment", spec: ClipSpec) -> str:
     """Key of the blink a clip shows: clips with the same key show the same blink (see `Exemplars`)."""
     own = [level for factor, level in spec.levels if factor in experiment.exemplars.own_per]
     return "/".join([*own, f"{spec.exemplar:03d}"])

@@ -2,15 +2,16 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
+from experiments.schema.keys import Key, is_tag, keys
 from experiments.schema.upgrades import upgraded
 from experiments.toml_lines import line_of
 
@@ -110,40 +111,21 @@ def _problem(detail: Any, text: str) -> Problem:
     return Problem(line_of(text, location), path, message)
 
 
-_TAGS = frozenset({"clip_rating", "within_anova"})
-
-
 def _is_union_tag(part: object) -> bool:
-    return isinstance(part, str) and part in _TAGS | {tag for tag, _ in _tagged_models()}
-
-
-def _tagged_models() -> Iterator[tuple[str, type[BaseModel]]]:
-    from experiments import forms, rules
-
-    for union in (rules.ExclusionRule, rules.ScreeningRule, forms.FormField):
-        for model in get_args(get_args(union)[0]):
-            yield model.model_fields["rule" if "rule" in model.model_fields else "type"].default, model
+    return any(part == key.field.default for key in keys() if is_tag(key.field))
 
 
 def _keys_at(location: Sequence[object]) -> list[str]:
-    """The keys allowed at a place of the declaration, by walking the models' annotations."""
-    model: Any = Experiment  # walked down key by key
+    """The keys allowed at a place of the declaration, by walking the models."""
+    model: type[BaseModel] = Experiment
+    tables: list[type[BaseModel]] = []
     for part in location:
-        if isinstance(part, int):
-            continue
-        tagged = dict(_tagged_models())
-        if isinstance(part, str) and part in tagged:
-            model = tagged[part]
-        elif part in getattr(model, "model_fields", {}):
-            model = _model_inside(model.model_fields[str(part)].annotation) or model
+        if isinstance(part, str) and part in model.model_fields:
+            tables = Key(part, model, model.model_fields[part]).tables
+            model = tables[0] if tables else model
+        model = next((table for table in tables if _tag_of(table) == part), model)
     return list(model.model_fields)
 
 
-def _model_inside(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in get_args(annotation):
-        found = _model_inside(argument)
-        if found is not None:
-            return found
-    return None
+def _tag_of(model: type[BaseModel]) -> object:
+    return next((field.default for field in model.model_fields.values() if is_tag(field)), None)

@@ -17,7 +17,8 @@ sys.path.insert(0, str(ROOT))
 from pydantic_core import PydanticUndefined  # noqa: E402
 from sqlalchemy import Table  # noqa: E402
 
-from experiments.columns import RUN_COLUMNS, VIEWS, Column  # noqa: E402
+from experiments.columns import RUN_COLUMNS, Column  # noqa: E402
+from experiments.trials import views  # noqa: E402
 from server.models import Base  # noqa: E402
 from server.settings import Settings  # noqa: E402
 
@@ -60,7 +61,7 @@ def data_dictionary() -> str:
         "",
     ]
     header = ("column", "type", "unit", "values or range", "meaning")
-    for view in VIEWS:
+    for view in views():
         lines += [f"## {view.title} (the view `{view.name}`, and its CSV)", ""]
         lines += [*table(header, map(column_row, view.columns)), ""]
     lines += ["## Runs: one row a visit (the runs CSV)", "", *table(header, map(column_row, RUN_COLUMNS))]

@@ -10,6 +10,7 @@ from analysis.read.study_ratings import StudyRatings
 from analysis.within.cell_means import cell_table
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
+from experiments.trials.clip_rating.declaration import clip_rating_of
 
 
 def analyse_study(experiment: Experiment, ratings: StudyRatings, phase: str = "live") -> Analysis:
@@ -64,7 +65,7 @@ def _where(rows: pd.DataFrame, position: int) -> str:
 
 def _check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     main = _main(rows)
-    scale = experiment.trial.scale
+    scale = clip_rating_of(experiment).scale
     given = main["response"].to_numpy()
     off = ~np.isnan(given) & ((given < scale.minimum) | (given > scale.maximum) | (given != np.round(given)))
     if off.any():

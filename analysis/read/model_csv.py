@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.read.text_table import numbers, read_text_table, texts_required
-from experiments.columns import RATINGS
 from experiments.errors import InputError
+from experiments.trials.clip_rating.columns import RATINGS
 
 EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
 

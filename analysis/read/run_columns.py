@@ -1,6 +1,7 @@
 """Columns of a study's ratings that hold one value for a whole run."""
 
-from experiments.columns import RATINGS, names_of
+from experiments.columns import names_of
+from experiments.trials.clip_rating.columns import RATINGS
 
 _OF_A_RUN = RATINGS.pick(
     "study",

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from analysis.errors import NoRatingsError
 from analysis.read.run_columns import RUN_FLAGS, RUN_TEXTS
 from analysis.read.text_table import numbers, read_text_table
-from experiments.columns import RATINGS, names_of
+from experiments.columns import names_of
 from experiments.definition import Experiment
 from experiments.errors import InputError
+from experiments.trials.clip_rating.columns import RATINGS
 
 ROW_TEXTS = names_of(RATINGS.pick("run", "kind", "verdict"))
 ROW_NUMBERS = names_of(RATINGS.pick("response", "expected_response", "rt"))

@@ -17,6 +17,7 @@ from scipy import special
 from analysis.plans.result import Analysis
 from analysis.within.marginal_means import level_combinations, margin
 from experiments.error_bars import within_participant_errors
+from experiments.trials.clip_rating.declaration import clip_rating_of
 
 Floats = NDArray[np.float64]
 
@@ -183,7 +184,7 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
     axes.set_ylabel("Naturalness rating" if analysis.experiment else analysis.rating)
     if analysis.experiment is not None:
-        scale = analysis.experiment.trial.scale
+        scale = clip_rating_of(analysis.experiment).scale
         axes.set_ylim(scale.minimum - 0.2, scale.maximum + 0.2)
         axes.set_yticks(range(scale.minimum, scale.maximum + 1))
     axes.grid(axis="y", linewidth=0.4, alpha=0.5)

@@ -18,10 +18,11 @@ from analysis.synthetic.space import DesignSpace
 from analysis.synthetic.targets import Targets, make_targets
 from analysis.synthetic.trials import rating_rows
 from analysis.synthetic.wishes import with_wishes
-from experiments.columns import RATINGS
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.load import load_experiment
+from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.clip_rating.declaration import clip_rating_of
 
 ATTEMPTS = 40
 """Fresh draws of participants before the best is kept and what it misses is reported."""
@@ -108,7 +109,8 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     """
     rng = np.random.default_rng(seed)
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
-    scale = (plan.experiment.trial.scale.minimum, plan.experiment.trial.scale.maximum)
+    declared = clip_rating_of(plan.experiment).scale
+    scale = (declared.minimum, declared.maximum)
     found: list[Repaired] = []
     rounds = 0
     while len(found) < ATTEMPTS and not any(not f.missed for f in found):

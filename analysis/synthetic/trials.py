@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.synthetic.space import DesignSpace
-from experiments.columns import RATINGS
 from experiments.definition import Experiment
 from experiments.design import BlockSpec, ClipSpec, blocks, clips, exemplar_key
 from experiments.schema.canonical import definition_sha256
+from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.clip_rating.declaration import clip_rating_of
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]
@@ -66,7 +67,7 @@ def rating_rows(
 def _cell_answers(
     experiment: Experiment, specs: list[ClipSpec], total: int, own: dict[str, float], rng: np.random.Generator
 ) -> dict[ClipSpec, list[int]]:
-    repeats, scale = experiment.blocks.repeats, experiment.trial.scale
+    repeats, scale = experiment.blocks.repeats, clip_rating_of(experiment).scale
     offsets = np.repeat([own[exemplar_key(experiment, spec)] for spec in specs], repeats)
     means = total / len(offsets) + offsets - offsets.mean()
     drawn = split_sum(total, means, scale.minimum, scale.maximum, rng)

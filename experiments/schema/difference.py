@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from experiments.definition import Experiment
-from experiments.schema.effects import Effect, effect_of
+from experiments.schema.effects import Effect, effect_of, effects_with
+from experiments.trials import KINDS
 
 TAGS = ("kind", "type", "rule")
 
@@ -36,7 +37,7 @@ class Change:
 def difference(old: Experiment, new: Experiment) -> list[Change]:
     """Every key that differs, what is measured first."""
     before, after = old.model_dump(mode="json"), new.model_dump(mode="json")
-    changes = list(_changes(before, after, "", ""))
+    changes = list(_Edit(KINDS[new.trial.kind].effects).changes(before, after, "", ""))
     return sorted(changes, key=lambda change: change.effect == "wording")
 
 
@@ -45,19 +46,51 @@ def changes_what_is_measured(changes: Sequence[Change]) -> bool:
     return any(change.effect == "measured" for change in changes)
 
 
-def _changes(old: Any, new: Any, shown: str, path: str) -> Iterator[Change]:
-    if old == new:
-        return
-    if tag := _tag_that_differs(old, new):
-        effect = effect_of(_join(path, tag)) or "measured"
-        yield Change(_join(shown, tag), effect, old[tag], new[tag])
-    elif isinstance(old, dict) and isinstance(new, dict):
-        yield from _of_tables(old, new, shown, path)
-    elif _are_elements(old) and _are_elements(new):
-        yield from _of_lists(old, new, shown, path)
-    else:
+class _Edit:
+    """Walks two declarations whose trials are (or become) of a kind with these effects."""
+
+    def __init__(self, below_trial: Mapping[str, Effect]) -> None:
+        self._effects = effects_with(below_trial)
+
+    def _effect(self, path: str) -> Effect:
         # A path that no entry covers is kept apart: the safe side.
-        yield Change(shown, effect_of(path) or "measured", old, new)
+        return effect_of(path, self._effects) or "measured"
+
+    def changes(self, old: Any, new: Any, shown: str, path: str) -> Iterator[Change]:
+        """What differs at `path`, called `shown`."""
+        if old == new:
+            return
+        if tag := _tag_that_differs(old, new):
+            effect = self._effect(_join(path, tag))
+            yield Change(_join(shown, tag), effect, old[tag], new[tag])
+        elif isinstance(old, dict) and isinstance(new, dict):
+            yield from self._of_tables(old, new, shown, path)
+        elif _are_elements(old) and _are_elements(new):
+            yield from self._of_lists(old, new, shown, path)
+        else:
+            yield Change(shown, self._effect(path), old, new)
+
+    def _of_tables(self, old: dict[str, Any], new: dict[str, Any], shown: str, path: str) -> Iterator[Change]:
+        for key in dict.fromkeys((*old, *new)):
+            if key not in old or key not in new:
+                # Tables have all their keys, so this is a text, or a set of them, in one language only:
+                # nobody has read both.
+                yield Change(_join(shown, key), "wording", old.get(key), new.get(key))
+                continue
+            # Languages are no part of a path.
+            below = path if path == "texts" else _join(path, key)
+            yield from self.changes(old[key], new[key], _join(shown, key), below)
+
+    def _of_lists(self, old: list[Any], new: list[Any], shown: str, path: str) -> Iterator[Change]:
+        before, after = _by_name(old), _by_name(new)
+        for name in dict.fromkeys((*before, *after)):
+            if name in before and name in after:
+                yield from self.changes(before[name], after[name], _join(shown, name), path)
+            else:
+                effect = self._effect(f"{path}.name")
+                yield Change(_join(shown, name), effect, before.get(name), after.get(name))
+        if list(before) != list(after) and set(before) == set(after):
+            yield Change(shown, self._effect(f"{path}.name"), list(before), list(after))
 
 
 def _tag_that_differs(old: Any, new: Any) -> str | None:
@@ -65,30 +98,6 @@ def _tag_that_differs(old: Any, new: Any) -> str | None:
     if not (isinstance(old, dict) and isinstance(new, dict)):
         return None
     return next((tag for tag in TAGS if tag in old and tag in new and old[tag] != new[tag]), None)
-
-
-def _of_tables(old: dict[str, Any], new: dict[str, Any], shown: str, path: str) -> Iterator[Change]:
-    for key in dict.fromkeys((*old, *new)):
-        if key not in old or key not in new:
-            # Tables have all their keys, so this is a text, or a set of them, in one language only:
-            # nobody has read both.
-            yield Change(_join(shown, key), "wording", old.get(key), new.get(key))
-            continue
-        # Languages are no part of a path.
-        below = path if path == "texts" else _join(path, key)
-        yield from _changes(old[key], new[key], _join(shown, key), below)
-
-
-def _of_lists(old: list[Any], new: list[Any], shown: str, path: str) -> Iterator[Change]:
-    before, after = _by_name(old), _by_name(new)
-    for name in dict.fromkeys((*before, *after)):
-        if name in before and name in after:
-            yield from _changes(before[name], after[name], _join(shown, name), path)
-        else:
-            effect = effect_of(f"{path}.name") or "measured"
-            yield Change(_join(shown, name), effect, before.get(name), after.get(name))
-    if list(before) != list(after) and set(before) == set(after):
-        yield Change(shown, effect_of(f"{path}.name") or "measured", list(before), list(after))
 
 
 def _are_elements(value: Any) -> bool:

@@ -58,15 +58,12 @@ EFFECTS: Mapping[str, Effect] = {
     "forms.fields.options.label": "wording",
     "texts": "wording",
     "analysis": "wording",
-    "trial.kind": "measured",
-    "trial.scale": "measured",
-    "trial.views": "measured",
-    "trial.start": "measured",
-    "trial.fixation_ms": "measured",
-    "trial.confirm": "measured",
-    "trial.comment": "wording",
-    "trial.expected_seconds": "wording",
 }
+
+
+def effects_with(below_trial: Mapping[str, Effect]) -> dict[str, Effect]:
+    """The table with the keys of one kind of trial, which stand under `trial`."""
+    return {**EFFECTS, "trial.kind": "measured", **{f"trial.{key}": of for key, of in below_trial.items()}}
 
 
 def effect_of(path: str, effects: Mapping[str, Effect] = EFFECTS) -> Effect | None:

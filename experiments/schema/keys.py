@@ -11,6 +11,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from experiments.definition import Experiment
+from experiments.trials import KINDS
+from experiments.trials.union import ByKind
 
 
 class Key(NamedTuple):
@@ -26,23 +28,26 @@ class Key(NamedTuple):
         return self.path.rpartition(".")[2]
 
     @property
-    def is_table(self) -> bool:
-        """True where the key holds further keys."""
-        return bool(models_inside(self.field.annotation))
+    def tables(self) -> list[type[BaseModel]]:
+        """The models that the key may hold, with keys of their own."""
+        if any(isinstance(mark, ByKind) for mark in self.field.metadata):
+            return [kind.declaration for kind in KINDS.values()]
+        return models_inside(self.field.annotation)
 
 
 def keys(model: type[BaseModel] = Experiment, prefix: str = "") -> Iterator[Key]:
     """Every key of `model` and of the models inside, depth first; a table comes before its keys."""
     for name, field in model.model_fields.items():
         path = f"{prefix}{name}"
-        yield Key(path, model, field)
-        for inner in models_inside(field.annotation):
+        key = Key(path, model, field)
+        yield key
+        for inner in key.tables:
             yield from keys(inner, f"{path}.")
 
 
 def paths(model: type[BaseModel] = Experiment, prefix: str = "") -> set[str]:
     """Paths of the keys that hold values rather than further keys."""
-    return {key.path for key in keys(model, prefix) if not key.is_table}
+    return {key.path for key in keys(model, prefix) if not key.tables}
 
 
 def models_inside(annotation: Any) -> list[type[BaseModel]]:

@@ -3,8 +3,10 @@
 from collections.abc import Iterable
 from typing import Any
 
-from experiments.columns import RATINGS, RUN_COLUMNS, Column
+from experiments.columns import RUN_COLUMNS, Column
 from experiments.definition import Experiment
+from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.clip_rating.declaration import clip_rating_of
 
 
 def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
@@ -28,7 +30,7 @@ def rating_columns(definitions: Iterable[Experiment]) -> list[Column]:
 
 def markdown(definition: Experiment, columns: Iterable[Column]) -> str:
     """The codebook as Markdown: `columns` are those of the ratings."""
-    scale = definition.trial.scale
+    scale = clip_rating_of(definition).scale
     language = definition.languages[0]
     lines = [
         f"# Codebook: {definition.title}",

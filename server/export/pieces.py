@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from experiments.columns import RATINGS
+from experiments.trials.clip_rating.columns import RATINGS
 from server.export.ratings_csv import factor_names, rating_rows
 from server.models import Study
 

@@ -6,7 +6,8 @@ from typing import Any
 from sqlalchemy import CursorResult, select, text
 from sqlalchemy.orm import Session
 
-from experiments.columns import RATINGS, names_of
+from experiments.columns import names_of
+from experiments.trials.clip_rating.columns import RATINGS
 from server.models import Study, StudyRun, StudyVersion
 
 RUNS_AT_ONCE = 200

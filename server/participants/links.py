@@ -8,9 +8,10 @@ from uuid import UUID
 from sqlalchemy.orm import Session
 
 from experiments import design
+from experiments.assignment.trial import Trial
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
-from server import assignment
+from experiments.trials import KINDS
 from server.clock import now
 from server.context import Services
 from server.models import Link, Study, StudyRun
@@ -202,7 +203,7 @@ def _new_run(
     lease = timedelta(minutes=loaded.experiment.session.lease_minutes)
     slot = repository.free_slot(session, version_id, phase, link.synthetic, lease)
     seed = secrets.randbits(SEED_BITS)
-    trials = assignment.assign(loaded.experiment, seed, slot)
+    trials = KINDS[loaded.experiment.trial.kind].assign(loaded.experiment, seed, slot)
     public_id = new_public_id()
     token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
     own = link.label if link.kind == "personal" else recruiter_of(link).participant(start.query)
@@ -230,7 +231,7 @@ def _new_run(
     return run, token
 
 
-def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[assignment.Trial]) -> list[dict[str, Any]]:
+def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
     return [
         {
             "study_run_id": run.id,

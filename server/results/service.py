@@ -7,6 +7,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
+from experiments.trials.clip_rating.declaration import clip_rating_of
 from server.models import Study, StudyVersion, VersionClip
 from server.results import repository, summary
 from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results, TimeBin
@@ -16,7 +17,7 @@ _DELAY_EDGES = [10.0 * step for step in range(11)]
 
 def results(session: Session, study: Study, definition: Experiment, phase: str) -> Results:
     """Means, distributions, response times and playback of one phase (pilot or live)."""
-    scale = definition.trial.scale
+    scale = clip_rating_of(definition).scale
     factors = list(definition.factor_names)
     means = repository.cell_means(session, study.id, phase, factors)
     clips = _clips(session, study, phase, scale.minimum, scale.maximum)

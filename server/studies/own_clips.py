@@ -9,11 +9,11 @@ from pathlib import Path
 
 import tomlkit
 
-from experiments.columns import RESERVED
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.manifest import Clip, Manifest, file_sha256
 from experiments.schema.canonical import definition_sha256
+from experiments.trials import reserved_names
 from server.studies.probe import NotAFilm, probe
 from server.studies.schemas import OwnClips
 from server.studies.uploads import plain_name
@@ -106,7 +106,7 @@ def check_factorial(placed: Placed) -> None:
             f"every cell needs the same number of clips: {'/'.join(most[0])} has {most[1]}, "
             f"{'/'.join(fewest[0])} has {fewest[1]}"
         )
-    if reserved := [name for name in levels_of if name in RESERVED]:
+    if reserved := [name for name in levels_of if name in reserved_names()]:
         raise InputError(
             f"a factor cannot be called '{reserved[0]}', the name of a ratings column; rename it"
         )

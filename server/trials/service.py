@@ -13,9 +13,10 @@ from server.participants.schemas import RunStatus
 from server.participants.screening import by_attention
 from server.tokens import hash_token
 from server.trials import repository
-from server.trials.schemas import PlaybackLog, RatingIn, Receipt
-from server.trials.verdict import Playback, Ruling, frames_in_log, is_settled, judge
-from server.versions import LoadedVersion, Versions
+from server.trials.kinds import Part, served
+from server.trials.schemas import RatingIn, Receipt
+from server.trials.verdict import Ruling, is_settled
+from server.versions import Versions
 
 
 class TrialNotInRun(NotFound):
@@ -24,22 +25,10 @@ class TrialNotInRun(NotFound):
     code = "trial_not_in_run"
 
 
-class RatingOutOfScale(Invalid):
-    """The rating does not lie on the declared scale."""
-
-    code = "rating_out_of_scale"
-
-
 class PlayOutOfRange(Invalid):
     """A clip may not be shown as often as this."""
 
     code = "play_out_of_range"
-
-
-class RatingMissing(Invalid):
-    """Only a clip that failed may go without a rating."""
-
-    code = "rating_missing"
 
 
 class RatingDiffers(Conflict):
@@ -70,7 +59,8 @@ def save_rating(
         ruling = (known.verdict, known.verdict_rule)
         return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
     _check(run, loaded.experiment, trial.kind, rating)
-    ruling = _judge(loaded, trial.version_clip_id, rating)
+    clips = () if trial.version_clip_id is None else (trial.version_clip_id,)
+    ruling = served(loaded.experiment.trial.kind).judge(loaded, clips, rating)
     saved_at = now()
     repository.add_rating(connection, _row(run, rating_id, rating, ruling, saved_at))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
@@ -100,43 +90,15 @@ def _known(stored: list[Any], rating_id: str, rating: RatingIn) -> Any:
     return None
 
 
-def _check(run: Any, experiment: Experiment, kind: str, rating: RatingIn) -> None:
+def _check(run: Any, experiment: Experiment, part: Part, rating: RatingIn) -> None:
     if run.status != "active":
         raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
-    scale, most = experiment.trial.scale, experiment.playback.max_repeats + 1
-    if rating.response is not None and not scale.minimum <= rating.response <= scale.maximum:
-        raise RatingOutOfScale(
-            f"Expected a whole number from {scale.minimum} to {scale.maximum}, got {rating.response}."
-        )
-    if rating.response is None and kind == "attention":
-        raise RatingMissing("Expected an answer, got none; only a clip that failed may go without.")
+    served(experiment.trial.kind).validate(experiment, part, rating)
+    most = experiment.playback.max_repeats + 1
     if rating.play > most:
         raise PlayOutOfRange(f"A clip is shown at most {most} times, got play {rating.play}.")
-
-
-def _playback(log: PlaybackLog) -> Playback:
-    seen = frames_in_log(index for index, _ in log.drawn) if log.drawn is not None else None
-    return Playback(
-        method=log.method,
-        clip_sha256=log.clip_sha256,
-        frames_drawn=log.frames_drawn,
-        frames_late=log.frames_late,
-        frames_missing=log.frames_missing,
-        longest_gap_ms=log.longest_gap_ms,
-        focus_lost=bool(log.focus_lost),
-        frames_seen=seen,
-    )
-
-
-def _judge(loaded: LoadedVersion, version_clip_id: int | None, rating: RatingIn) -> Ruling:
-    rules, rated = loaded.experiment.playback, rating.response is not None
-    if version_clip_id is None:
-        return judge(rules, _playback(rating.playback), None, 0, rated=rated)
-    clip = loaded.clips[version_clip_id]
-    frames = clip.frames * loaded.experiment.trial.views
-    return judge(rules, _playback(rating.playback), clip.sha256, frames, rated=rated)
 
 
 def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: datetime) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.columns import RATINGS
 from experiments.definition import Experiment
+from experiments.trials.clip_rating.columns import RATINGS
 
 Row = dict[str, object]
 

@@ -2,10 +2,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.columns import RATINGS, RUN_COLUMNS, VIEWS, Column, names_of
+from experiments.columns import RUN_COLUMNS, Column, names_of
+from experiments.trials import views
+from experiments.trials.clip_rating.columns import RATINGS
 
 
-@pytest.mark.parametrize("columns", [RUN_COLUMNS, *(view.columns for view in VIEWS)])
+@pytest.mark.parametrize("columns", [RUN_COLUMNS, *(view.columns for view in views())])
 def test_every_column_has_a_sentence_and_a_name_of_its_own(columns: tuple[Column, ...]) -> None:
     assert len(set(names_of(columns))) == len(columns)
     assert all(column.description.endswith(".") for column in columns)

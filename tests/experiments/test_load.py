@@ -10,6 +10,7 @@ from experiments.load import (
 )
 from experiments.rules import ScreenFormAnswer
 from experiments.schema.canonical import definition_sha256
+from experiments.trials.clip_rating.declaration import clip_rating_of
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")
 
@@ -74,7 +75,7 @@ def test_the_hash_is_of_the_meaning_not_the_spelling() -> None:
 def test_shipped_experiments_speak_every_language_they_list(name: str) -> None:
     experiment = load_experiment(name)
     for language in experiment.languages:
-        assert experiment.trial.scale.question[language]
+        assert clip_rating_of(experiment).scale.question[language]
         for form in experiment.forms:
             assert form.title[language]
             assert all(field.label[language] for field in form.fields)

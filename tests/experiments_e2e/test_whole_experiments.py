@@ -10,8 +10,8 @@ import pytest
 from sqlalchemy import text
 
 from experiments import design
-from experiments.columns import RATINGS
 from experiments.load import FOLDER
+from experiments.trials.clip_rating.columns import RATINGS
 from server.app import create_app
 from server.context import Services
 from server.export.formats import ratings_csv

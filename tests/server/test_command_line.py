@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.columns import RATINGS
 from experiments.load import parse_experiment
+from experiments.trials.clip_rating.columns import RATINGS
 from server.context import Services
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
 from server.settings import Settings

@@ -3,7 +3,8 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, inspect, text
 
-from experiments.columns import VIEWS, Dialect
+from experiments.columns import Dialect
+from experiments.trials import views
 from server.db import Database
 from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.models import Base
@@ -27,8 +28,8 @@ def test_the_views_of_the_database_are_those_of_the_columns(empty_database_url: 
     upgrade(database)
     dialect: Dialect = "sqlite" if database.engine.dialect.name == "sqlite" else "postgresql"
     with database.engine.connect() as connection:
-        assert set(inspect(connection).get_view_names()) == {view.name for view in VIEWS}
-        for view in VIEWS:
+        assert set(inspect(connection).get_view_names()) == {view.name for view in views()}
+        for view in views():
             made_by_migrations = definition_of(connection, view.name)
             connection.execute(text(f"DROP VIEW {view.name}"))
             connection.execute(text(view.create(dialect)))

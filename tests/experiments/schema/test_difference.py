@@ -2,8 +2,9 @@ import pytest
 
 from experiments.load import load_experiment, locate, parse_experiment
 from experiments.schema.difference import Change, changes_what_is_measured, difference
-from experiments.schema.effects import EFFECTS, effect_of
+from experiments.schema.effects import EFFECTS, effect_of, effects_with
 from experiments.schema.keys import keys, paths
+from experiments.trials import KINDS
 
 TEXT = locate("exp1").read_text(encoding="utf-8")
 
@@ -17,7 +18,8 @@ def edited(*pairs: tuple[str, str]) -> list[Change]:
 
 
 def test_every_key_says_what_an_edit_of_it_does() -> None:
-    assert {path for path in paths() if effect_of(path) is None} == set()
+    for kind in KINDS.values():
+        assert {path for path in paths() if effect_of(path, effects_with(kind.effects)) is None} == set()
 
 
 def test_no_entry_is_left_from_a_key_that_is_gone() -> None:

@@ -2,7 +2,7 @@ import csv
 import io
 import json
 
-from experiments.columns import RATINGS
+from experiments.trials.clip_rating.columns import RATINGS
 from server.export.codebook import RUN_COLUMNS
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase

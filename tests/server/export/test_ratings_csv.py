@@ -3,7 +3,7 @@ import io
 import json
 from typing import Any
 
-from experiments.columns import RATINGS
+from experiments.trials.clip_rating.columns import RATINGS
 from server.context import Services
 from server.export.formats import ratings_csv
 from server.export.ratings_csv import rating_rows

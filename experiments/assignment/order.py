@@ -1,30 +1,24 @@
-"""Which trials a participant gets and in what order: pure functions of declaration, seed and slot."""
+"""Every clip for everyone, one a trial: in blocks, with practice before and attention checks between."""
 
 import random
-from dataclasses import dataclass
+from collections.abc import Callable
 from itertools import cycle, islice, permutations
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from experiments import design
-from experiments.definition import Experiment
+from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec, ClipSpec
 
-MOST_ORDERS = 120
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
+
+MAX_ORDERS = 120
 """Up to five blocks every order is dealt; beyond that a Latin square: each block in each place."""
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One trial as assigned: practice has block 0; attention checks have no clip."""
-
-    kind: Literal["practice", "main", "attention"]
-    block: int
-    block_label: str
-    clip: ClipSpec | None = None
-    expected_response: int | None = None
-
-
-def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
+def single_clips(
+    experiment: "Experiment", seed: int, slot: int, asked: Callable[[random.Random], int]
+) -> list[Trial]:
     """The trials of one participant in order.
 
     Parameters
@@ -32,6 +26,7 @@ def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
     experiment: the declaration.
     seed: of everything random; equal seeds give equal orders.
     slot: place in the counterbalancing, from 0; block orders are dealt by it, evenly over any run of slots.
+    asked: draws the answer that an attention check asks for.
     """
     rng = random.Random(seed)
     trials = _practice(experiment, rng)
@@ -39,29 +34,29 @@ def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
         clips = list(block.clips)
         if experiment.blocks.trial_order == "random":
             rng.shuffle(clips)
-        main = [Trial("main", number, block.label, clip) for clip in clips]
-        trials.extend(_with_attention(experiment, main, rng))
+        main = [_of_one("main", number, block.label, clip) for clip in clips]
+        trials.extend(_with_attention(experiment, main, rng, asked))
     return trials
 
 
-def block_orders(experiment: Experiment) -> list[tuple[int, ...]]:
+def block_orders(experiment: "Experiment") -> list[tuple[int, ...]]:
     """The orders of the levels' blocks that slots are dealt, as indices; one where nothing is dealt."""
     count = len(_levels(experiment))
     if experiment.blocks.order == "alternating":
         return [tuple((start + step) % count for step in range(count)) for start in range(count)]
     if experiment.blocks.order == "counterbalanced":
-        every = list(islice(permutations(range(count)), MOST_ORDERS + 1))
-        return every if len(every) <= MOST_ORDERS else _latin_square(count)
+        every = list(islice(permutations(range(count)), MAX_ORDERS + 1))
+        return every if len(every) <= MAX_ORDERS else _latin_square(count)
     return [tuple(range(count))]
 
 
-def _levels(experiment: Experiment) -> list[BlockSpec]:
+def _levels(experiment: "Experiment") -> list[BlockSpec]:
     """One block of each level of the split factor (or the one block of all clips), repeats left out."""
     every = design.blocks(experiment)
     return every[: len(every) // experiment.blocks.repeats]
 
 
-def _ordered_blocks(experiment: Experiment, rng: random.Random, slot: int) -> list[BlockSpec]:
+def _ordered_blocks(experiment: "Experiment", rng: random.Random, slot: int) -> list[BlockSpec]:
     declared = experiment.blocks
     levels = _levels(experiment)
     if declared.order == "random":
@@ -81,22 +76,27 @@ def _latin_square(count: int) -> list[tuple[int, ...]]:
     return rows if count % 2 == 0 else rows + [tuple(reversed(row)) for row in rows]
 
 
-def _practice(experiment: Experiment, rng: random.Random) -> list[Trial]:
+def _practice(experiment: "Experiment", rng: random.Random) -> list[Trial]:
     """Clips from as many different cells as there are practice trials, exemplars at random."""
     cells = design.cells(experiment)
     rng.shuffle(cells)
     drawn = islice(cycle(cells), experiment.practice.trials)
     clips = [ClipSpec(cell, rng.randint(1, experiment.exemplars.per_cell)) for cell in drawn]
-    return [Trial("practice", 0, "practice", clip) for clip in clips]
+    return [_of_one("practice", 0, "practice", clip) for clip in clips]
 
 
-def _with_attention(experiment: Experiment, main: list[Trial], rng: random.Random) -> list[Trial]:
+def _of_one(kind: Literal["practice", "main"], block: int, label: str, clip: ClipSpec) -> Trial:
+    return Trial(kind, block, label, (Shown("shown", clip),))
+
+
+def _with_attention(
+    experiment: "Experiment", main: list[Trial], rng: random.Random, asked: Callable[[random.Random], int]
+) -> list[Trial]:
     """Put the declared number of instructed ratings between a block's trials, never before the first."""
-    scale = experiment.trial.scale
     trials = list(main)
     places = sorted(rng.sample(range(1, len(main) + 1), min(experiment.attention.per_block, len(main))))
     for place in reversed(places):
-        response = rng.randint(scale.minimum, scale.maximum)
+        response = asked(rng)
         check = Trial("attention", main[0].block, main[0].block_label, expected_response=response)
         trials.insert(place, check)
     return trials

@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
+from experiments.assignment.order import block_orders
 from experiments.definition import Experiment
 from experiments.load import load_experiment, parse_experiment
-from server.assignment import assign, block_orders
+from experiments.trials.clip_rating.plan import assign
 from tests.helpers.studies import SHORT
 
 seeds = st.integers(min_value=0, max_value=2**53 - 1)

@@ -1,0 +1,1 @@
+"""Who sees what and in which order: pure functions of declaration, seed and slot."""

@@ -1,0 +1,30 @@
+"""One trial as it is assigned to a participant, of any kind."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from experiments.design import ClipSpec
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A clip of a trial and the role in which it is shown."""
+
+    role: str
+    clip: ClipSpec
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial as assigned: practice has block 0; attention checks have no clip."""
+
+    kind: Literal["practice", "main", "attention"]
+    block: int
+    block_label: str
+    shown: tuple[Shown, ...] = ()
+    expected_response: int | None = None
+
+    @property
+    def clip(self) -> ClipSpec | None:
+        """The clip of a trial that shows one; None for checks."""
+        return self.shown[0].clip if self.shown else None
