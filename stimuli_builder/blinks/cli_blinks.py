@@ -10,12 +10,14 @@ from experiments.errors import InputError
 if TYPE_CHECKING:
     from stimuli_builder.blinks.label_options import LabelOptions
 
+CLASSIFIER = "classifier"
 EXAMPLES = """
 Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.
 
-The series is a CSV with a column of distances; a track's distance columns are found by themselves.
-BLINKS.csv gets a row a blink; the blinks' profiles (closure at 300 fps) are written beside it, to fit a
-model to. Frame counts of the labelling rule are the paper's at 300 fps and scale with the rate.
+The series is a CSV with a column of distances; a track's distance columns are found by themselves. Blinks,
+squints, gaze shifts and closed eyes are told apart at any rate from 15 to 1,000 frames a second.
+BLINKS.csv gets a row a blink; the blinks' profiles (closure at 300 fps) and a table of all events are
+written beside it. --preset chooses the paper's rule instead; its frame counts are at 300 fps and scale.
 
 Examples:
 
@@ -46,10 +48,10 @@ def blinks(
     preset: Annotated[
         str,
         typer.Option(
-            help="Values of the rule: rest as part of the peak 'velocity', as part of the opening "
-            "('relative'), or 0.1 px a frame ('paper')."
+            help="How blinks are told: 'classifier' (any rate), or the paper's rule with rest as part of the "
+            "peak 'velocity', as part of the opening ('relative'), or 0.1 px a frame ('paper')."
         ),
-    ] = "velocity",
+    ] = "classifier",
     gradient_peak: Annotated[
         float | None, typer.Option(help="Gradient at rest, as part of the phase's greatest.")
     ] = None,
@@ -75,7 +77,13 @@ def blinks(
             "--allow-gaps/--no-gaps", help="Label round long gaps; tracks allow them, plain series not."
         ),
     ] = None,
-    any_duration: Annotated[bool, typer.Option("--any-duration", help="Take blinks of any length.")] = False,
+    events: Annotated[
+        Path | None,
+        typer.Option(help="Table of all lid events; OUT with the ending .events.csv without it."),
+    ] = None,
+    resample: Annotated[
+        bool, typer.Option("--resample", help="Bring uneven times (time_s) to an even rate first.")
+    ] = False,
     summary: Annotated[Path | None, typer.Option(help="Summary to write (JSON).")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="The labelled series as a figure (PNG, SVG, PDF).")
@@ -105,7 +113,9 @@ def blinks(
             closed=closed,
             complete_from=complete_from,
             allow_gaps=allow_gaps,
-            any_duration=any_duration,
+            classify=preset == CLASSIFIER,
+            events=events or out.with_name(f"{out.stem}.events.csv"),
+            resample=resample,
             summary=summary,
             plot=plot,
             plot_aligned=plot_aligned,
@@ -129,6 +139,13 @@ def _options(
     from stimuli_builder.blinks.label_options import preset
 
     given = [limit for limit in (peak, opening, px) if limit is not None]
+    if name == CLASSIFIER:
+        if given or opening_px is not None or minimum_depth is not None:
+            raise InputError(
+                "the --gradient options, --opening-px and --minimum-depth belong to the paper's rule: "
+                "add --preset velocity, relative or paper"
+            )
+        return preset("velocity")
     if len(given) > 1:
         raise InputError("give one of --gradient-peak, --gradient and --gradient-px")
     options = preset(name)

@@ -1,5 +1,6 @@
 """Cut the profiles of measured blinks out of their series, one eye at a time or both together."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -7,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.events.recognise import LidEvent, Recognised
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum, find_blinks
 from stimuli_builder.blinks.measure import (
@@ -17,26 +19,36 @@ from stimuli_builder.blinks.measure import (
     smoothed,
 )
 from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
+from stimuli_builder.blinks.recognised import recognised_blinks
 from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
 
 LID_FILTER_FRAMES = 10
 PLAUSIBLE_MS = (120, 600)
 """Median durations that are believed: 330 ms is usual."""
-PLAUSIBLE_SPEED = (9, 50)
-"""Peak closing velocity over amplitude, per second: 18-29 is usual at any amplitude (main sequence)."""
 USUAL_CLOSING_MS = (65, 140)
 USUAL_SPEED = (15, 28)
-"""A rate off by a factor of two puts both outside, on opposite sides; a person seldom has both there."""
+"""Peak closing velocity over amplitude, per second (main sequence). A rate off by a factor of two puts it and
+the closing time outside, on opposite sides; a person seldom has both there."""
+TELLING_FPS = 60
 
 
 @dataclass(frozen=True, eq=False)
 class EyeBlinks:
-    """The blinks of one column: the series, its filtered distance, every blink measured, what was refused."""
+    """The blinks of one column: the series, its filtered distance, every blink measured, what was refused.
+
+    `recognised` is what the classifier told; None by the paper's rule.
+    """
 
     series: BlinkSeries
     smooth: Array
     blinks: tuple[MeasuredBlink, ...]
     refused: tuple[RefusedMinimum, ...]
+    recognised: Recognised | None = None
+
+    @property
+    def events(self) -> tuple[LidEvent, ...]:
+        """All lid events of the classifier, other than blinks too; none by the paper's rule."""
+        return () if self.recognised is None else self.recognised.events
 
 
 def blinks_of(
@@ -46,14 +58,24 @@ def blinks_of(
     closed_distance: float | None = None,
     complete_from: float = 0.95,
     edges: Mapping[int, tuple[int, int]] = MappingProxyType({}),
+    recognised: Recognised | None = None,
 ) -> EyeBlinks:
-    """Label and measure one series; `edges` puts (onset, end) of a person's in place, by minimum frame."""
-    labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)
+    """Label and measure one series.
+
+    Parameters
+    ----------
+    edges : by minimum frame, an (onset, end) of a person's that takes the place of the labelled one.
+    recognised : what `recognise` told of this series; None labels by the paper's rule with `options`.
+    """
+    if recognised is None:
+        labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)
+    else:
+        labelled, refused = recognised_blinks(series, recognised, options)
     labelled = [_moved(series, blink, edges.get(blink.minimum)) for blink in labelled]
-    measured = measure_blinks(
+    measured, flat = measure_blinks(
         series, labelled, options, closed_distance=closed_distance, complete_from=complete_from
     )
-    return EyeBlinks(series, smoothed(series, options), tuple(measured), tuple(refused))
+    return EyeBlinks(series, smoothed(series, options), tuple(measured), (*refused, *flat), recognised)
 
 
 def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | None) -> LabelledBlink:
@@ -67,40 +89,44 @@ def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | N
         raise InputError(
             f"the review moves a blink of {series.column} ({onset} to {end}) over frames without a value"
         )
-    return replace(blink, onset=onset, end=end)
+    event = blink.event
+    if event is not None:
+        event = replace(event, onset_s=onset / series.fps, end_s=end / series.fps)
+    return replace(blink, onset=onset, end=end, event=event)
 
 
-def require_blinks(eye: EyeBlinks, options: LabelOptions, *, any_duration: bool = False) -> None:
-    """Refuse a series without a blink, or whose blinks last as none do: then its rate is wrong."""
-    column = eye.series.column
+def require_blinks(eye: EyeBlinks, options: LabelOptions) -> None:
+    """Refuse a series without a blink."""
+    if eye.blinks:
+        return
+    deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
+    others = Counter(event.kind.replace("_", " ") for event in eye.events if event.kind != "blink")
+    seen = ", ".join(f"{count} x {kind}" for kind, count in others.items())
+    lost = f"; {len(eye.refused)} minima could not be labelled" if eye.refused else ""
+    raise InputError(
+        f"no blink in column '{eye.series.column}': its deepest dip is {deepest:.0%} of the opening"
+        + (f", it has {seen}" if seen else f", a blink needs {options.minimum_depth:.0%} (--minimum-depth)")
+        + f"{lost}; is the column right, and --fps?"
+    )
+
+
+def rate_doubt(eye: EyeBlinks) -> str:
+    """Why the rate of a series may be wrong, in words; empty where its blinks last as blinks do."""
     if not eye.blinks:
-        deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
-        lost = f"; {len(eye.refused)} minima could not be labelled" if eye.refused else ""
-        raise InputError(
-            f"no blink in column '{column}': its deepest dip is {deepest:.0%} of the opening, a blink needs "
-            f"{options.minimum_depth:.0%} (--minimum-depth){lost}; is the column right, and --fps?"
-        )
-    if not any_duration:
-        _require_plausible_rate(eye)
-
-
-def _require_plausible_rate(eye: EyeBlinks) -> None:
+        return ""
     duration_ms = float(np.median([blink.duration_ms for blink in eye.blinks]))
     closing_ms = float(np.median([blink.down_ms for blink in eye.blinks]))
     speed = float(np.median([blink.peak_closing_velocity / blink.amplitude for blink in eye.blinks]))
-    possible = (
-        PLAUSIBLE_MS[0] <= duration_ms <= PLAUSIBLE_MS[1]
-        and PLAUSIBLE_SPEED[0] <= speed <= PLAUSIBLE_SPEED[1]
+    # Under 60 fps the filter and the frames, not the lid, rule how fast a blink seems to be.
+    slow = closing_ms > USUAL_CLOSING_MS[1] and (speed < USUAL_SPEED[0] or eye.series.fps < TELLING_FPS)
+    fast = closing_ms < USUAL_CLOSING_MS[0] and (speed > USUAL_SPEED[1] or eye.series.fps < TELLING_FPS)
+    if PLAUSIBLE_MS[0] <= duration_ms <= PLAUSIBLE_MS[1] and not slow and not fast:
+        return ""
+    return (
+        f"at {eye.series.fps:g} fps the blinks of '{eye.series.column}' last {duration_ms:.0f} ms and close "
+        f"in {closing_ms:.0f} ms (medians), where {PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]} and "
+        f"{USUAL_CLOSING_MS[0]}-{USUAL_CLOSING_MS[1]} are usual: is --fps right?"
     )
-    slow = closing_ms > USUAL_CLOSING_MS[1] and speed < USUAL_SPEED[0]
-    fast = closing_ms < USUAL_CLOSING_MS[0] and speed > USUAL_SPEED[1]
-    if not possible or slow or fast:
-        raise InputError(
-            f"at {eye.series.fps:g} fps the blinks of '{eye.series.column}' last {duration_ms:.0f} ms, "
-            f"close in {closing_ms:.0f} ms and at {speed:.1f} amplitudes a second (medians), where "
-            f"{PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]}, {USUAL_CLOSING_MS[0]}-{USUAL_CLOSING_MS[1]} and "
-            f"{USUAL_SPEED[0]}-{USUAL_SPEED[1]} are usual: is --fps right? --any-duration takes them"
-        )
 
 
 def eye_of(column: str) -> Eye | None:
@@ -169,6 +195,16 @@ def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink
                 free.remove(other)
                 break
     return pairs
+
+
+def both_eyes(
+    eyes: Sequence[EyeBlinks], names: Sequence[Eye | None]
+) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
+    """Return the blinks of the left eye with their partners in the right one; none for other columns."""
+    if len(eyes) != 2 or set(names) != {"left", "right"}:
+        return []
+    by_name = dict(zip(names, eyes, strict=True))
+    return paired_blinks(by_name["left"], by_name["right"])
 
 
 def paired_profiles(left: EyeBlinks, right: EyeBlinks, recording: str) -> list[BlinkProfile]:

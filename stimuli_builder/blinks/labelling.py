@@ -8,6 +8,7 @@ from scipy.ndimage import percentile_filter
 from scipy.signal import find_peaks
 
 from stimuli_builder.blinks.bottom import turning_frame
+from stimuli_builder.blinks.events.recognise import LidEvent
 from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS, LabelOptions
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import PAPER_FPS, box_filter, runs, scaled_frames
@@ -21,7 +22,8 @@ class LabelledBlink:
 
     `depth` is the fall from the local opening to the minimum, as part of that opening; `baseline` the
     paper's mean about the minimum; `touches_neighbour` says that an end of the blink is the highest
-    point between it and the next one, which began before the eye had come to rest.
+    point between it and the next one, which began before the eye had come to rest. `event` is what the
+    classifier of lid events told of it, its times between frames; None by the paper's rule.
     """
 
     onset: int
@@ -30,6 +32,7 @@ class LabelledBlink:
     depth: float
     baseline: float
     touches_neighbour: bool = False
+    event: LidEvent | None = None
 
 
 @dataclass(frozen=True)

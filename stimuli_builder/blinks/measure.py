@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
 from stimuli_builder.blinks.label_options import LabelOptions
-from stimuli_builder.blinks.labelling import LabelledBlink
+from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array
 from stimuli_builder.blinks.series import BlinkSeries, box_filter, scaled_frames
 
@@ -25,7 +25,8 @@ class MeasuredBlink:
     The closure takes the line from the onset to the end as open (0) and the recording's closed level as
     closed (1). Velocities are of the filtered distance, in its unit a second. `amplitude` is the fall from
     the open level to the minimum, `closure` the greatest closure. `rest_before` and `rest_after` tell how
-    far the resting eye was open before and after: closure against the wider of the two.
+    far the resting eye was open before and after: closure against the wider of the two. `probability` and
+    the closed phase are the classifier's, and NaN by the paper's rule; with it, times lie between frames.
     """
 
     number: int
@@ -52,6 +53,9 @@ class MeasuredBlink:
     rest_before: float
     rest_after: float
     touches_neighbour: bool
+    probability: float = float("nan")
+    closed_from_s: float = float("nan")
+    closed_to_s: float = float("nan")
 
 
 def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | None = None) -> float:
@@ -85,17 +89,38 @@ def measure_blinks(
     *,
     closed_distance: float | None = None,
     complete_from: float = COMPLETE_FROM,
-) -> list[MeasuredBlink]:
-    """Measure every labelled blink; the closed level is the recording's (see `closed_level`)."""
+) -> tuple[list[MeasuredBlink], list[RefusedMinimum]]:
+    """Measure every labelled blink; the closed level is the recording's (see `closed_level`).
+
+    Returns
+    -------
+    measured, refused
+        A blink that begins or ends no further open than the closed level has no closure and is refused.
+
+    Raises
+    ------
+    InputError
+        The closed distance given is not below the opening of any blink.
+    """
     if not blinks:
-        return []
+        return [], []
     smooth = smoothed(series, options)
     closed = closed_level(smooth, blinks, closed_distance)
+    fit = [blink for blink in blinks if closed < min(smooth[blink.onset], smooth[blink.end])]
+    if not fit and closed_distance is not None:
+        widest = max(float(smooth[blink.onset]) for blink in blinks)
+        raise InputError(
+            f"--closed {closed:g} is not below the opening of any blink of '{series.column}' "
+            f"(up to {widest:g}); it is the distance that stays when the lids meet"
+        )
+    reason = f"it begins or ends no further open than the closed distance {closed:.3g}"
+    refused = [RefusedMinimum(blink.minimum, reason) for blink in blinks if blink not in fit]
     velocity = np.gradient(smooth) * series.fps
-    return [
+    measured = [
         _measure(series, blink, number, smooth, velocity, closed, complete_from)
-        for number, blink in enumerate(blinks, start=1)
+        for number, blink in enumerate(fit, start=1)
     ]
+    return measured, refused
 
 
 def _measure(
@@ -109,27 +134,24 @@ def _measure(
 ) -> MeasuredBlink:
     fps, least = series.fps, float(smooth[blink.minimum])
     open_distance = float(open_line(smooth, blink.onset, blink.end)(blink.minimum))
-    if not closed < min(smooth[blink.onset], smooth[blink.end]):
-        raise InputError(
-            f"the closed distance {closed:g} is not below the opening {open_distance:g} of blink {number}"
-        )
     closure = min(1.0, (open_distance - least) / (open_distance - closed))
-    down, up = blink.minimum - blink.onset, blink.end - blink.minimum
+    onset_s, minimum_s, end_s = _times(blink, fps)
     before, after = _rests(smooth, blink, fps, closed)
+    event = blink.event
     return MeasuredBlink(
         number=number,
         column=series.column,
         onset_frame=blink.onset,
         minimum_frame=blink.minimum,
         end_frame=blink.end,
-        onset_s=blink.onset / fps,
-        minimum_s=blink.minimum / fps,
-        end_s=blink.end / fps,
-        down_frames=down,
-        up_frames=up,
-        down_ms=down * 1000 / fps,
-        up_ms=up * 1000 / fps,
-        duration_ms=(down + up) * 1000 / fps,
+        onset_s=onset_s,
+        minimum_s=minimum_s,
+        end_s=end_s,
+        down_frames=blink.minimum - blink.onset,
+        up_frames=blink.end - blink.minimum,
+        down_ms=(minimum_s - onset_s) * 1000,
+        up_ms=(end_s - minimum_s) * 1000,
+        duration_ms=(end_s - onset_s) * 1000,
         open_distance=open_distance,
         minimum_distance=least,
         closed_distance=closed,
@@ -141,7 +163,17 @@ def _measure(
         rest_before=before,
         rest_after=after,
         touches_neighbour=blink.touches_neighbour,
+        probability=float("nan") if event is None else event.probability,
+        closed_from_s=float("nan") if event is None else event.closed_from_s,
+        closed_to_s=float("nan") if event is None else event.closed_to_s,
     )
+
+
+def _times(blink: LabelledBlink, fps: float) -> tuple[float, float, float]:
+    """Onset, minimum and end in seconds: the event's, between frames, or the labelled frames'."""
+    if blink.event is None:
+        return blink.onset / fps, blink.minimum / fps, blink.end / fps
+    return blink.event.onset_s, blink.event.minimum_s, blink.event.end_s
 
 
 def open_line(smooth: Array, onset: int, end: int) -> Callable[[ArrayLike], Array]:
@@ -161,10 +193,12 @@ def _rests(smooth: Array, blink: LabelledBlink, fps: float, closed: float) -> tu
     before = smooth[max(0, blink.onset - reach) : blink.onset + 1]
     after = smooth[blink.end + pause : blink.end + pause + reach]
     levels = [
-        float(np.nanmedian(before)),
+        float(np.nanmedian(before)) if np.isfinite(before).any() else float(smooth[blink.onset]),
         float(np.nanmedian(after)) if np.isfinite(after).any() else float(smooth[blink.end]),
     ]
     widest = max(levels)
+    if widest <= closed:
+        return 0.0, 0.0
     return (widest - levels[0]) / (widest - closed), (widest - levels[1]) / (widest - closed)
 
 

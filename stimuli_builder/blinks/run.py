@@ -1,5 +1,6 @@
 """What `stimuli blinks` does: read, label, apply the review, write everything or nothing."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,16 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.extract import EyeBlinks, all_profiles, blinks_of, eye_of, require_blinks
+from stimuli_builder.blinks.events.recognise import recognise
+from stimuli_builder.blinks.extract import (
+    EyeBlinks,
+    all_profiles,
+    blinks_of,
+    both_eyes,
+    eye_of,
+    rate_doubt,
+    require_blinks,
+)
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.profile import BlinkProfile
 from stimuli_builder.blinks.profile_table import write_profile_table
@@ -26,7 +36,7 @@ from stimuli_builder.blinks.review import (
     write_reviews,
 )
 from stimuli_builder.blinks.series import read_series
-from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_summary
+from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
 from stimuli_builder.files import check_targets
 
 
@@ -43,7 +53,9 @@ class BlinksJob:
     closed: float | None = None
     complete_from: float = 0.95
     allow_gaps: bool | None = None
-    any_duration: bool = False
+    classify: bool = True
+    events: Path | None = None
+    resample: bool = False
     summary: Path | None = None
     plot: Path | None = None
     plot_aligned: Path | None = None
@@ -58,9 +70,10 @@ def run_blinks(job: BlinksJob) -> None:
     eyes = label_recording(job)
     reviews, decided, lost = _reviewed(job, eyes)
     eyes = [_with_moved_edges(job, eye, decided) for eye in eyes]
-    frame = blinks_frame([blink for eye in eyes for blink in eye.blinks], decided)
+    names = [eye_of(eye.series.column) for eye in eyes]
+    blinks = [blink for eye in eyes for blink in eye.blinks]
+    frame = blinks_frame(blinks, decided, both_eyes(eyes, names))
     accepted = [_accepted_only(eye, decided) for eye in eyes]
-    names = [eye_of(eye.series.column) for eye in accepted]
     profiles = all_profiles(accepted, job.series.stem, names)
     if not profiles:
         raise InputError("the review rejects every blink: nothing is left to write")
@@ -74,19 +87,31 @@ def run_blinks(job: BlinksJob) -> None:
         write_summary(job.summary, summaries)
     if job.review is not None and (job.reject or job.accept):
         write_reviews(job.review, reviews)
+    if job.events is not None and job.classify:
+        write_events(job.events, eyes)
     write_blinks(job.out, frame)
     _report(job, summaries, frame, lost)
 
 
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
-    """Label every column of the job; none with a blink, or a wrong rate, is refused."""
+    """Label every column of the job; none with a blink is refused, an unlikely rate is told."""
+    given = read_series(job.series, job.columns, job.fps, allow_gaps=job.allow_gaps, resample=job.resample)
+    seen = recognise(given) if job.classify else [None] * len(given)
     eyes = [
-        blinks_of(series, job.options, closed_distance=job.closed, complete_from=job.complete_from)
-        for series in read_series(job.series, job.columns, job.fps, allow_gaps=job.allow_gaps)
+        blinks_of(
+            series,
+            job.options,
+            closed_distance=job.closed,
+            complete_from=job.complete_from,
+            recognised=recognised,
+        )
+        for series, recognised in zip(given, seen, strict=True)
     ]
     with_blinks = [eye for eye in eyes if eye.blinks]
     for eye in with_blinks or eyes:
-        require_blinks(eye, job.options, any_duration=job.any_duration)
+        require_blinks(eye, job.options)
+        if doubt := rate_doubt(eye):
+            sys.stderr.write(f"warning: {doubt}\n")
     return eyes
 
 
@@ -102,7 +127,8 @@ def _check(job: BlinksJob) -> None:
     for figure in (job.plot, job.plot_aligned):
         if figure is not None:
             check_figure_name(figure)
-    outputs = [job.out, job.profiles, job.summary, job.plot, job.plot_aligned, job.review]
+    events = job.events if job.classify else None
+    outputs = [job.out, job.profiles, events, job.summary, job.plot, job.plot_aligned, job.review]
     check_targets(outputs, [job.series])
 
 
@@ -125,7 +151,12 @@ def _with_moved_edges(job: BlinksJob, eye: EyeBlinks, decided: Mapping[tuple[str
     if not edges:
         return eye
     return blinks_of(
-        eye.series, job.options, closed_distance=job.closed, complete_from=job.complete_from, edges=edges
+        eye.series,
+        job.options,
+        closed_distance=job.closed,
+        complete_from=job.complete_from,
+        edges=edges,
+        recognised=eye.recognised,
     )
 
 
@@ -164,7 +195,6 @@ def _report(
 ) -> None:
     console = Console()
     headers = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
-    headers = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
     table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     table.add_column("column", no_wrap=True)
     for header in headers:
@@ -183,6 +213,11 @@ def _report(
             console.print(
                 f"{row['column']}: minimum at frame {refused['minimum']} left out: {refused['reason']}"
             )
+        if row["other_events"]:
+            seen = ", ".join(
+                f"{count} {kind.replace('_', ' ')}" for kind, count in row["other_events"].items()
+            )
+            console.print(f"{row['column']}: besides blinks: {seen}")
         if row["missing_frames"]:
             console.print(f"{row['column']}: {row['missing_frames']} frames without a value were left out")
         if row["bridged_frames"]:
@@ -191,7 +226,8 @@ def _report(
         console.print(
             f"the review names a blink at frame {review.minimum_frame} of {review.column}: none is there"
         )
-    written = [job.out, job.profiles, job.summary, job.plot, job.plot_aligned]
+    events = job.events if job.classify else None
+    written = [job.out, job.profiles, events, job.summary, job.plot, job.plot_aligned]
     console.print(
         f"{len(frame)} blinks; wrote " + ", ".join(str(path) for path in written if path is not None)
     )

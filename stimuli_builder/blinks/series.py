@@ -104,9 +104,12 @@ def choose_columns(table: pd.DataFrame, wanted: Sequence[str], path: Path) -> li
     raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
 
 
-def series_fps(table: pd.DataFrame, fps: float | None, path: Path) -> float:
-    """Return the frame rate: given, or measured from `time_s`; both must agree within 1%."""
-    measured = _measured_fps(table, path) if "time_s" in table.columns else None
+def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
+    """Return the frame rate: given, or measured from `time_s`; both must agree within 1%.
+
+    `uneven` takes times whose steps differ, for a series that is resampled.
+    """
+    measured = _measured_fps(table, path, uneven=uneven) if "time_s" in table.columns else None
     if fps is None and measured is None:
         raise InputError(f"{path.name} has no column time_s: give the recording's rate with --fps")
     if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
@@ -123,16 +126,17 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path) -> float:
     return rate
 
 
-def _measured_fps(table: pd.DataFrame, path: Path) -> float:
+def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
     times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
     steps = np.diff(times)
     if steps.size == 0 or not np.isfinite(steps).all() or (steps <= 0).any():
         raise InputError(f"{path.name}: time_s must be complete and increase from row to row")
     step = float(np.median(steps))
-    if (np.abs(steps / step - 1) > 0.2).any():
+    if not uneven and (np.abs(steps / step - 1) > 0.2).any():
         row = int(np.argmax(np.abs(steps / step - 1) > 0.2)) + 2
         raise InputError(
-            f"{path.name}: time_s is uneven (row {row}); labels need a constant frame rate: resample it first"
+            f"{path.name}: time_s is uneven (row {row}); labels need a constant frame rate: "
+            "--resample brings it to one"
         )
     return float((times.size - 1) / (times[-1] - times[0]))
 
@@ -204,11 +208,39 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
+def resampled(table: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
+    """Bring columns to even times at the mean rate of `time_s`, by straight lines between true times.
+
+    Gaps stay gaps: a value next to an empty one is empty.
+    """
+    times = table["time_s"].to_numpy(dtype=np.float64)
+    even = np.linspace(times[0], times[-1], times.size)
+    data: dict[str, Array | pd.Series] = {"frame": np.arange(even.size, dtype=np.float64), "time_s": even}
+    for column in columns:
+        data[column] = np.interp(even, times, table[column].to_numpy(dtype=np.float64))
+    if "status" in table.columns:
+        nearest = np.clip(np.searchsorted(times, even), 0, times.size - 1)
+        data["status"] = table["status"].iloc[nearest].reset_index(drop=True)
+    return pd.DataFrame(data)
+
+
 def read_series(
-    path: Path, columns: Sequence[str] = (), fps: float | None = None, *, allow_gaps: bool | None = None
+    path: Path,
+    columns: Sequence[str] = (),
+    fps: float | None = None,
+    *,
+    allow_gaps: bool | None = None,
+    resample: bool = False,
 ) -> list[BlinkSeries]:
-    """Read the distance columns of a plain series or track CSV, see `choose_columns` and `series_fps`."""
+    """Read the distance columns of a plain series or track CSV, see `choose_columns` and `series_fps`.
+
+    `resample` brings uneven times to even ones first.
+    """
     table = read_table(path)
     chosen = choose_columns(table, columns, path)
-    rate = series_fps(table, fps, path)
+    if resample and "time_s" not in table.columns:
+        raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
+    rate = series_fps(table, fps, path, uneven=resample)
+    if resample:
+        table = resampled(table, chosen)
     return [make_series(table, column, rate, path, allow_gaps=allow_gaps) for column in chosen]

@@ -1,6 +1,7 @@
 """The blinks table (a row a blink) and the summary of a recording."""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -40,6 +41,12 @@ BLINK_COLUMNS = {
     "rest_before": "closure of the resting eye before the blink, against the wider of before and after",
     "rest_after": "closure of the resting eye after the blink, likewise",
     "touches_neighbour": "true where the eye does not come to rest before the neighbouring blink",
+    "probability": "the classifier's probability that it is a blink; empty by the paper's rule",
+    "closed_from_s": "start of the closed phase (95% of the amplitude reached), in seconds; likewise",
+    "closed_to_s": "end of the closed phase",
+    "partner": "number of the other eye's blink of the same moment; empty where only one eye blinked",
+    "partner_lag_ms": "onset of this blink minus its partner's",
+    "partner_closure": "greatest closure of this blink minus its partner's",
     "accepted": "false where a review rejected the blink",
     "reason": "reason given in the review",
 }
@@ -47,18 +54,43 @@ DURATION_BIN_MS = 1000 / 30
 AMPLITUDE_BINS = 10
 
 
-def blinks_frame(blinks: Sequence[MeasuredBlink], decided: Mapping[tuple[str, int], Review]) -> pd.DataFrame:
-    """Return the blinks table, columns as in `BLINK_COLUMNS`."""
+EVENT_COLUMNS = {
+    "column": "column of the series",
+    "kind": "blink, squint, gaze_shift or closed_eye",
+    "probability": "the classifier's probability of this kind",
+    "frame": "deepest frame",
+    "onset_s": "begin of closing in seconds from the first frame",
+    "closed_from_s": "start of the deepest phase",
+    "minimum_s": "deepest moment",
+    "closed_to_s": "end of the deepest phase",
+    "end_s": "end of reopening",
+    "depth": "greatest depth as part of the opening",
+}
+
+
+def blinks_frame(
+    blinks: Sequence[MeasuredBlink],
+    decided: Mapping[tuple[str, int], Review],
+    pairs: Sequence[tuple[MeasuredBlink, MeasuredBlink]] = (),
+) -> pd.DataFrame:
+    """Return the blinks table, columns as in `BLINK_COLUMNS`; `pairs` are the blinks of both eyes."""
+    partners = {(one.column, one.number): other for pair in pairs for one, other in (pair, pair[::-1])}
     rows = []
     for blink in blinks:
         review = decided.get((blink.column, blink.number))
+        other = partners.get((blink.column, blink.number))
         row = asdict(blink) | {
+            "partner": None if other is None else other.number,
+            "partner_lag_ms": None if other is None else (blink.onset_s - other.onset_s) * 1000,
+            "partner_closure": None if other is None else blink.closure - other.closure,
             "accepted": review is None or review.decision == "accept",
             "reason": "" if review is None else review.reason,
         }
         rows.append(row)
     frame = pd.DataFrame(rows, columns=list(BLINK_COLUMNS))
     numbers = [field.name for field in fields(MeasuredBlink) if field.type in (float, "float")]
+    numbers += ["partner_lag_ms", "partner_closure"]
+    frame["partner"] = frame["partner"].astype("Int64")
     frame[numbers] = frame[numbers].astype(float).round(6)
     return frame
 
@@ -67,6 +99,15 @@ def write_blinks(path: Path, frame: pd.DataFrame) -> None:
     """Write the blinks table as CSV."""
     with whole_file(path) as partial:
         frame.to_csv(partial, index=False, lineterminator="\n")
+
+
+def write_events(path: Path, eyes: Sequence[EyeBlinks]) -> None:
+    """Write every lid event of every column as CSV, columns as in `EVENT_COLUMNS`."""
+    rows = [{"column": eye.series.column} | asdict(event) for eye in eyes for event in eye.events]
+    with whole_file(path) as partial:
+        pd.DataFrame(rows, columns=list(EVENT_COLUMNS)).round(6).to_csv(
+            partial, index=False, lineterminator="\n"
+        )
 
 
 def aligned(profiles: Sequence[BlinkProfile]) -> tuple[Array, Array]:
@@ -104,6 +145,7 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
         "blinks": len(rows),
         "rejected": int((frame["column"] == series.column).sum() - len(rows)),
         "refused": [asdict(refused) for refused in eye_blinks.refused],
+        "other_events": dict(Counter(event.kind for event in eye_blinks.events if event.kind != "blink")),
         "bridged_frames": series.bridged_frames,
         "missing_frames": series.missing_frames,
         "rate_per_minute": round(len(rows) / minutes, 3),

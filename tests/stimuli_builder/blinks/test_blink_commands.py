@@ -89,9 +89,12 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
     [
         (["--column", "gap_x"], "did you mean"),
         (["--column", "gap_l", "--fps", "30"], "is the column right, and --fps"),
-        (["--column", "gap_l", "--fps", "150"], "is --fps right"),
-        (["--column", "gap_l", "--fps", "600"], "is --fps right"),
-        (["--column", "gap_l", "--fps", "300", "--minimum-depth", "0.999999"], "no blink in column"),
+        (
+            ["--column", "gap_l", "--fps", "300", "--preset", "velocity", "--minimum-depth", "0.999999"],
+            "no blink in column",
+        ),
+        (["--column", "gap_l", "--fps", "300", "--minimum-depth", "0.5"], "add --preset velocity"),
+        (["--column", "gap_l", "--fps", "300", "--resample"], "no column time_s"),
         (["--column", "gap_l", "--fps", "300", "--preset", "papr"], "did you mean 'paper'"),
         (["--column", "gap_l", "--fps", "300", "--reject", "1=x"], "--review"),
         (["--column", "gap_l", "--fps", "300", "--review", "r.csv"], "no such review file"),
@@ -105,10 +108,24 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
         (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "no figure format 'gif'"),
         (["--column", "gap_l", "--fps", "300", "--summary", "none/s.json"], "does not exist"),
         (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "a name of its own"),
-        (["--column", "gap_l", "--fps", "300", "--closed", "40"], "not below the opening"),
+        (["--column", "gap_l", "--fps", "300", "--closed", "40"], "is not below the opening of any blink"),
         (["--column", "gap_l", "--fps", "300", "--closed", "-1"], "0 or more"),
         (["--column", "gap_l", "--fps", "300", "--complete-from", "2"], "up to 1"),
-        (["--column", "gap_l", "--fps", "300", "--gradient", "0.1", "--gradient-px", "1"], "give one of"),
+        (
+            [
+                "--column",
+                "gap_l",
+                "--fps",
+                "300",
+                "--preset",
+                "paper",
+                "--gradient",
+                "0.1",
+                "--gradient-px",
+                "1",
+            ],
+            "give one of",
+        ),
     ],
 )
 def test_bad_input_gets_one_line_and_leaves_nothing(
@@ -122,6 +139,14 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
     assert ended.err.count("\n") == 1
     assert message in ended.err
     assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("fps", [150, 600])
+def test_a_rate_that_makes_strange_blinks_is_doubted_not_refused(stimuli, series_file, tmp_path, fps):
+    ended = stimuli("blinks", series_file, "--column", "gap_l", "--fps", fps, "--out", tmp_path / "b.csv")
+    assert ended.code == 0
+    assert ended.err.startswith("warning: at ")
+    assert "is --fps right?" in ended.err
 
 
 def test_a_model_is_fitted_drawn_from_and_plotted(stimuli, series_file, tmp_path):

@@ -1,0 +1,144 @@
+"""Dips of a lid series that may be something, and the numbers by which they are told apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from stimuli_builder.blinks.events.levels import Depth
+from stimuli_builder.blinks.profile import Array
+
+LEAST_PROMINENCE = 0.06
+NOISES = 2.5
+RIPPLE = 0.25
+"""A dip that rises by less than this part of its height above the open eye is a ripple of a larger one."""
+REACH_S = 8.0
+FEATURES = (
+    "log depth", "depth to the recording's deep", "prominence to depth", "prominence to deep",
+    "log width at half", "log width at 0.85", "log width at 0.2", "log closing time", "log opening time",
+    "log prominence to noise", "step of the base", "base before", "share of like depth about",
+    "roughness about", "log frames in width", "other eye", "has other eye", "log fps",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One dip: its deepest frame and where it crosses parts of its prominence (frames, fractions of one).
+
+    `left` and `right` hold the crossings at 0.2, 0.5 and 0.85 of the prominence, outwards from the peak.
+    """
+
+    peak: int
+    depth: float
+    prominence: float
+    left: tuple[float, float, float]
+    right: tuple[float, float, float]
+
+
+LEVELS = (0.2, 0.5, 0.85)
+
+
+def find_candidates(depth: Depth) -> list[Candidate]:
+    """Every dip that rises clearly above noise and is no ripple of a larger one, in order of time."""
+    least = max(LEAST_PROMINENCE, NOISES * depth.noise)
+    padded = np.concatenate([[depth.smooth.min()], depth.smooth, [depth.smooth.min()]])
+    wide = 2 * int(REACH_S * depth.fps) + 1
+    peaks, facts = find_peaks(padded, prominence=least, wlen=wide)
+    found = []
+    for place, prominence in zip(peaks - 1, facts["prominences"], strict=True):
+        height = float(depth.smooth[place])
+        if prominence >= RIPPLE * height:
+            base = height - float(prominence)
+            left, right = (
+                tuple(_crossing(depth, int(place), base + part * prominence, step) for part in LEVELS)
+                for step in (-1, 1)
+            )
+            found.append(Candidate(int(place), height, float(prominence), left, right))  # type: ignore[arg-type]
+    return found
+
+
+def _crossing(depth: Depth, peak: int, level: float, step: int) -> float:
+    """Where the depth first falls below a level on one side of the peak, between frames."""
+    reach = int(REACH_S * depth.fps) + 1
+    first = max(0, peak - reach)
+    side = depth.smooth[first : peak + 1][::-1] if step < 0 else depth.smooth[peak : peak + reach]
+    below = np.flatnonzero(side < level)
+    if not below.size:
+        return float(peak + step * (side.size - 1))
+    frame = int(below[0])
+    rise = side[frame - 1] - side[frame]
+    part = (side[frame - 1] - level) / rise if rise > 0 else 0.0
+    return peak + step * (frame - 1 + float(part))
+
+
+def deep_level(candidates: list[Candidate], depth: Depth) -> float:
+    """How deep this recording's blinks go: the upper quintile of its dips as short as blinks are."""
+    short = [
+        c.depth for c in candidates if 0.03 <= (c.right[1] - c.left[1]) / depth.fps <= 0.5 and c.depth >= 0.15
+    ]
+    if len(short) >= 2:
+        return float(np.percentile(short, 80))
+    return max(0.3, float(np.percentile(depth.smooth, 99.5)))
+
+
+def features_of(candidates: list[Candidate], depth: Depth, other: Array | None = None) -> NDArray[np.float64]:
+    """One row of `FEATURES` for each candidate.
+
+    Parameters
+    ----------
+    other : (n,) array, optional
+        Smoothed depth of the other eye, divided by its own deep level; NaN where unknown.
+    """
+    deep = deep_level(candidates, depth)
+    rows = [_row(c, depth, deep, other) for c in candidates]
+    return np.array(rows, np.float64).reshape(-1, len(FEATURES))
+
+
+def _row(c: Candidate, depth: Depth, deep: float, other: Array | None) -> list[float]:
+    fps, smooth = depth.fps, depth.smooth
+    least = 0.3 / fps
+    wide, half, narrow = ((right - left) / fps for left, right in zip(c.left, c.right, strict=True))
+    closing = (c.left[2] - c.left[0]) / fps
+    opening = (c.right[0] - c.right[2]) / fps
+    before, after = _base(smooth, c.left[0], -1, fps), _base(smooth, c.right[0], 1, fps)
+    like, rough = _surroundings(c, depth)
+    beside, has_other = _beside(c, other, deep)
+    return [
+        np.log(max(c.depth, 0.02)), min(c.depth / deep, 3.0), c.prominence / max(c.depth, 0.02),
+        min(c.prominence / deep, 3.0), np.log(max(half, least)), np.log(max(narrow, least)),
+        np.log(max(wide, least)), np.log(max(closing, least)), np.log(max(opening, least)),
+        np.log(c.prominence / depth.noise), np.clip((before - after) / c.prominence, -3, 3),
+        np.clip(before / max(c.depth, 0.02), -1, 1), like, min(rough / c.prominence, 1.0),
+        np.log(max(half * fps, 0.3)), beside, has_other, np.log(fps),
+    ]  # fmt: skip
+
+
+def _base(smooth: Array, edge: float, step: int, fps: float) -> float:
+    """Median depth of the 0.4 s beyond an edge."""
+    near, far = edge + step * 0.03 * fps, edge + step * 0.43 * fps
+    first, last = sorted((round(near), round(far)))
+    part = smooth[max(0, first) : max(0, last + 1)]
+    return float(np.median(part)) if part.size else float(smooth[0 if step < 0 else -1])
+
+
+def _surroundings(c: Candidate, depth: Depth) -> tuple[float, float]:
+    """Share of the 3 s on either side as deep as half the candidate, and the roughness of 1 s on either."""
+    fps, smooth = depth.fps, depth.smooth
+    start, stop = int(c.left[0] - 0.05 * fps), int(c.right[0] + 0.05 * fps) + 1
+    reach = int(3 * fps)
+    about = np.concatenate([smooth[max(0, start - reach) : max(0, start)], smooth[stop : stop + reach]])
+    like = float((about > 0.5 * c.depth).mean()) if about.size else 0.0
+    reach = int(fps)
+    near = np.concatenate([smooth[max(0, start - reach) : max(0, start)], smooth[stop : stop + reach]])
+    rough = float(np.median(np.abs(near - np.median(near)))) if near.size else 0.0
+    return like, rough
+
+
+def _beside(c: Candidate, other: Array | None, deep: float) -> tuple[float, float]:
+    if other is None:
+        return 0.0, 0.0
+    part = other[max(0, c.peak - 1) : c.peak + 2]
+    if not np.isfinite(part).any():
+        return 0.0, 0.0
+    return float(np.clip(np.nanmax(part) / max(c.depth / deep, 0.05), -0.5, 2.0)), 1.0

@@ -1,0 +1,174 @@
+"""From lid series to events: what each dip is, how sure that is, and when it happened."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stimuli_builder.blinks.events.candidates import Candidate, deep_level, features_of, find_candidates
+from stimuli_builder.blinks.events.generated import CLOSED_EYE_S
+from stimuli_builder.blinks.events.levels import Depth, depth_of
+from stimuli_builder.blinks.events.network import shipped_network
+from stimuli_builder.blinks.events.template import Timing, timing_of
+from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.series import BlinkSeries, runs
+
+SHORTEST_PIECE_S = 0.8
+LEAST_PROBABILITY = 0.5
+ONE_BLINK_S = 0.12
+"""Two dips closer than this are one blink seen twice by a noisy tracker; the likelier one stays."""
+
+
+@dataclass(frozen=True)
+class LidEvent:
+    """One event of one eye.
+
+    Parameters
+    ----------
+    kind : str
+        "blink", "squint", "gaze_shift" or "closed_eye" (closed phase of 0.5 s or more).
+    probability : float
+        The classifier's, of this kind among the four and 'nothing'.
+    frame : int
+        Deepest frame of the series.
+    onset_s, closed_from_s, minimum_s, closed_to_s, end_s : float
+        From 5% of the amplitude over the closed phase (95% of it) to 95% recovery, from the first frame.
+    depth : float
+        Greatest depth as part of the opening.
+    """
+
+    kind: str
+    probability: float
+    frame: int
+    onset_s: float
+    closed_from_s: float
+    minimum_s: float
+    closed_to_s: float
+    end_s: float
+    depth: float
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """Events of one eye in order of time, and the deepest frames of blinks whose start or end is missing."""
+
+    events: tuple[LidEvent, ...]
+    cut: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A gapless piece of one eye with its dips."""
+
+    start: int
+    depth: Depth
+    candidates: list[Candidate]
+
+
+def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
+    """Return the events of each series; two series are taken as the two eyes of one face."""
+    pieces = [_pieces(series) for series in eyes]
+    results = []
+    for number, series in enumerate(eyes):
+        other = _whole(pieces[1 - number], series.distance.size) if len(eyes) == 2 else None
+        events: list[LidEvent] = []
+        cut: list[int] = []
+        for piece in pieces[number]:
+            _judge(piece, series.fps, other, events, cut)
+        results.append(Recognised(tuple(_single(events)), tuple(cut)))
+    return results
+
+
+def _pieces(series: BlinkSeries) -> list[_Piece]:
+    found = []
+    for start, stop in runs(np.isfinite(series.distance)):
+        if stop - start >= max(5, SHORTEST_PIECE_S * series.fps):
+            depth = depth_of(series.distance[start:stop], series.fps)
+            found.append(_Piece(start, depth, find_candidates(depth)))
+    return found
+
+
+def _whole(pieces: list[_Piece], size: int) -> Array:
+    """Depth of an eye over the whole series, its deep level 1; NaN in gaps."""
+    whole = np.full(size, np.nan)
+    for piece in pieces:
+        stop = min(size, piece.start + piece.depth.smooth.size)
+        level = deep_level(piece.candidates, piece.depth)
+        whole[piece.start : stop] = piece.depth.smooth[: stop - piece.start] / level
+    return whole
+
+
+def _judge(piece: _Piece, fps: float, other: Array | None, events: list[LidEvent], cut: list[int]) -> None:
+    """Add the events of a piece to `events` and its incomplete blinks to `cut`."""
+    network = shipped_network()
+    beside = None if other is None else other[piece.start : piece.start + piece.depth.smooth.size]
+    rows = features_of(piece.candidates, piece.depth, beside)
+    for candidate, shares in zip(piece.candidates, network.probabilities(rows), strict=True):
+        kind = network.kinds[int(shares.argmax())]
+        if shares[network.kinds.index("blink")] >= LEAST_PROBABILITY:
+            kind = "blink"
+        if kind == "nothing":
+            continue
+        if _cut(candidate, piece.depth):
+            cut += [piece.start + candidate.peak] if kind == "blink" else []
+            continue
+        timing = _timed(candidate, piece.depth) if kind == "blink" else _crossed(candidate, fps)
+        if kind == "blink" and timing.closed_to_s - timing.closed_from_s >= CLOSED_EYE_S:
+            kind = "closed_eye"
+        events.append(_event(kind, float(shares.max()), candidate, timing, piece.start, fps))
+
+
+def _cut(candidate: Candidate, depth: Depth) -> bool:
+    """Whether a dip is at the edge of its piece: its beginning or end was not seen."""
+    return candidate.left[1] <= 0 or candidate.right[1] >= depth.smooth.size - 1
+
+
+def _timed(candidate: Candidate, depth: Depth) -> Timing:
+    """Phases of a blink by the template, or by its crossings where the template slid off the dip."""
+    timing = timing_of(candidate, depth)
+    inside = candidate.left[1] <= timing.minimum_s * depth.fps <= candidate.right[1]
+    return timing if inside else _crossed(candidate, depth.fps)
+
+
+def _crossed(candidate: Candidate, fps: float) -> Timing:
+    """Phases of an event that is no blink: the crossings of its prominence."""
+    left, right = candidate.left, candidate.right
+    return Timing(
+        left[0] / fps,
+        left[2] / fps,
+        candidate.peak / fps,
+        right[2] / fps,
+        right[0] / fps,
+        candidate.depth,
+        0.0,
+    )
+
+
+def _event(
+    kind: str, probability: float, candidate: Candidate, timing: Timing, start: int, fps: float
+) -> LidEvent:
+    shift = start / fps
+    return LidEvent(
+        kind=kind,
+        probability=probability,
+        frame=start + candidate.peak,
+        onset_s=max(0.0, timing.onset_s) + shift,
+        closed_from_s=max(0.0, timing.closed_from_s) + shift,
+        minimum_s=timing.minimum_s + shift,
+        closed_to_s=timing.closed_to_s + shift,
+        end_s=timing.end_s + shift,
+        depth=candidate.depth,
+    )
+
+
+def _single(events: list[LidEvent]) -> list[LidEvent]:
+    """Keep the likelier of two blinks too close to be two."""
+    kept: list[LidEvent] = []
+    for event in sorted(events, key=lambda event: event.minimum_s):
+        last = kept[-1] if kept else None
+        both = last is not None and event.kind == last.kind == "blink"
+        if last is not None and both and event.minimum_s - last.minimum_s < ONE_BLINK_S:
+            kept[-1] = max(last, event, key=lambda one: one.probability)
+        else:
+            kept.append(event)
+    return kept
