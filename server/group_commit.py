@@ -4,18 +4,15 @@ An endpoint hands its work to a writer thread and awaits it. The writer takes ev
 in one transaction and answers after the commit. SQLite has one writer; PostgreSQL has several, and work with
 the same key goes to the same one, so that two of them do not wait for each other's rows.
 
-Heavy work (a run start writes a hundred rows) waits while lighter work comes, but not for long, and few of it
-share a commit: a thousand people who start at once do not hold up those who rate.
+Each transaction takes all light work that waits (a rating) and only little heavy work (a run start writes a
+hundred rows): a thousand people who start at once neither hold up those who rate nor are held up for ever.
 """
 
 import asyncio
-import math
 import threading
-import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
-from queue import Empty, PriorityQueue
 from typing import Any, TypeVar
 
 from sqlalchemy import Connection
@@ -24,12 +21,12 @@ from server.db import Database
 from server.errors import ApiError
 
 T = TypeVar("T")
-MOST_AT_ONCE = 64
-"""Weight of what shares one commit; a rating weighs 1."""
+MAX_LIGHT = 64
+"""Pieces of light work that share one commit."""
+MAX_HEAVY = 16
+"""Weight of the heavy work among them; a rating weighs 1. One piece goes in though it is heavier."""
 POSTGRES_WRITERS = 4
 """Writers of light work; PostgreSQL has one more, for heavy work."""
-PATIENCE_S = 0.25
-"""Heavy work lets pass what is lighter and came no later than this after it."""
 
 
 @dataclass
@@ -62,8 +59,37 @@ class _Work:
             self.future.set_result(self.result)
 
 
-Queue = PriorityQueue[tuple[float, int, _Work | None]]
-"""When it is due, in seconds; a number that settles ties; the work, or None at the very end."""
+class _Queue:
+    """What waits for one writer."""
+
+    def __init__(self) -> None:
+        self._light: deque[_Work] = deque()
+        self._heavy: deque[_Work] = deque()
+        self._ends = False
+        self._changed = threading.Condition()
+
+    def put(self, work: _Work) -> None:
+        with self._changed:
+            (self._heavy if work.weight > 1 else self._light).append(work)
+            self._changed.notify()
+
+    def end(self) -> None:
+        """Nothing more will come."""
+        with self._changed:
+            self._ends = True
+            self._changed.notify()
+
+    def take(self) -> list[_Work]:
+        """What shares the next commit, light work first; waits for it. Empty at the end."""
+        with self._changed:
+            while not (self._light or self._heavy or self._ends):
+                self._changed.wait()
+            batch = [self._light.popleft() for _ in range(min(MAX_LIGHT, len(self._light)))]
+            weight = 0
+            while self._heavy and (weight == 0 or weight + self._heavy[0].weight <= MAX_HEAVY):
+                weight += self._heavy[0].weight
+                batch.append(self._heavy.popleft())
+            return batch
 
 
 class GroupCommit:
@@ -71,10 +97,9 @@ class GroupCommit:
 
     def __init__(self, database: Database) -> None:
         self.database = database
-        self._queues: list[Queue] = []
+        self._queues: list[_Queue] = []
         self._threads: list[threading.Thread] = []
         self._starting = threading.Lock()
-        self._numbers = count()
 
     async def run(self, key: str, work: Callable[[Connection], T], weight: int = 1) -> T:
         """Do `work` in a transaction shared with others and return its result once that is committed.
@@ -84,25 +109,23 @@ class GroupCommit:
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         queues = self._queues or self._start()
-        due, place = time.monotonic(), hash(key) % max(1, len(queues) - 1)
-        if weight > 1:
-            due, place = due + PATIENCE_S, -1
-        queues[place].put((due, next(self._numbers), _Work(work, weight, loop, future)))
+        place = hash(key) % max(1, len(queues) - 1) if weight == 1 else -1
+        queues[place].put(_Work(work, weight, loop, future))
         return await future
 
     def close(self) -> None:
         """Finish what waits, then stop."""
         for queue in self._queues:
-            queue.put((math.inf, next(self._numbers), None))
+            queue.end()
         for thread in self._threads:
             thread.join()
         self._queues, self._threads = [], []
 
-    def _start(self) -> list[Queue]:
+    def _start(self) -> list[_Queue]:
         with self._starting:
             if not self._queues:
                 number = 1 if self.database.is_sqlite else POSTGRES_WRITERS + 1
-                queues: list[Queue] = [PriorityQueue() for _ in range(number)]
+                queues = [_Queue() for _ in range(number)]
                 for queue in queues:
                     thread = threading.Thread(target=self._write, args=(queue,), name="writer", daemon=True)
                     thread.start()
@@ -110,15 +133,12 @@ class GroupCommit:
                 self._queues = queues
             return self._queues
 
-    def _write(self, queue: Queue) -> None:
-        while (first := queue.get()[2]) is not None:
-            batch, ends = _waiting(queue, first)
+    def _write(self, queue: _Queue) -> None:
+        while batch := queue.take():
             self._commit(batch)
             for loop in {work.loop for work in batch}:
                 mine = [work for work in batch if work.loop is loop]
                 _tell(loop, mine)
-            if ends:
-                return
 
     def _commit(self, batch: list[_Work]) -> None:
         try:
@@ -132,21 +152,6 @@ class GroupCommit:
             # One of them broke the transaction of all: each gets one of its own.
             for work in batch:
                 self._commit([work])
-
-
-def _waiting(queue: Queue, first: _Work) -> tuple[list[_Work], bool]:
-    """`first` and what waits behind it, up to the weight of a batch; True where the end was among it."""
-    batch, weight = [first], first.weight
-    while weight < MOST_AT_ONCE:
-        try:
-            work = queue.get_nowait()[2]
-        except Empty:
-            return batch, False
-        if work is None:
-            return batch, True
-        batch.append(work)
-        weight += work.weight
-    return batch, False
 
 
 def _tell(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:

@@ -25,7 +25,7 @@ from rich.table import Table
 
 from tools.load_measures import Row
 from tools.load_otree import peer
-from tools.load_scenarios import burst, export, steady, under_fire
+from tools.load_scenarios import burst, export, starts, steady, under_fire
 
 EXPORTED_ROWS, EXPORTED_PER_S = 1_000_000, 50_000
 MARKS = {True: "yes", False: "NO", None: ""}
@@ -33,11 +33,12 @@ MARKS = {True: "yes", False: "NO", None: ""}
 
 def scenarios(share: float, seconds: float, workers: int) -> dict[str, Callable[[], list[Row]]]:
     """By name; `share` of the raters and rows."""
-    starts = int(1000 * share)
+    begin_at_once = int(1000 * share)
     return {
         "sqlite": lambda: steady("sqlite", int(300 * share), seconds, 1, 100, 250),
         "postgres": lambda: steady("postgres", int(1000 * share), seconds, workers, 100, math.inf),
-        "burst": lambda: burst("sqlite", starts, 1) + burst("postgres", starts, workers),
+        "starts": lambda: starts("sqlite", int(300 * share), int(300 * share), seconds / 2, 1, 150),
+        "burst": lambda: burst("sqlite", begin_at_once, 1) + burst("postgres", begin_at_once, workers),
         "many": lambda: steady("postgres", int(5000 * share), seconds, workers, math.inf, math.inf),
         "kill": lambda: under_fire(int(200 * share), seconds, workers),
         "otree": lambda: peer(int(100 * share), seconds / 2),

@@ -25,6 +25,7 @@ class Tally:
 
     start_ms: list[float] = field(default_factory=list)
     rating_ms: list[float] = field(default_factory=list)
+    rating_at: list[float] = field(default_factory=list)
     clip_ms: list[float] = field(default_factory=list)
     acknowledged: dict[str, int | None] = field(default_factory=dict)
     failed_starts: int = 0
@@ -91,6 +92,7 @@ class LoadRater:
         body = self.person.rating(trial, self.scale)
         began = time.perf_counter()
         status, _ = await self.insist("PUT", f"/api/run/ratings/{rating_id}", body, keep=False)
+        self.tally.rating_at.append(began)
         self.tally.rating_ms.append(1000 * (time.perf_counter() - began))
         if status in (200, 201):
             self.tally.acknowledged[rating_id] = body["response"]

@@ -128,6 +128,43 @@ def burst(kind: str, count: int, workers: int) -> list[Row]:
     ]
 
 
+def starts(kind: str, count: int, newcomers: int, seconds: float, workers: int, p95: float) -> list[Row]:
+    """`count` raters at their pace while `newcomers` begin at the same moment; `p95` is the limit in ms."""
+    tally, begun = Tally(), Tally()
+    window = [0.0, 0.0]
+    with load_server(kind, workers) as server:
+
+        async def go() -> None:
+            raters = await begin(server, count, tally, AT_ONCE_AT_START)
+            await prepare(raters)
+            rating = asyncio.create_task(rate(raters, seconds))
+            await asyncio.sleep(seconds / 3)
+            window[0] = time.perf_counter()
+            await begin(server, newcomers, begun, newcomers)
+            window[1] = time.perf_counter()
+            await rating
+
+        run(go())
+        all_there = saved(server, tally)
+    pairs = list(zip(tally.rating_at, tally.rating_ms, strict=True))
+    during = [ms for at, ms in pairs if window[0] <= at <= window[1]]
+    others = [ms for at, ms in pairs if not window[0] <= at <= window[1]]
+    said = f"{window[1] - window[0]:.1f}; {quantiles(begun.start_ms, 0.5, 0.95)}"
+    return [
+        Row(
+            f"{newcomers} starts at once among {count} raters, {kind}",
+            f"rating p50 / p95 / p99 meanwhile, of {len(during)} (ms)",
+            quantiles(during, 0.5, 0.95, 0.99),
+            f"p95 < {p95:g}",
+            percentile(during, 0.95) < p95,
+        ),
+        Row("", "before and after (ms)", quantiles(others, 0.5, 0.95, 0.99)),
+        Row("", "failed starts", *_shown(begun.failed_starts, 0)),
+        Row("", "all begun after (s); p50 / p95 (ms)", said),
+        all_there,
+    ]
+
+
 def _shown(found: int, wanted: int) -> tuple[str, str, bool]:
     return str(found), str(wanted), found == wanted
 

@@ -10,7 +10,7 @@ from sqlalchemy import Connection, text
 from sqlalchemy.exc import IntegrityError
 
 from server.errors import Conflict
-from server.group_commit import MOST_AT_ONCE, GroupCommit
+from server.group_commit import MAX_HEAVY, MAX_LIGHT, GroupCommit
 
 INSERT = text("INSERT INTO clips VALUES (:name, 1, 30, 1, 1, 1, '2026-11-21 00:00:00')")
 
@@ -90,7 +90,7 @@ def test_closing_finishes_what_waits(writers, services) -> None:
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-def test_heavy_work_lets_lighter_work_pass_and_shares_its_commits_with_few(writers, services) -> None:
+def test_light_work_passes_heavy_work_however_long_that_has_waited(writers, services) -> None:
     """The first piece occupies the one writer until everything else waits (PostgreSQL has two kinds)."""
     occupied, order = threading.Event(), []
 
@@ -100,17 +100,35 @@ def test_heavy_work_lets_lighter_work_pass_and_shares_its_commits_with_few(write
     async def main() -> None:
         first = asyncio.create_task(writers.run("k", lambda _: occupied.wait(10)))
         await asyncio.sleep(0.05)
-        tasks = [asyncio.create_task(writers.run("k", note("heavy"), MOST_AT_ONCE // 2)) for _ in range(4)]
-        await asyncio.sleep(0)
+        tasks = [asyncio.create_task(writers.run("k", note("heavy"), MAX_HEAVY // 2)) for _ in range(6)]
+        await asyncio.sleep(0.4)
         tasks += [asyncio.create_task(writers.run("k", note("light"))) for _ in range(3)]
         await asyncio.sleep(0)
         occupied.set()
         await asyncio.gather(first, *tasks)
 
     run_apart(main)
-    assert [name for name, _ in order] == ["light"] * 3 + ["heavy"] * 4
+    assert [name for name, _ in order] == ["light"] * 3 + ["heavy"] * 6
     transactions = [list(group) for _, group in groupby(order, lambda noted: id(noted[1]))]
-    assert [len(group) for group in transactions] == [5, 2]
+    assert [len(group) for group in transactions] == [5, 2, 2]
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_heavy_work_gets_its_share_while_light_work_never_ceases(writers, services) -> None:
+    done: list[str] = []
+
+    async def main() -> None:
+        async def light() -> None:
+            while "heavy" not in done:
+                await writers.run("k", lambda _: None)
+
+        raters = [asyncio.create_task(light()) for _ in range(2 * MAX_LIGHT)]
+        await asyncio.sleep(0.05)
+        await asyncio.wait_for(writers.run("k", lambda _: done.append("heavy"), 2 * MAX_HEAVY), 10)
+        await asyncio.gather(*raters)
+
+    run_apart(main)
+    assert done == ["heavy"]
 
 
 @pytest.mark.postgres
