@@ -1,13 +1,13 @@
 # Three stages: the pages, the Python packages, and what runs. Every RUN stays below its WORKDIR, so that
 # tools/dockerfile_steps.py can do the same steps in a clean folder where there is no Docker engine.
-FROM node:22-slim AS pages
+FROM node:22.21.1-slim AS pages
 WORKDIR /app/frontend
 COPY frontend/package.json frontend/package-lock.json frontend/.npmrc ./
 RUN npm ci --no-audit --no-fund --loglevel=error
 COPY frontend ./
 RUN npm run --silent build
 
-FROM python:3.11-slim AS packages
+FROM python:3.11.14-slim AS packages
 WORKDIR /app
 COPY deploy/requirements.lock ./
 RUN python -m venv venv
@@ -21,7 +21,7 @@ COPY migrations migrations
 RUN cp server.md README.md && venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps .
 RUN mkdir data backups
 
-FROM python:3.11-slim
+FROM python:3.11.14-slim
 WORKDIR /app
 ENV PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 PATH=/app/venv/bin:$PATH
 ENV PALPEBRA_DATA_FOLDER=/app/data PALPEBRA_FRONTEND_FOLDER=/app/frontend/dist PALPEBRA_LOG_FORMAT=json

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A backup now and every BACKUP_EVERY_S seconds; the newest BACKUP_KEEP stay. Ends at once when told to.
+# A backup now and every BACKUP_EVERY_S seconds; those of the newest BACKUP_KEEP days stay. Ends at once when told to.
 set -eu
 trap 'exit 0' TERM INT
 while :; do

@@ -1,10 +1,13 @@
 """The command `server`: it only gathers the command groups, each of which lives with its subject."""
 
 import typer
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
 from server.errors import ApiError
+from server.settings import Settings
 
 app = typer.Typer(
     name="server",
@@ -35,6 +38,16 @@ def _call() -> None:
         app()
     except ApiError as error:
         raise InputError(error.message) from error
+    except ValidationError as error:
+        if error.title != Settings.__name__:
+            raise
+        raise InputError("; ".join(map(_setting, error.errors()))) from error
+
+
+def _setting(problem: ErrorDetails) -> str:
+    name = str(problem["loc"][0]).upper() if problem["loc"] else "a setting"
+    shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
+    return f"{shown}: {problem['msg']}, got {problem['input']!r}; see docs/settings.md"
 
 
 def main() -> None:

@@ -10,13 +10,15 @@ from typing import Any
 import psycopg
 from sqlalchemy import Connection, create_engine, event
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.engine import Engine, make_url
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.engine import URL, Engine, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import DeclarativeBase, Session
 
+from experiments.errors import InputError
 from server.settings import Settings
 
+DRIVERS = ("sqlite", "sqlite+pysqlite", "postgresql+psycopg")
 BUSY_TIMEOUT_S = 30
 SQLITE_AWAY = frozenset(
     (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
@@ -30,7 +32,7 @@ class Database:
     """
 
     def __init__(self, url: str, *, pool: int = 20) -> None:
-        self.url = make_url(url)
+        self.url = checked_url(url)
         self.is_sqlite = self.url.get_backend_name() == "sqlite"
         self.engine = _sqlite_engine(url, pool) if self.is_sqlite else _postgres_engine(url, pool)
         self._write_engine = self.engine.execution_options(immediate=True)
@@ -61,6 +63,23 @@ class Database:
         self.engine.dispose()
 
 
+def checked_url(url: str) -> URL:
+    """The address of a database that this program can use; InputError, without password, for others."""
+    expected = (
+        "expected DATABASE_URL as postgresql://user:password@host/name or sqlite:///path/to/file, "
+        "or none for SQLite in the data folder"
+    )
+    try:
+        parsed = make_url(url)
+    except (ArgumentError, ValueError) as error:
+        raise InputError(f"{expected}; got an address that cannot be read") from error
+    if parsed.drivername not in DRIVERS:
+        raise InputError(f"{expected}; got one that begins with '{parsed.drivername}:'")
+    if parsed.drivername.startswith("postgresql") and not parsed.database:
+        raise InputError(f"{expected}; got one without a name of the database behind the host")
+    return parsed
+
+
 def insert_once(session: Session, table: type[DeclarativeBase], rows: Sequence[dict[str, Any]]) -> None:
     """Insert rows; those that a UNIQUE constraint already knows are left as they are."""
     if not rows:
@@ -87,7 +106,7 @@ def is_away(error: BaseException) -> bool:
 
 def open_database(settings: Settings) -> Database:
     """The database of these settings; the folder of a SQLite file is made."""
-    url = make_url(settings.resolved_database_url)
+    url = checked_url(settings.resolved_database_url)
     if url.get_backend_name() == "sqlite" and url.database:
         Path(url.database).parent.mkdir(parents=True, exist_ok=True)
     return Database(settings.resolved_database_url, pool=settings.database_pool)

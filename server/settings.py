@@ -86,6 +86,9 @@ class Settings(BaseSettings):
         description="Which requests are logged; problems: those that failed or were slow. Never an address.",
     )
     log_slow_ms: float = Field(default=1000.0, gt=0, description="From when on a request counts as slow.")
+    free_megabytes_min: float = Field(
+        default=200.0, ge=0, description="With less room on the data folder's disk /readyz says 503."
+    )
     metrics_token: str = Field(
         default="",
         description="Token that /metrics asks for; empty: it answers requests from this machine alone.",

@@ -15,6 +15,7 @@ from server.operations import backup as backups
 from server.operations import restore as restoring
 from server.operations.copying import address, copy_database
 from server.operations.doctor import examine
+from server.operations.retention import superfluous
 from server.operations.rows import Content
 from server.settings import Settings
 
@@ -65,23 +66,28 @@ def backup(
         ),
     ] = False,
     keep: Annotated[
-        int, typer.Option(min=0, help="Remove all but the newest this many *.tar of that folder; 0: none.")
+        int,
+        typer.Option(
+            min=0,
+            help="Keep, of the newest DAYS days with a backup, the last one each (all of the newest day); "
+            "remove earlier palpebra-DATE.tar of that folder. 0: remove none.",
+            metavar="DAYS",
+        ),
     ] = 0,
 ) -> None:
     """Write database, clips and secret key of this moment into one file, while the server goes on.
 
     The file holds everybody's answers and the secret key: keep it where only you can read it (mode 600).
-    Example: server backup backups/monday.tar
+    Example: server backup backups/palpebra-$(date -u +%FT%H%M%S).tar --keep 14
     """
     path = file or Path(f"palpebra-{now():%Y-%m-%dT%H%M%S}.tar")
     with migrated_services() as services:
         described = backups.back_up(services, path, with_clips=not without_clips)
     rows = sum(table.rows for table in described.tables.values())
     out.print(f"{path}: {rows} rows, {len(described.clips)} clips, {path.stat().st_size / 1e6:.1f} MB")
-    if keep:
-        for old in sorted(path.parent.glob("palpebra-*.tar"))[:-keep]:
-            old.unlink()
-            out.print(f"removed {old}")
+    for old in superfluous(path.parent.glob("palpebra-*.tar"), keep) if keep else ():
+        old.unlink()
+        out.print(f"removed {old}")
 
 
 def restore(

@@ -29,7 +29,7 @@ export interface paths {
         };
         /**
          * Readyz
-         * @description The database answers and has the newest revision; clips can be read.
+         * @description The database answers, is writable and has the newest revision; the disk has room, clips are read.
          */
         get: operations["readyz"];
         put?: never;
