@@ -89,6 +89,8 @@ def _line_in(message: str) -> int | None:
 
 def _problem(detail: Any, text: str) -> Problem:
     location = tuple(part for part in detail["loc"] if not _is_union_tag(part))
+    if detail["type"] == "union_tag_invalid":
+        location = (*location, detail["ctx"]["discriminator"].strip("'"))
     path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
     message = str(detail["msg"]).removeprefix("Value error, ")
     if not location and (place := _PLACE.match(message)):
@@ -101,9 +103,10 @@ def _problem(detail: Any, text: str) -> Problem:
         context = detail["ctx"]
         allowed = [tag.strip(" '") for tag in str(context["expected_tags"]).split(",")]
         tag = str(context["tag"])
-        message = f"no such {context['discriminator']} '{tag}'{did_you_mean(tag, allowed)}"
+        message = f"no such {location[-1]} '{tag}'{did_you_mean(tag, allowed)}"
     elif detail["type"] == "union_tag_not_found":
-        message = f"the key {detail['ctx']['discriminator']} is required and missing"
+        name = detail["ctx"]["discriminator"].strip("'")
+        message = f"the key {name} is required and missing"
     elif detail["type"] == "missing":
         message = "this key is required and missing"
     elif "input" in detail and isinstance(detail["input"], str | int | float | bool):

@@ -4,6 +4,9 @@ import re
 from collections.abc import Sequence
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
+_STRING_OR_COMMENT = re.compile(
+    r'"""(?:\\.|[^\\])*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL
+)
 _KEY = re.compile(r"^\s*([A-Za-z0-9_\-\"'.]+)\s*=")
 
 
@@ -26,7 +29,12 @@ def _places(text: str) -> dict[tuple[object, ...], int]:
     places: dict[tuple[object, ...], int] = {}
     counts: dict[tuple[object, ...], int] = {}
     here: tuple[object, ...] = ()
-    for number, line in enumerate(text.splitlines(), start=1):
+    depth = 0
+    for number, line in enumerate(_without_strings(text).split("\n"), start=1):
+        inside = depth > 0
+        depth += sum(line.count(bracket) for bracket in "[{") - sum(line.count(bracket) for bracket in "]}")
+        if inside:
+            continue  # of a value over several lines
         header = _HEADER.match(line)
         if header is not None:
             here = _enter(_split(header[2]), header[1] == "[[", counts)
@@ -36,6 +44,19 @@ def _places(text: str) -> dict[tuple[object, ...], int]:
         if key is not None:
             places.setdefault((*here, *_split(key[1])), number)
     return places
+
+
+def _without_strings(text: str) -> str:
+    """The text with its values' strings and its comments emptied, every line where it was."""
+
+    def emptied(match: re.Match[str]) -> str:
+        token = match[0]
+        if token.startswith(('"""', "'''")):
+            return '""' + "\n" * token.count("\n")
+        # A quoted key says what it is called; quoted values do not matter.
+        return "" if token.startswith("#") else re.sub(r"[\[\]{}#=]", "_", token)
+
+    return _STRING_OR_COMMENT.sub(emptied, text)
 
 
 def _enter(keys: list[str], is_array: bool, counts: dict[tuple[object, ...], int]) -> tuple[object, ...]:

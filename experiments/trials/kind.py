@@ -34,6 +34,7 @@ class Kind:
     roles: the clips a trial shows, in the order of their places (`shown`; `left`, `right`).
     effects: what an edit of each key of the declaration does to stored answers, by path below [trial].
     assign: the trials of one participant in order, by declaration, seed and slot.
+    example: a [trial] as TOML, for the reference; it is what a newcomer copies.
     """
 
     declaration: type[TrialDeclaration]
@@ -42,6 +43,7 @@ class Kind:
     roles: tuple[str, ...]
     effects: Mapping[str, Effect]
     assign: "Callable[[Experiment, int, int], list[Trial]]"
+    example: str
 
     @property
     def name(self) -> str:

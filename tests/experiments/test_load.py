@@ -20,7 +20,7 @@ EXP1 = locate("exp1").read_text(encoding="utf-8")
     [
         ("per_cell", "per_cel", 66, "unknown key 'per_cel'; did you mean 'per_cell'?"),
         ("motion_blur = false", "motion_blr = false", 49, "did you mean 'motion_blur'?"),
-        ('rule = "incomplete"', 'rule = "incomplet"', 97, "did you mean 'incomplete'?"),
+        ('rule = "incomplete"', 'rule = "incomplet"', 98, "did you mean 'incomplete'?"),
         ("more_than = 0.2", "mor_than = 0.2", 102, "did you mean 'more_than'?"),
         ("expected_seconds = 7.3", "expected_seconds = -1", 79, "greater than 0, got -1"),
         ("maximum = 120", "maximun = 120", 126, "did you mean 'maximum'?"),

@@ -18,6 +18,20 @@ EFFECTS: dict[str, Effect] = {
     "expected_seconds": "wording",
 }
 
+EXAMPLE = """\
+[trial]
+kind = "clip_rating"
+start = "key"
+expected_seconds = 7.2
+
+[trial.scale]
+minimum = 1
+maximum = 7
+question = { en = "How natural was this blink?" }
+low = { en = "very unnatural" }
+high = { en = "very natural" }
+"""
+
 CLIP_RATING = Kind(
     declaration=ClipRating,
     answer=RatingAnswer,
@@ -25,4 +39,5 @@ CLIP_RATING = Kind(
     roles=("shown",),
     effects=EFFECTS,
     assign=assign,
+    example=EXAMPLE,
 )

@@ -1,0 +1,71 @@
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.toml_lines import line_of
+
+TEXT = '''\
+title = "one # not a comment"   # a [comment] = 2
+text = """
+title = "no key of the document"
+[trial]
+kind = "neither"
+He said \\""" and "" and more""""
+raw = \'\'\'
+[[forms]]
+name = "no form"
+\'\'\'
+rows = [
+    ["a", "b"],
+    [ "c" ],
+]
+names = ["[x]", "{"]
+[trial]
+kind = "clip_rating"
+question = { en = "a [b] = c" }
+[[forms]]
+name = "first"
+[[forms]]
+name = "second"
+'''
+
+
+@pytest.mark.parametrize(
+    ("location", "line"),
+    [
+        (("title",), 1),
+        (("text",), 2),
+        (("raw",), 7),
+        (("rows",), 11),
+        (("rows", 1, 0), 11),
+        (("names",), 15),
+        (("trial",), 16),
+        (("trial", "kind"), 17),
+        (("trial", "question", "en"), 18),
+        (("forms", 0, "name"), 20),
+        (("forms", 1, "name"), 22),
+        (("forms", 1), 21),
+        (("absent",), None),
+    ],
+)
+def test_a_key_is_found_on_its_own_line(location: tuple[object, ...], line: int | None) -> None:
+    tomllib.loads(TEXT)
+    assert line_of(TEXT, location) == line
+
+
+words = st.text(alphabet="ab\"'[]{}=#\\ \n", max_size=30)
+
+
+@given(st.lists(words, min_size=1, max_size=4))
+def test_whatever_stands_in_texts_the_keys_after_them_are_found(texts: list[str]) -> None:
+    lines: list[str] = []
+    expected = {}
+    for number, text in enumerate(texts):
+        escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+        expected[f"key{number}"] = sum(line.count("\n") + 1 for line in lines) + 1
+        lines.append(f'key{number} = """{escaped}"""')
+    document = "\n".join(lines)
+    assert list(tomllib.loads(document).values()) == texts
+    assert {key: line_of(document, (key,)) for key in expected} == expected

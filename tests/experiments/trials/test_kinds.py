@@ -1,0 +1,141 @@
+"""What every kind of trial must do; a toy kind, which lives in this folder only, does it too."""
+
+import json
+import re
+from collections.abc import Iterator
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from experiments import design
+from experiments.columns import names_of
+from experiments.definition import Experiment
+from experiments.load import DefinitionError, locate, parse_experiment
+from experiments.schema.canonical import definition_sha256
+from experiments.schema.difference import difference
+from experiments.schema.effects import effect_of, effects_with
+from experiments.schema.keys import paths
+from experiments.schema.stored import load_stored
+from experiments.schema.upgrades import FORMAT
+from experiments.trials import KINDS, reserved_names, views
+from experiments.trials.kind import Kind
+from tests.experiments.trials.toy import TOY
+
+ALL = [*KINDS.values(), TOY]
+
+
+@pytest.fixture(params=ALL, ids=lambda kind: kind.name)
+def kind(request: pytest.FixtureRequest) -> Iterator[Kind]:
+    """The kind, registered by the one line that a new kind needs."""
+    known = request.param.name in KINDS
+    KINDS[request.param.name] = request.param
+    Experiment.model_rebuild(force=True)
+    yield request.param
+    if not known:
+        del KINDS[request.param.name]
+        Experiment.model_rebuild(force=True)
+
+
+def text_with(trial: str) -> str:
+    text = locate("exp3").read_text(encoding="utf-8")
+    assert text.count("[trial]") == 1
+    return re.sub(r"(?s)\[trial\].*?(?=\[display\])", lambda _: trial + "\n", text)
+
+
+def declared(kind: Kind) -> Experiment:
+    return parse_experiment(text_with(kind.example))
+
+
+def test_its_example_is_a_declaration_of_its_own_type(kind: Kind) -> None:
+    experiment = declared(kind)
+    assert type(experiment.trial) is kind.declaration
+    assert experiment.trial.kind == kind.name
+
+
+def test_an_unknown_key_is_named_with_its_line_and_the_nearest_right_one(kind: Kind) -> None:
+    text = text_with(kind.example.replace("[trial]", "[trial]\nexpected_secnds = 3.0"))
+    line = text.splitlines().index("expected_secnds = 3.0") + 1
+    with pytest.raises(DefinitionError, match="did you mean 'expected_seconds'") as raised:
+        parse_experiment(text)
+    assert raised.value.problems[0].line == line
+    assert raised.value.problems[0].path == "trial.expected_secnds"
+
+
+def test_an_unknown_kind_is_named_with_its_line_and_the_nearest_right_one(kind: Kind) -> None:
+    wrong = kind.name[:-1]
+    text = text_with(kind.example.replace(kind.name, wrong))
+    with pytest.raises(DefinitionError) as raised:
+        parse_experiment(text)
+    problem = raised.value.problems[0]
+    assert problem.message == f"no such kind '{wrong}'; did you mean '{kind.name}'?"
+    assert problem.line == text.splitlines().index(f'kind = "{wrong}"') + 1
+
+
+def test_every_key_says_what_an_edit_of_it_does(kind: Kind) -> None:
+    effects = effects_with(kind.effects)
+    own = paths(kind.declaration, "trial.")
+    assert {path for path in own if effect_of(path, effects) is None} == set()
+    assert {key.partition(".")[0] for key in kind.effects} <= set(kind.declaration.model_fields)
+
+
+def test_it_is_stored_and_read_again_with_its_hash(kind: Kind) -> None:
+    experiment = declared(kind)
+    again = load_stored(json.loads(experiment.model_dump_json()), FORMAT)
+    assert again == experiment
+    assert definition_sha256(again) == definition_sha256(experiment)
+
+
+def test_an_edit_of_it_is_named(kind: Kind) -> None:
+    old = declared(kind)
+    slower = old.trial.model_copy(update={"expected_seconds": 99.0})
+    changes = difference(old, old.model_copy(update={"trial": slower}))
+    assert [(change.path, change.effect) for change in changes] == [("trial.expected_seconds", "wording")]
+
+
+def test_an_experiment_of_another_kind_is_measured(kind: Kind) -> None:
+    others = [other for other in KINDS.values() if other.name != kind.name]
+    for other in others:
+        changes = difference(declared(kind), declared(other))
+        assert [(change.path, change.effect) for change in changes] == [("trial.kind", "measured")]
+        assert definition_sha256(declared(kind)) != definition_sha256(declared(other))
+
+
+@pytest.mark.parametrize("slot", [0, 1, 7])
+def test_its_trials_show_clips_of_the_design_in_its_roles(kind: Kind, slot: int) -> None:
+    experiment = declared(kind)
+    clips, trials = set(design.clips(experiment)), kind.assign(experiment, 5, slot)
+    assert kind.assign(experiment, 5, slot) == trials
+    assert kind.assign(experiment, 6, slot) != trials
+    for trial in trials:
+        if trial.kind != "attention":
+            assert {shown.role for shown in trial.shown} == set(kind.roles)
+            assert {shown.clip for shown in trial.shown} <= clips
+
+
+def test_its_columns_are_a_view_with_the_base_columns(kind: Kind) -> None:
+    names = names_of(kind.view.columns)
+    assert len(set(names)) == len(names)
+    assert {"study", "run", "participant", "definition_sha256"} <= set(names)
+    assert all(column.description.endswith(".") for column in kind.view.columns)
+    assert kind.view in views()
+    assert set(names) <= reserved_names()
+    for dialect in ("sqlite", "postgresql"):
+        assert kind.view.create(dialect).startswith(f"CREATE VIEW {kind.view.name} AS")
+
+
+def test_its_answer_is_typed_to_the_end(kind: Kind) -> None:
+    assert kind.answer.model_json_schema()["additionalProperties"] is False
+    with pytest.raises(ValidationError):
+        kind.answer.model_validate({"no such": "answer"})
+
+
+def test_it_is_in_the_schema_of_the_api(kind: Kind) -> None:
+    schema = TypeAdapter(Experiment).json_schema()
+    assert kind.declaration.__name__ in schema["$defs"]
+    assert kind.name in schema["properties"]["trial"]["discriminator"]["mapping"]
+
+
+def test_the_toy_is_gone_afterwards() -> None:
+    assert TOY.name not in KINDS
+    with pytest.raises(DefinitionError, match="no such kind 'same_or_not'"):
+        parse_experiment(text_with(TOY.example))

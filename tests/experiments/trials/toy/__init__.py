@@ -1,0 +1,64 @@
+"""A kind of trial of the tests' own: two clips one after the other, the same or not?
+
+It stands for any kind added later: nothing outside this folder knows it but the line that registers it.
+"""
+
+import random
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from experiments import design
+from experiments.assignment.trial import Shown, Trial
+from experiments.base import Declaration, Translated
+from experiments.columns import Column, View, base
+from experiments.trials.kind import Kind, TrialDeclaration
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
+
+
+class SameOrNot(TrialDeclaration):
+    """Two clips in turn, and whether they looked alike."""
+
+    kind: Literal["same_or_not"] = "same_or_not"
+    question: Translated
+    gap_ms: Annotated[int, Field(ge=0, le=5000)] = 500
+
+
+class SameAnswer(Declaration):
+    same: bool
+
+
+def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
+    """Every clip with its neighbour, in random order; slots take turns in which comes first."""
+    clips = design.clips(experiment)
+    pairs = list(pairwise(clips))
+    random.Random(seed).shuffle(pairs)
+    roles = ("first", "second") if slot % 2 == 0 else ("second", "first")
+    return [
+        Trial("main", 1, "all", tuple(Shown(role, clip) for role, clip in zip(roles, pair, strict=True)))
+        for pair in pairs
+    ]
+
+
+TOY = Kind(
+    declaration=SameOrNot,
+    answer=SameAnswer,
+    view=View(
+        name="sameness",
+        title="Sameness: one row a pair",
+        columns=(
+            *base.STUDY,
+            *base.RUN,
+            Column("same", "boolean", "True where the two looked alike.", source="t"),
+        ),
+        rows="FROM trial_ratings t JOIN study_runs r ON r.id = t.study_run_id "
+        "JOIN study_versions v ON v.id = r.version_id JOIN studies s ON s.id = r.study_id",
+    ),
+    roles=("first", "second"),
+    effects={"question": "measured", "gap_ms": "measured", "expected_seconds": "wording"},
+    assign=assign,
+    example='[trial]\nkind = "same_or_not"\nquestion = { en = "The same?", de = "Gleich?" }\n',
+)
