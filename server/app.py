@@ -12,11 +12,12 @@ from server.accounts import endpoints as accounts
 from server.accounts import people
 from server.clips import endpoints as clips
 from server.context import open_services
+from server.door import Door
 from server.errors import install_error_handlers
 from server.export import endpoints as export
 from server.library import endpoints as library
 from server.library import strips
-from server.middleware import BodyLimit, SecurityHeaders
+from server.middleware import SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.operations import endpoints as operations
 from server.operations.observer import Observer
@@ -82,7 +83,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for router in _routers():
         app.include_router(router)
     install_error_handlers(app)
-    app.add_middleware(BodyLimit, settings=services.settings)
+    app.add_middleware(Door, settings=services.settings)
     app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)
     return app

@@ -21,6 +21,7 @@ from server.context import Services
 from server.models import Account, Study
 from server.operations.logs import logging_configuration
 from server.operations.metrics import MULTIPROCESS_VARIABLE
+from server.protocol import BoundedHttp
 from server.settings import Settings
 from server.studies.links import general_link, link_url
 
@@ -62,6 +63,7 @@ def run(
         uvicorn.run(
             "server.app:create_app",
             factory=True,
+            http=BoundedHttp,
             host=host,
             port=port,
             workers=workers,

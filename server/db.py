@@ -46,6 +46,14 @@ class Database:
             yield session
 
     @contextmanager
+    def snapshot(self) -> Iterator[Session]:
+        """As `read()`, but seeing one moment of the database, however long it reads."""
+        with Session(self.engine, autoflush=False) as session:
+            if not self.is_sqlite:  # SQLite's transactions are snapshots in themselves
+                session.connection(execution_options={"isolation_level": "REPEATABLE READ"})
+            yield session
+
+    @contextmanager
     def write(self) -> Iterator[Session]:
         """A session committed at the end, rolled back where an exception leaves the block."""
         with self._writer, Session(self._write_engine, expire_on_commit=False) as session:

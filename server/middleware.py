@@ -1,4 +1,4 @@
-"""What every answer passes through: security headers, and a limit on the size of request bodies.
+"""What every answer passes through: security headers.
 
 Written as plain ASGI because Starlette's BaseHTTPMiddleware costs as much as a whole rating.
 """
@@ -7,10 +7,8 @@ import secrets
 from collections.abc import Mapping
 
 from starlette.datastructures import MutableHeaders
-from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.errors import error_response
 from server.settings import Settings
 
 NONCE_PLACEHOLDER = "__CSP_NONCE__"
@@ -71,39 +69,3 @@ class SecurityHeaders:
             await send(message)
 
         await self.app(scope, receive, send_with_headers)
-
-
-class BodyLimit:
-    """Refuse bodies over the limit: small for participants, large under /api/admin for uploads."""
-
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
-        self.app = app
-        self.limit, self.upload_limit = settings.max_body_bytes, settings.max_upload_bytes
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if scope["type"] != "http" or scope["method"] in ("GET", "HEAD"):
-            await self.app(scope, receive, send)
-            return
-        limit = self.upload_limit if scope["path"].startswith("/api/admin/") else self.limit
-        declared = dict(scope["headers"]).get(b"content-length", b"0")
-        if declared.isdigit() and int(declared) > limit:
-            await error_response(413, "too_large", _too_large(limit))(scope, receive, send)
-            return
-        received = 0
-
-        async def counted() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
-            if received > limit:
-                # Of what reading a body may raise, FastAPI lets only this exception through.
-                raise HTTPException(413, _too_large(limit))
-            return message
-
-        await self.app(scope, counted, send)
-
-
-def _too_large(limit: int) -> str:
-    shown = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
-    return f"The request is too large: at most {shown} are accepted."

@@ -135,7 +135,8 @@ Viewer = Annotated[Identity, Depends(_Access("viewer", "read"))]
 """May look at everything but accounts."""
 Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]
 """May download data."""
-Experimenter = Annotated[Identity, Depends(_Access("experimenter", "write"))]
+EXPERIMENTER = _Access("experimenter", "write")
+Experimenter = Annotated[Identity, Depends(EXPERIMENTER)]
 """May change studies."""
 Owner = Annotated[Identity, Depends(_Access("owner", None))]
 """May change accounts."""

@@ -1,11 +1,12 @@
 """What the account endpoints take and give."""
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from server.accounts.identity import Role, Scope
+from server.text import VisibleObject
 
 AccountName = Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^[\w.@+ -]{2,100}$")]
 Password = Annotated[str, StringConstraints(min_length=1, max_length=200)]
@@ -167,4 +168,4 @@ class AuditOut(_Out):
     action: str
     target_kind: str
     target: str
-    details: dict[str, Any]
+    details: VisibleObject

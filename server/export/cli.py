@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from sqlalchemy.exc import SQLAlchemyError
 
+from experiments.errors import InputError
 from server.cli_common import migrated_services, out
 from server.export.formats import FORMATS, Format
 from server.studies.lookup import find_study
@@ -40,9 +42,14 @@ def export(
 
       server export exp3 --format psych-ds --out exp3.zip
     """
-    with migrated_services() as services, services.database.read() as session:
+    with migrated_services() as services, services.database.snapshot() as session:
         found = find_study(session, study)
-        size = _write(out_file, FORMATS[form](session, found))
+        try:
+            size = _write(out_file, FORMATS[form](session, found))
+        except (ValueError, SQLAlchemyError) as error:
+            raise InputError(
+                f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
+            ) from error
     if str(out_file) != "-":
         out.print(f"{out_file}: {size:,} bytes")
 

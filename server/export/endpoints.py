@@ -9,10 +9,12 @@ from server.accounts.audit import record
 from server.accounts.identity import Exporter, Identity, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.export.formats import FORMATS, Format
+from server.export.formats import FORMATS, Format, row_count
 from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/data", tags=["data"], responses=ERROR_RESPONSES)
+ROWS_HEADER = "palpebra-rows"
+"""How many rows (CSV: below the header; zip: of ratings; JSON lines: runs) a whole download holds."""
 
 
 def _stream(
@@ -22,12 +24,21 @@ def _stream(
         find_study(session, name)  # an unknown study is refused before the stream begins
         record(session, who, "data downloaded", "study", name, what=form)
 
-    def body() -> Iterator[bytes]:
-        with services.database.read() as session:
-            yield from FORMATS[form](session, find_study(session, name))
+    pieces = _pieces(services, name, form)
+    # The first piece is the number of rows; taking it begins the snapshot that the rest is read from.
+    headers = {
+        "content-disposition": f'attachment; filename="{name}-{file}"',
+        ROWS_HEADER: next(pieces).decode(),
+    }
+    return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
-    headers = {"content-disposition": f'attachment; filename="{name}-{file}"'}
-    return StreamingResponse(body(), media_type=media_type, headers=headers)
+
+def _pieces(services: Services, name: str, form: Format) -> Iterator[bytes]:
+    """The number of rows, then the export; what goes wrong ends the connection before the answer's end."""
+    with services.database.snapshot() as session:
+        study = find_study(session, name)
+        yield str(row_count(form, session, study)).encode()
+        yield from FORMATS[form](session, study)
 
 
 @router.get("/ratings.csv", response_class=StreamingResponse)

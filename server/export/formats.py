@@ -1,5 +1,6 @@
 """The forms in which a study's data go out, each as pieces of bytes: for downloads and the command line."""
 
+import json
 from collections.abc import Callable, Iterator
 from typing import Literal
 
@@ -7,9 +8,11 @@ from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.export import codebook, psych_ds, runs
-from server.export.pieces import csv_pieces, rating_table
+from server.export.pieces import csv_pieces, rating_table, whole
+from server.export.ratings_csv import rating_count
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
+from server.text import encoded
 
 Format = Literal["csv", "runs", "raw", "codebook", "psych-ds"]
 Pieces = Callable[[Session, Study], Iterator[bytes]]
@@ -22,19 +25,21 @@ def ratings_csv(session: Session, study: Study) -> Iterator[bytes]:
 
 def runs_csv(session: Session, study: Study) -> Iterator[bytes]:
     """One row a visit, forms included."""
-    yield from csv_pieces(runs.run_rows(session, study))
+    yield from csv_pieces(whole(runs.run_rows(session, study), runs.run_count(session, study), extra=1))
 
 
 def raw_json(session: Session, study: Study) -> Iterator[bytes]:
-    """Everything stored, one JSON object a run and line."""
-    for line in runs.raw_lines(session, study):
-        yield line.encode("utf-8")
+    """Everything stored, one JSON object a run and line; the last line tells that it is complete."""
+    number = runs.run_count(session, study)
+    for line in whole(runs.raw_lines(session, study), number):
+        yield encoded(line)
+    yield (json.dumps({"complete": True, "runs": number}) + "\n").encode()
 
 
 def codebook_markdown(session: Session, study: Study) -> Iterator[bytes]:
     """What every column means."""
     columns = codebook.rating_columns(all_definitions(session, study))
-    yield codebook.markdown(active_definition(session, study), columns).encode("utf-8")
+    yield encoded(codebook.markdown(active_definition(session, study), columns))
 
 
 def psych_ds_zip(session: Session, study: Study) -> Iterator[bytes]:
@@ -49,3 +54,8 @@ FORMATS: dict[Format, Pieces] = {
     "codebook": codebook_markdown,
     "psych-ds": psych_ds_zip,
 }
+
+
+def row_count(form: Format, session: Session, study: Study) -> int:
+    """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
+    return rating_count(session, study) if form in ("csv", "psych-ds") else runs.run_count(session, study)

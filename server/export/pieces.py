@@ -4,15 +4,32 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy.orm import Session
 
+from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
-from server.export.ratings_csv import factor_names, rating_rows
+from server.export.ratings_csv import factor_names, rating_count, rating_rows
 from server.models import Study
+from server.text import encoded
 
 ROWS_A_PIECE = 500
+Row = TypeVar("Row")
+
+
+class ExportBrokenOff(InputError):
+    """An export holds another number of rows than the study had when it began."""
+
+
+def whole(rows: Iterable[Row], expected: int, extra: int = 0) -> Iterator[Row]:
+    """`rows` as they come; ExportBrokenOff at the end where they are not `expected` + `extra`."""
+    number = -extra
+    for row in rows:
+        number += 1
+        yield row
+    if number != expected:
+        raise ExportBrokenOff(f"the export broke off: expected {expected} rows, got {number}; try it again")
 
 
 def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
@@ -21,11 +38,12 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
     while batch := list(islice(remaining, ROWS_A_PIECE)):
         stream = io.StringIO()
         csv.writer(stream, lineterminator="\n").writerows(batch)
-        yield stream.getvalue().encode("utf-8")
+        yield encoded(stream.getvalue())
 
 
 def rating_table(session: Session, study: Study) -> Iterator[Sequence[Any]]:
     """Header and rows of the tidy ratings CSV."""
     factors = factor_names(session, study)
     yield RATINGS.csv_header(factors)
-    yield from (RATINGS.csv_row(row, factors) for row in rating_rows(session, study))
+    rows = (RATINGS.csv_row(row, factors) for row in rating_rows(session, study))
+    yield from whole(rows, rating_count(session, study))

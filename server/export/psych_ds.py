@@ -17,10 +17,11 @@ from server.export.codebook import (
     rating_columns,
     variables_measured,
 )
-from server.export.pieces import csv_pieces, rating_table
-from server.export.runs import run_rows
+from server.export.pieces import csv_pieces, rating_table, whole
+from server.export.runs import run_count, run_rows
 from server.models import Study
 from server.studies.lookup import active_definition, active_version, all_definitions
+from server.text import encoded
 
 
 class _Sink(io.RawIOBase):
@@ -73,11 +74,11 @@ def dataset(session: Session, study: Study, made: str) -> Iterator[bytes]:
     }
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
-            archive.writestr(f"{study.name}/{name}", text)
+            archive.writestr(f"{study.name}/{name}", encoded(text))
             yield sink.take()
         tables: tuple[tuple[str, Iterable[Sequence[Any]]], ...] = (
             ("ratings", _with_header(columns, rating_table(session, study))),
-            ("runs", run_rows(session, study)),
+            ("runs", whole(run_rows(session, study), run_count(session, study), extra=1)),
         )
         for table, rows in tables:
             path = f"{study.name}/data/study-{keyword}_description-{table}_data.csv"

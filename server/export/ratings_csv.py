@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from sqlalchemy import CursorResult, select, text
+from sqlalchemy import CursorResult, func, select, text
 from sqlalchemy.orm import Session
 
 from experiments.columns import names_of
 from experiments.trials.clip_rating.columns import RATINGS
-from server.models import Study, StudyRun, StudyVersion
+from server.models import Rating, Study, StudyRun, StudyVersion
 
 RUNS_AT_ONCE = 200
 _BOOLEANS = names_of(RATINGS.columns, "boolean")
@@ -24,6 +24,13 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
     for definition in session.scalars(query.order_by(StudyVersion.number)):
         names.update(dict.fromkeys(factor["name"] for factor in definition["factors"]))
     return tuple(names)
+
+
+def rating_count(session: Session, study: Study) -> int:
+    """Rows that `rating_rows` gives."""
+    query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
+    query = query.where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    return session.scalar(query) or 0
 
 
 def rating_rows(session: Session, study: Study) -> Iterator[Sequence[Any]]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from experiments.columns import RUN_COLUMNS
@@ -29,6 +29,12 @@ def each_run(session: Session, study: Study) -> Iterator[StudyRun]:
         latest = runs[-1].id
         yield from runs
         session.expunge_all()
+
+
+def run_count(session: Session, study: Study) -> int:
+    """Runs of a study but previews."""
+    query = select(func.count()).select_from(StudyRun).where(StudyRun.study_id == study.id)
+    return session.scalar(query.where(StudyRun.preview.is_(False))) or 0
 
 
 def run_rows(session: Session, study: Study) -> Iterator[list[Any]]:

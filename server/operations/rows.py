@@ -17,6 +17,7 @@ from sqlalchemy import JSON, Connection, DateTime, Integer, MetaData, Table, fun
 
 from experiments.errors import InputError
 from server.db import Database
+from server.text import visible
 
 BATCH = 500
 REVISION_TABLE = "alembic_version"
@@ -69,11 +70,11 @@ def tables_of(connection: Connection) -> list[Table]:
 
 
 def read_rows(connection: Connection, table: Table) -> Iterator[Row]:
-    """Every row in order of the primary key, in constant memory."""
+    """Every row in order of the primary key, in constant memory; what no file could hold is made visible."""
     query = select(table).order_by(*table.primary_key.columns).execution_options(yield_per=BATCH)
     times = {column.name for column in table.columns if isinstance(column.type, DateTime)}
     for found in connection.execute(query).mappings():
-        yield {name: _time_text(value) if name in times else value for name, value in found.items()}
+        yield {name: _time_text(value) if name in times else visible(value) for name, value in found.items()}
 
 
 def write_rows(connection: Connection, table: Table, rows: Iterable[Row]) -> Content:

@@ -15,6 +15,7 @@ from server.participants.lookup import find_run
 from server.participants.refusals import FormsMissing, RatingsMissing, RunClosed
 from server.participants.schemas import Completion
 from server.participants.trial_list import trial_list
+from server.text import visible
 from server.versions import LoadedVersion
 
 
@@ -34,7 +35,7 @@ def complete_run(services: Services, session: Session, token: str) -> Completion
     if run.status != "complete":
         raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")
     code = completion_code(session, run, loaded)
-    address = recruiter_of(run.link).redirect(code, run.public_id, run.recruiter_parameters)
+    address = recruiter_of(run.link).redirect(code, run.public_id, visible(run.recruiter_parameters))
     return Completion(status="complete", completion_code=code, redirect_url=address)
 
 
@@ -65,7 +66,7 @@ def completion_code(session: Session, run: StudyRun, loaded: LoadedVersion) -> s
 
 def _screened_out(run: StudyRun) -> Completion:
     recruiter = recruiter_of(run.link)
-    address = recruiter.redirect_screened_out_to(run.public_id, run.recruiter_parameters)
+    address = recruiter.redirect_screened_out_to(run.public_id, visible(run.recruiter_parameters))
     code = recruiter.code_screened_out or None
     return Completion(status="screened_out", completion_code=code, redirect_url=address)
 

@@ -1,9 +1,11 @@
 """One participant's visit as the experimenter sees it."""
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from server.text import VisibleObject
 
 
 class Exclude(BaseModel):
@@ -88,14 +90,14 @@ class TimelineEvent(BaseModel):
     type: str
     at_client: datetime | None
     received_at: datetime
-    data: dict[str, Any]
+    data: VisibleObject
 
 
 class TimelineForm(BaseModel):
     """The answers of one form."""
 
     form: str
-    answers: dict[str, Any]
+    answers: VisibleObject
     saved_at: datetime
 
 
@@ -114,8 +116,8 @@ class Timeline(BaseModel):
     """One run, complete."""
 
     summary: RunSummary
-    device: dict[str, Any]
-    recruiter_parameters: dict[str, str]
+    device: VisibleObject
+    recruiter_parameters: VisibleObject
     consented_at: datetime | None
     trials: list[TimelineTrial]
     events: list[TimelineEvent]

@@ -13,6 +13,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from experiments.errors import InputError
+from server.protocol import BoundedHttp
 
 TIMEOUT_S = 60.0
 START_TIMEOUT_S = 30.0
@@ -78,7 +79,9 @@ class JsonClient:
 @contextmanager
 def running_server(app: FastAPI) -> Iterator[str]:
     """Serve `app` from a thread on a free port; yields its address."""
-    config = uvicorn.Config(app, host="127.0.0.1", port=0, log_level="error", access_log=False)
+    config = uvicorn.Config(
+        app, host="127.0.0.1", port=0, log_level="error", access_log=False, http=BoundedHttp
+    )
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, name="palpebra-server", daemon=True)
     thread.start()

@@ -30,7 +30,8 @@ def test_the_runs_csv_has_one_row_a_visit_with_its_forms(viewer: Admin, particip
 
 def test_raw_data_are_json_lines(viewer: Admin, participant: Participant) -> None:
     participant.agree().rate_all()
-    [line] = viewer.get("/studies/short/data/raw.ndjson").text.splitlines()
+    line, end = viewer.get("/studies/short/data/raw.ndjson").text.splitlines()
+    assert json.loads(end) == {"complete": True, "runs": 1}
     assert len(json.loads(line)["trials"]) == 12
 
 

@@ -1,0 +1,219 @@
+"""What comes in is bounded before anybody is recognised: size, time and text of every request's body.
+
+Written as plain ASGI because Starlette's BaseHTTPMiddleware costs as much as a whole rating.
+"""
+
+import asyncio
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.accounts.identity import EXPERIMENTER, identify
+from server.context import Services
+from server.errors import ApiError, error_response
+from server.settings import Settings
+from server.text import body_problem
+
+ANONYMOUS_BYTES = 64 * 1024
+"""Of a JSON body whose sender is not known."""
+SIGNED_IN_BYTES = 16 * 1024 * 1024
+"""Of a JSON body under /api/admin from an account: a definition, or a table of clips."""
+HELD_BYTES = 32 * 1024 * 1024
+"""Of all bodies under way in this process, the first `ANONYMOUS_BYTES` of each not counted."""
+BODY_S = 30.0
+UPLOAD_IDLE_S, UPLOAD_GRACE_S, UPLOAD_BYTES_PER_S = 30.0, 60.0, 16 * 1024
+UPLOADS = "/api/admin/uploads"
+ADMIN, ACCOUNTLESS = "/api/admin/", ("/api/admin/session", "/api/admin/invitations/")
+RUN = "/api/run/"
+Kind = Literal["anonymous", "run", "admin", "upload"]
+
+
+class BodyTooLarge(ApiError):
+    """The body is larger than its sender may send."""
+
+    status = 413
+    code = "too_large"
+
+
+class BodyTooSlow(ApiError):
+    """The body did not come in time."""
+
+    status = 408
+    code = "too_slow"
+
+
+class TextNotStorable(ApiError):
+    """The body holds what no text can hold."""
+
+    status = 422
+    code = "invalid_text"
+
+
+class Busy(ApiError):
+    """Too much is under way at this moment."""
+
+    status = 503
+    code = "busy"
+
+
+class _Gone(Exception):
+    """The client went away before its request was complete."""
+
+
+def too_large(limit: int) -> BodyTooLarge:
+    """The refusal of a body over `limit` bytes."""
+    shown = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
+    return BodyTooLarge(f"The request is too large: at most {shown} are accepted.")
+
+
+def kind_of(method: str, path: str) -> Kind:
+    """To which class of limits a request belongs."""
+    if path.rstrip("/") == UPLOADS and method == "POST":
+        return "upload"
+    if path.startswith(ADMIN) and not path.startswith(ACCOUNTLESS):
+        return "admin"
+    return "run" if path.startswith(RUN) else "anonymous"
+
+
+@dataclass
+class _Body:
+    """What has come of one body, and what may come."""
+
+    limit: int
+    content: bytearray
+    held: int = 0
+
+
+class Door:
+    """Collect JSON bodies within their limits, let uploads of known senders stream, cut those who stall."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self.run_bytes, self.upload_bytes = settings.max_body_bytes, settings.max_upload_bytes
+        self._held = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        if scope["method"] in ("GET", "HEAD"):
+            await self.app(scope, receive, send)
+            return
+        try:
+            if kind_of(scope["method"], scope["path"]) == "upload":
+                inner = await self._upload(scope, receive)
+            else:
+                inner = await self._collected(scope, receive)
+        except _Gone:
+            return
+        except ApiError as refusal:
+            # The rest of the body is not waited for.
+            headers = {**(refusal.headers or {}), "connection": "close"}
+            answer = error_response(refusal.status, refusal.code, refusal.message, refusal.details, headers)
+            await answer(scope, receive, send)
+            return
+        await self.app(scope, inner, send)
+
+    async def _upload(self, scope: Scope, receive: Receive) -> Receive:
+        """Recognise the sender first; then let the body pass, counted and timed."""
+        await run_in_threadpool(EXPERIMENTER, Request(scope), _services(scope), None, None)
+        if _declared(scope) > self.upload_bytes:
+            raise too_large(self.upload_bytes)
+        return _counted(receive, self.upload_bytes)
+
+    async def _collected(self, scope: Scope, receive: Receive) -> Receive:
+        kind, declared = kind_of(scope["method"], scope["path"]), _declared(scope)
+        body = _Body(self.run_bytes if kind == "run" else ANONYMOUS_BYTES, bytearray())
+        try:
+            async with asyncio.timeout(BODY_S):
+                if declared > body.limit:
+                    await self._raise_limit(scope, kind, body, declared)
+                await self._collect(scope, receive, kind, body)
+        except TimeoutError:
+            raise BodyTooSlow(f"The request did not arrive within {BODY_S:.0f} s; try again.") from None
+        finally:
+            self._held -= body.held
+        if (problem := body_problem(bytes(body.content))) is not None:
+            raise TextNotStorable(f"The request was refused: {problem}.")
+        return _replayed(bytes(body.content), receive)
+
+    async def _collect(self, scope: Scope, receive: Receive, kind: Kind, body: _Body) -> None:
+        more = True
+        while more:
+            message = await receive()
+            if message["type"] == "http.disconnect":
+                raise _Gone
+            body.content += message.get("body", b"")
+            more = message.get("more_body", False)
+            if len(body.content) > body.limit:
+                await self._raise_limit(scope, kind, body, len(body.content))
+            over = max(0, len(body.content) - ANONYMOUS_BYTES)
+            self._held += over - body.held
+            body.held = over
+            if self._held > HELD_BYTES:
+                raise Busy("The server is busy; please try again in 2 s.", headers={"retry-after": "2"})
+
+    async def _raise_limit(self, scope: Scope, kind: Kind, body: _Body, size: int) -> None:
+        """Let an account send more than a stranger; BodyTooLarge where that is not enough or nobody's."""
+        if kind == "admin" and body.limit < SIGNED_IN_BYTES:
+            await run_in_threadpool(identify, Request(scope), _services(scope))
+            body.limit = SIGNED_IN_BYTES
+        if size > body.limit:
+            raise too_large(body.limit)
+
+
+def _services(scope: Scope) -> Services:
+    services: Services = scope["app"].state.services
+    return services
+
+
+def _declared(scope: Scope) -> int:
+    text = dict(scope["headers"]).get(b"content-length", b"0")
+    return int(text) if text.isdigit() else 0
+
+
+def _replayed(content: bytes, receive: Receive) -> Receive:
+    """A `receive` that gives the collected body once, then what the connection says."""
+    given = False
+
+    async def replay() -> Message:
+        nonlocal given
+        if given:
+            return await receive()
+        given = True
+        return {"type": "http.request", "body": content, "more_body": False}
+
+    return replay
+
+
+def _counted(receive: Receive, limit: int) -> Receive:
+    """A `receive` that refuses an upload which grows too large, stalls or trickles."""
+    received, began = 0, time.monotonic()
+
+    async def counted() -> Message:
+        nonlocal received
+        try:
+            async with asyncio.timeout(UPLOAD_IDLE_S):
+                message = await receive()
+        except TimeoutError:
+            raise _too_slow() from None
+        received += len(message.get("body", b""))
+        if received > limit:
+            # Of what reading a body may raise, FastAPI lets only this exception through.
+            raise HTTPException(413, too_large(limit).message, {"connection": "close"})
+        spent = time.monotonic() - began
+        if message.get("more_body") and spent > UPLOAD_GRACE_S and received < spent * UPLOAD_BYTES_PER_S:
+            raise _too_slow()
+        return message
+
+    return counted
+
+
+def _too_slow() -> HTTPException:
+    return HTTPException(408, "The upload came to a standstill; please try again.", {"connection": "close"})
