@@ -66,6 +66,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     async def lifespan(served: FastAPI) -> AsyncIterator[None]:
         served.state.services.stopping.listen()
         yield
+        served.state.services.passwords.close()
         served.state.services.group_commit.close()
         served.state.services.database.close()
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
+from server.accounts.passwords import PasswordWork
+from server.accounts.throttle import SignInThrottle
 from server.clips.s3 import open_s3
 from server.clips.store import ClipStore, FolderStore
 from server.db import Database, open_database
@@ -26,7 +28,8 @@ class Services:
     unsupported: RateLimit
     versions: Versions
     group_commit: GroupCommit
-    sign_ins: RateLimit
+    sign_ins: SignInThrottle
+    passwords: PasswordWork
     stopping: Stopping
 
 
@@ -41,7 +44,8 @@ def open_services(settings: Settings) -> Services:
         unsupported=RateLimit(settings.unsupported_per_minute),
         versions=Versions(),
         group_commit=GroupCommit(database),
-        sign_ins=RateLimit(settings.logins_per_minute),
+        sign_ins=SignInThrottle(settings),
+        passwords=PasswordWork(),
         stopping=Stopping(),
     )
 

@@ -60,7 +60,12 @@ class Settings(BaseSettings):
     )
     session_hours: float = Field(default=12.0, gt=0, description="Hours an experimenter stays signed in.")
     logins_per_minute: int = Field(
-        default=10, ge=1, description="Sign-in attempts for one account a minute before it must wait."
+        default=30,
+        ge=1,
+        description="Sign-in attempts a minute from one range of addresses (/24, /64), or one known browser.",
+    )
+    logins_per_minute_overall: int = Field(
+        default=120, ge=1, description="Sign-in attempts a minute from browsers not seen before, per worker."
     )
     monitor_stream_minutes: float = Field(
         default=60.0, gt=0, description="After so long the live monitor's browser connects anew."

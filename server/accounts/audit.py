@@ -1,6 +1,6 @@
 """The audit log: one row for every change an experimenter makes."""
 
-from typing import Any
+from typing import Any, Literal
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -8,15 +8,27 @@ from sqlalchemy.orm import Session
 from server.accounts.identity import Identity
 from server.models import AuditEntry
 
+NOBODY: Literal["nobody"] = "nobody"
+"""The actor where somebody tried and was not recognised."""
+
 
 def record(
-    session: Session, who: Identity | None, action: str, kind: str = "", target: str = "", /, **details: Any
+    session: Session,
+    who: Identity | Literal["nobody"] | None,
+    action: str,
+    kind: str = "",
+    target: str = "",
+    /,
+    **details: Any,
 ) -> None:
-    """Add an entry in the caller's transaction, so that a change and its entry stand or fall together."""
+    """Add an entry in the caller's transaction, so that a change and its entry stand or fall together.
+
+    who: None for the command line.
+    """
     session.add(
         AuditEntry(
-            account_id=who.account_id if who else None,
-            actor=who.name if who else "command line",
+            account_id=who.account_id if isinstance(who, Identity) else None,
+            actor=who.name if isinstance(who, Identity) else who or "command line",
             action=action,
             target_kind=kind,
             target=target[:200],

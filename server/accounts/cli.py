@@ -8,18 +8,22 @@ from rich.console import Console
 from experiments.errors import InputError
 from server.accounts import service
 from server.accounts.identity import Role
+from server.accounts.passwords import hash_password
 from server.accounts.people import invitation_url
+from server.cli_common import migrated_services, out
 from server.db import open_database
 from server.errors import ApiError
 from server.settings import Settings
 
 app = typer.Typer(help="Accounts of experimenters.", no_args_is_help=True)
+account_app = typer.Typer(help="Let somebody in again who lost a password or a phone.", no_args_is_help=True)
 _ROLES: dict[str, Role] = {"owner": "owner", "experimenter": "experimenter", "viewer": "viewer"}
 
 
 def register(parent: typer.Typer) -> None:
     """Add `server admin` to the command line."""
     parent.add_typer(app, name="admin")
+    parent.add_typer(account_app, name="account")
 
 
 def _known(role: str) -> Role:
@@ -64,3 +68,36 @@ def link(
     settings = Settings()
     _, token = service.invite(open_database(settings), _known(role), label, None)
     Console(soft_wrap=True).print(invitation_url(settings.public_url, token), highlight=False)
+
+
+@account_app.command("reset-password")
+def reset_password(
+    name: Annotated[str, typer.Argument(help="Name of the account.")],
+    password: Annotated[
+        str,
+        typer.Option(
+            prompt=True, hide_input=True, confirmation_prompt=True, help="Asked for where not given."
+        ),
+    ] = "",
+) -> None:
+    """Give an account a new password; its sessions and API tokens end, and the audit log says so.
+
+    Example: server account reset-password ada
+    """
+    with migrated_services() as services:
+        fresh = hash_password(password, name)
+        with services.database.write() as session:
+            service.reset_password(session, name, fresh)
+    out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")
+
+
+@account_app.command("reset-second-factor")
+def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the account.")]) -> None:
+    """Turn an account's second factor off, for the day phone and recovery codes are lost.
+
+    Its sessions and API tokens end, and the audit log says so. Make sure that it is she who asks.
+    Example: server account reset-second-factor ada
+    """
+    with migrated_services() as services, services.database.write() as session:
+        service.reset_second_factor(session, name)
+    out.print(f"the second factor of '{name}' is off; its sessions and API tokens have ended")

@@ -3,12 +3,14 @@
 from datetime import timedelta
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Request, Response
+from fastapi import APIRouter, Cookie, Header, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from sqlalchemy import select
 
 from server.accounts import second_factor, service
 from server.accounts.audit import record
 from server.accounts.identity import COOKIE, Identity, Myself, NotSignedIn, account_of, check_origin, identify
+from server.accounts.passwords import hash_password, password_fits
 from server.accounts.schemas import (
     AccountOut,
     ChangePassword,
@@ -25,6 +27,7 @@ from server.accounts.schemas import (
     SignIn,
     TokenOut,
 )
+from server.accounts.throttle import DEVICE_COOKIE, known_device, new_device
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
@@ -32,6 +35,7 @@ from server.models import Account, AdminSession, ApiToken
 from server.tokens import hash_token, new_token
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
+DEVICE_DAYS = 365
 UserAgent = Annotated[str, Header(include_in_schema=False)]
 
 
@@ -59,6 +63,18 @@ def _set_cookie(response: Response, services: Services, token: str) -> None:
     )
 
 
+def _set_device(response: Response, services: Services, name: str) -> None:
+    response.set_cookie(
+        DEVICE_COOKIE,
+        new_device(services.settings.key, name),
+        max_age=DEVICE_DAYS * 86400,
+        httponly=True,
+        samesite="strict",
+        secure=services.settings.is_https,
+        path="/api/admin/session",
+    )
+
+
 @router.get("/session")
 def get_session(request: Request, services: ServicesDep) -> Me:
     """Who is signed in here."""
@@ -72,14 +88,58 @@ def get_session(request: Request, services: ServicesDep) -> Me:
 
 
 @router.post("/session")
-def sign_in(
-    request: Request, services: ServicesDep, body: SignIn, response: Response, user_agent: UserAgent = ""
+async def sign_in(
+    request: Request,
+    services: ServicesDep,
+    body: SignIn,
+    response: Response,
+    user_agent: UserAgent = "",
+    device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
 ) -> Me:
-    """Sign in; sets the session cookie. Ten wrong passwords lock the account for a while."""
+    """Sign in; sets the session cookie. After some wrong attempts from one place the next must wait."""
     check_origin(request, services)
-    services.sign_ins.hit(body.name.casefold())
-    token = service.sign_in(services, body.name, body.password, body.code, user_agent)
+    token = await attempt(services, body, address_of(request), device_cookie, user_agent)
     _set_cookie(response, services, token)
+    _set_device(response, services, body.name)
+    return await run_in_threadpool(_just_signed_in, services, token)
+
+
+async def attempt(
+    services: Services, body: SignIn, address: str, device_cookie: str | None, user_agent: str
+) -> str:
+    """Check the credentials within the limits; return the token of a new session.
+
+    Names that exist and names that do not take the same steps.
+    """
+    device = known_device(services.settings.key, body.name, device_cookie)
+    throttle = services.sign_ins
+    key = throttle.key(body.name, address, device)
+    throttle.enter(key, address, device)
+    stored = await run_in_threadpool(service.stored_password, services, body.name)
+    fits = await services.passwords.run(lambda: password_fits(body.password, stored))
+    if fits and not device:
+        throttle.codes.check(body.name.casefold())
+    token, failure = await run_in_threadpool(
+        service.open_session, services, body.name, stored if fits else None, body.code, user_agent
+    )
+    if token is not None:
+        throttle.names.succeeded(key)
+        throttle.codes.succeeded(body.name.casefold())
+        return token
+    if not isinstance(failure, service.SecondFactorRequired):
+        throttle.names.failed(key)
+        if fits and not device:
+            # Whoever knows the password could else try codes from everywhere.
+            throttle.codes.failed(body.name.casefold())
+    raise failure or service.WrongCredentials("Name or password are wrong.")
+
+
+def address_of(request: Request) -> str:
+    """The client's address as the proxy says; it is neither stored nor logged."""
+    return request.client.host if request.client else ""
+
+
+def _just_signed_in(services: Services, token: str) -> Me:
     with services.database.read() as session:
         found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(token)))
         return Me(account=account_out(found.account) if found else None, accounts_exist=True)
@@ -104,7 +164,7 @@ def get_invitation(services: ServicesDep, token: str) -> InvitationState:
 
 
 @router.post("/invitations/{token}/account", status_code=201)
-def accept_invitation(
+async def accept_invitation(
     request: Request,
     services: ServicesDep,
     token: str,
@@ -114,11 +174,15 @@ def accept_invitation(
 ) -> Me:
     """Use a one-time link: make the account and sign in."""
     check_origin(request, services)
-    cookie = service.accept_invitation(services, token, body.name, body.password, user_agent)
+    services.sign_ins.enter(
+        services.sign_ins.key(body.name, address_of(request), None), address_of(request), None
+    )
+    await run_in_threadpool(service.check_invitation, services, token)
+    fresh = await services.passwords.run(lambda: hash_password(body.password, body.name))
+    cookie = await run_in_threadpool(service.accept_invitation, services, token, body.name, fresh, user_agent)
     _set_cookie(response, services, cookie)
-    with services.database.read() as session:
-        found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(cookie)))
-        return Me(account=account_out(found.account) if found else None, accounts_exist=True)
+    _set_device(response, services, body.name)
+    return await run_in_threadpool(_just_signed_in, services, cookie)
 
 
 @router.get("/sessions")
@@ -154,9 +218,24 @@ def _revoke_session(services: Services, me: Identity, session_id: int | None) ->
 
 
 @router.put("/password", status_code=204)
-def change_password(services: ServicesDep, me: Myself, body: ChangePassword) -> None:
-    """Change the password; every other session ends."""
-    service.change_password(services, me, body.password, body.new_password)
+async def change_password(services: ServicesDep, me: Myself, body: ChangePassword) -> None:
+    """Change the password; every other session and every API token ends."""
+    await _must_fit(services, me, body.password)
+    fresh = await services.passwords.run(lambda: hash_password(body.new_password, me.name))
+    await run_in_threadpool(service.change_password, services, me, fresh)
+
+
+async def _must_fit(services: Services, me: Identity, password: str) -> None:
+    """Ask for the present password; a stolen session may not try many."""
+    key = f"session {me.session_id}"
+    services.sign_ins.names.check(key)
+    stored = await run_in_threadpool(service.own_password, services, me)
+    try:
+        await services.passwords.run(lambda: service.must_fit(password, stored))
+    except service.WrongCredentials:
+        services.sign_ins.names.failed(key)
+        raise
+    services.sign_ins.names.succeeded(key)
 
 
 @router.post("/second-factor")
@@ -174,9 +253,10 @@ def confirm_second_factor(services: ServicesDep, me: Myself, body: ConfirmCode) 
 
 
 @router.delete("/second-factor", status_code=204)
-def remove_second_factor(services: ServicesDep, me: Myself, body: ConfirmPassword) -> None:
+async def remove_second_factor(services: ServicesDep, me: Myself, body: ConfirmPassword) -> None:
     """Turn the second factor off."""
-    service.remove_second_factor(services, me, body.password)
+    await _must_fit(services, me, body.password)
+    await run_in_threadpool(service.remove_second_factor, services, me)
 
 
 @router.get("/tokens")

@@ -1,12 +1,15 @@
 """Signing in, invitations, second factor, tokens: the rules behind the account endpoints."""
 
-from datetime import datetime, timedelta
+from datetime import timedelta
+from typing import Any, cast
 
-from sqlalchemy import func, select
+from sqlalchemy import CursorResult, func, select, update
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
+from experiments.errors import did_you_mean
 from server.accounts import second_factor
-from server.accounts.audit import record
+from server.accounts.audit import NOBODY, record
 from server.accounts.identity import Identity, Role, account_of
 from server.accounts.passwords import hash_password, password_fits
 from server.clock import now
@@ -16,9 +19,8 @@ from server.errors import ApiError, Conflict, NotFound
 from server.models import Account, AdminSession, ApiToken, Invitation
 from server.tokens import hash_token, new_token
 
-WRONG_BEFORE_LOCK = 10
-LOCK_SHORTEST, LOCK_LONGEST = timedelta(minutes=1), timedelta(minutes=15)
 INVITATION_DAYS = 7
+INVITATION_USED = Conflict("This invitation was used or has expired; ask for a new one.")
 
 
 class WrongCredentials(ApiError):
@@ -35,13 +37,6 @@ class SecondFactorRequired(ApiError):
     code = "second_factor_required"
 
 
-class AccountLocked(ApiError):
-    """Too many wrong passwords; wait."""
-
-    status = 429
-    code = "account_locked"
-
-
 def identity_of(account: Account, session_id: int | None = None) -> Identity:
     """The identity of an account that has just been recognised."""
     return Identity(account.id, account.name, account.role, session_id=session_id)
@@ -52,41 +47,49 @@ def accounts_exist(session: Session) -> bool:
     return bool(session.scalar(select(func.count()).select_from(Account)))
 
 
-def sign_in(services: Services, name: str, password: str, code: str | None, user_agent: str) -> str:
-    """Check the credentials and return the token of a new session (the cookie's value)."""
+def stored_password(services: Services, name: str) -> str | None:
+    """The password's hash of the account called `name`; None where there is none."""
     with services.database.read() as session:
         account = _by_name(session, name)
-        stored = account.password_hash if account else None
-        locked = account.locked_until if account else None
-    if locked is not None and locked > now():
-        raise _locked(locked)
-    # argon2 takes its time: not inside a transaction.
-    fits = password_fits(password, stored)
+        return account.password_hash if account else None
+
+
+def open_session(
+    services: Services, name: str, checked: str | None, code: str | None, user_agent: str
+) -> tuple[str | None, ApiError | None]:
+    """After a right password: the token of a new session (the cookie's value), or why there is none.
+
+    checked: the stored hash that the password fitted, None where it fitted none. The account is held
+    meanwhile, so that a code works once however many ask at once; failures are written down too.
+    """
     with services.database.write() as session:
-        account = _by_name(session, name)
-        if account is None or account.disabled_at is not None or not fits:
+        account = _by_name(session, name, lock=True)
+        if account is None or account.disabled_at is not None or account.password_hash != checked:
             failure: ApiError | None = WrongCredentials("Name or password are wrong.")
         else:
             failure = _second_factor_failure(services, account, code)
-        if failure is None and account is not None:
-            account.failed_logins, account.locked_until = 0, None
+        if account is not None and failure is None:
             token = _open_session(services, session, account, user_agent)
             record(session, identity_of(account), "signed in", "account", account.name)
-            return token
-        if account is not None and not isinstance(failure, SecondFactorRequired):
-            _count_failure(session, account)
-    raise failure or WrongCredentials("Name or password are wrong.")
+            return token, None
+        if not isinstance(failure, SecondFactorRequired):
+            record_failure(services, session, account)
+    return None, failure
 
 
-def _by_name(session: Session, name: str) -> Account | None:
-    return session.scalar(select(Account).where(func.lower(Account.name) == name.lower()))
+def record_failure(services: Services, session: Session, account: Account | None) -> None:
+    """Write a failed sign-in down, so many a minute; a name that is nobody's may be a password: not kept."""
+    unwritten = services.sign_ins.written()
+    if unwritten is None:
+        return
+    name = account.name if account else "(unknown)"
+    details = {"not_written_before": unwritten} if unwritten else {}
+    record(session, NOBODY, "sign-in failed", "account", name, **details)
 
 
-def _locked(until: datetime) -> AccountLocked:
-    wait = max(1, round((until - now()).total_seconds()))
-    return AccountLocked(
-        f"Too many wrong passwords; please try again in {wait} s.", headers={"retry-after": str(wait)}
-    )
+def _by_name(session: Session, name: str, *, lock: bool = False) -> Account | None:
+    query = select(Account).where(func.lower(Account.name) == name.lower())
+    return session.scalar(query.with_for_update() if lock else query)
 
 
 def _second_factor_failure(services: Services, account: Account, code: str | None) -> ApiError | None:
@@ -104,14 +107,6 @@ def _second_factor_failure(services: Services, account: Account, code: str | Non
         account.recovery_code_hashes = [kept for kept in account.recovery_code_hashes if kept != hashed]
         return None
     return WrongCredentials("That code is wrong or was used before.")
-
-
-def _count_failure(session: Session, account: Account) -> None:
-    account.failed_logins += 1
-    over = account.failed_logins - WRONG_BEFORE_LOCK
-    if over >= 0:
-        account.locked_until = now() + min(LOCK_LONGEST, LOCK_SHORTEST * 2 ** min(over, 8))
-        record(session, identity_of(account), "locked after wrong passwords", "account", account.name)
 
 
 def _open_session(services: Services, session: Session, account: Account, user_agent: str) -> str:
@@ -132,9 +127,19 @@ def create_account(session: Session, name: str, password: str, role: Role) -> Ac
     """Add an account; Conflict where the name is taken."""
     if _by_name(session, name) is not None:
         raise Conflict(f"There is already an account called '{name}'; choose another name.")
-    account = Account(name=name, password_hash=hash_password(password, name), role=role)
+    return add_account(session, name, hash_password(password, name), role)
+
+
+def add_account(session: Session, name: str, password_hash: str, role: Role) -> Account:
+    """Add an account whose password was hashed before; Conflict where the name is taken."""
+    if _by_name(session, name) is not None:
+        raise Conflict(f"There is already an account called '{name}'; choose another name.")
+    account = Account(name=name, password_hash=password_hash, role=role)
     session.add(account)
-    session.flush()
+    try:
+        session.flush()
+    except IntegrityError as error:  # somebody took it at this very moment
+        raise Conflict(f"There is already an account called '{name}'; choose another name.") from error
     record(session, identity_of(account), "account created", "account", name, role=role)
     return account
 
@@ -164,15 +169,32 @@ def find_invitation(session: Session, token: str) -> Invitation:
     return found
 
 
-def accept_invitation(services: Services, token: str, name: str, password: str, user_agent: str) -> str:
+def check_invitation(services: Services, token: str) -> None:
+    """NotFound or Conflict where a one-time link does not work, before a password is hashed for it."""
+    with services.database.read() as session:
+        _must_be_open(find_invitation(session, token))
+
+
+def _must_be_open(invitation: Invitation) -> None:
+    if invitation.used_at is not None or invitation.expires_at <= now():
+        raise INVITATION_USED
+
+
+def accept_invitation(services: Services, token: str, name: str, password_hash: str, user_agent: str) -> str:
     """Make the invited account and sign it in; return the session's token."""
-    hash_password(password, name)  # a weak password is refused before the write lock is taken
     with services.database.write() as session:
         invitation = find_invitation(session, token)
-        if invitation.used_at is not None or invitation.expires_at <= now():
-            raise Conflict("This invitation was used or has expired; ask for a new one.")
-        account = create_account(session, name, password, known_role(invitation.role))
-        invitation.used_at = now()
+        # One statement decides, so that of many who come at once one is let in, whatever the database.
+        used = (
+            update(Invitation)
+            .where(
+                Invitation.id == invitation.id, Invitation.used_at.is_(None), Invitation.expires_at > now()
+            )
+            .values(used_at=now())
+        )
+        if cast(CursorResult[Any], session.execute(used)).rowcount != 1:
+            raise INVITATION_USED
+        account = add_account(session, name, password_hash, known_role(invitation.role))
         return _open_session(services, session, account, user_agent)
 
 
@@ -182,23 +204,48 @@ def known_role(word: str) -> Role:
     return roles[word]
 
 
-def change_password(services: Services, who: Identity, password: str, new_password: str) -> None:
-    """Change one's own password and end every other session."""
-    with services.database.read() as session:
-        stored = account_of(session, who).password_hash
-    _must_fit(password, stored)
-    fresh = hash_password(new_password, who.name)
+def change_password(services: Services, who: Identity, fresh: str) -> None:
+    """Give oneself a new password (its hash); every other session and every API token ends."""
     with services.database.write() as session:
         account_of(session, who).password_hash = fresh
-        for other in open_sessions(session, who):
-            if other.id != who.session_id:
-                other.revoked_at = now()
+        end_everything(session, who.account_id, keep_session=who.session_id)
         record(session, who, "password changed", "account", who.name)
 
 
-def _must_fit(password: str, stored: str) -> None:
+def own_password(services: Services, who: Identity) -> str:
+    """The hash of one's own password."""
+    with services.database.read() as session:
+        return account_of(session, who).password_hash
+
+
+def must_fit(password: str, stored: str) -> None:
+    """WrongCredentials where this is not the present password."""
     if not password_fits(password, stored):
         raise WrongCredentials("The present password is wrong.")
+
+
+def reset_password(session: Session, name: str, fresh: str) -> None:
+    """From the command line: give an account a new password (its hash); sessions and tokens end."""
+    account = _named(session, name)
+    account.password_hash = fresh
+    end_everything(session, account.id)
+    record(session, None, "password reset", "account", account.name)
+
+
+def reset_second_factor(session: Session, name: str) -> None:
+    """From the command line: turn an account's second factor off; sessions and tokens end."""
+    account = _named(session, name)
+    _without_second_factor(account)
+    end_everything(session, account.id)
+    record(session, None, "second factor reset", "account", account.name)
+
+
+def _named(session: Session, name: str) -> Account:
+    account = _by_name(session, name, lock=True)
+    if account is None:
+        names = list(session.scalars(select(Account.name)))
+        raise NotFound(f"There is no account called '{name}'{did_you_mean(name, names)}.")
+    return account
 
 
 def open_sessions(session: Session, who: Identity) -> list[AdminSession]:
@@ -238,16 +285,16 @@ def confirm_second_factor(services: Services, who: Identity, code: str) -> list[
     return codes
 
 
-def remove_second_factor(services: Services, who: Identity, password: str) -> None:
-    """Turn the second factor off again; asks for the password."""
-    with services.database.read() as session:
-        stored = account_of(session, who).password_hash
-    _must_fit(password, stored)
+def remove_second_factor(services: Services, who: Identity) -> None:
+    """Turn the second factor off again; the password was asked for."""
     with services.database.write() as session:
-        account = account_of(session, who)
-        account.totp_secret = account.totp_confirmed_at = account.totp_last_step = None
-        account.recovery_code_hashes = []
+        _without_second_factor(account_of(session, who))
         record(session, who, "second factor removed", "account", who.name)
+
+
+def _without_second_factor(account: Account) -> None:
+    account.totp_secret = account.totp_confirmed_at = account.totp_last_step = None
+    account.recovery_code_hashes = []
 
 
 def change_account(
@@ -255,7 +302,9 @@ def change_account(
 ) -> Account:
     """Change another account's role, or disable it and end its sessions; one owner must remain."""
     with database.write() as session:
-        account = session.get(Account, account_id)
+        # All owners are held: two who demote each other at once would leave none.
+        session.scalars(select(Account.id).where(Account.role == "owner").with_for_update()).all()
+        account = session.get(Account, account_id, populate_existing=True)
         if account is None:
             raise NotFound("There is no such account.")
         account.role = role or account.role
@@ -266,13 +315,15 @@ def change_account(
         if not session.scalar(owners):
             raise Conflict("One owner must remain; make another account an owner first.")
         if account.disabled_at is not None:
-            _end_everything(session, account.id)
+            end_everything(session, account.id)
         record(session, who, "account changed", "account", account.name, role=account.role, disabled=disabled)
     return account
 
 
-def _end_everything(session: Session, account_id: int) -> None:
+def end_everything(session: Session, account_id: int, keep_session: int | None = None) -> None:
+    """End the sessions of an account, but for one, and revoke its API tokens."""
     for row in session.scalars(select(AdminSession).where(AdminSession.account_id == account_id)):
-        row.revoked_at = row.revoked_at or now()
+        if row.id != keep_session:
+            row.revoked_at = row.revoked_at or now()
     for token in session.scalars(select(ApiToken).where(ApiToken.account_id == account_id)):
         token.revoked_at = token.revoked_at or now()

@@ -21,7 +21,7 @@ def test_a_one_time_link_works_once(client: TestClient, settings: Settings, serv
     assert (again.status_code, again.json()["error"]["code"]) == (409, "conflict")
 
 
-@pytest.mark.parametrize("password", ["short", "a" * 20, "the owner!"[:9]])
+@pytest.mark.parametrize("password", ["short", "a" * 20, "1234567890ab"])
 def test_a_weak_password_is_refused(
     client: TestClient, settings: Settings, services: Services, password: str
 ) -> None:
@@ -55,19 +55,6 @@ def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(
     cookie = made.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
-
-
-def test_ten_wrong_passwords_lock_the_account(
-    client: TestClient, services: Services, settings: Settings, owner: Admin
-) -> None:
-    services.sign_ins.per_minute = 1000  # so that it is the account's own lock that answers
-    browser = fresh_browser(client, settings)
-    for _ in range(10):
-        wrong = browser.post("/api/admin/session", json={"name": owner.name, "password": "wrong"})
-        assert (wrong.status_code, wrong.json()["error"]["code"]) == (401, "wrong_credentials")
-    locked = browser.post("/api/admin/session", json={"name": owner.name, "password": PASSWORD})
-    assert (locked.status_code, locked.json()["error"]["code"]) == (429, "account_locked")
-    assert int(locked.headers["retry-after"]) > 0
 
 
 def test_an_unknown_name_and_a_wrong_password_are_told_alike(

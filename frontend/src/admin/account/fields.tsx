@@ -18,7 +18,7 @@ type PasswordProps = Field & Omit<PasswordInputProps, "onChange" | "value"> & { 
 
 /** `fresh`: a password to be chosen, not the present one. */
 export function PasswordField({ onChange, fresh = false, ...rest }: PasswordProps) {
-  const chosen = { description: "At least 10 characters.", autoComplete: "new-password", minLength: 10 };
+  const chosen = { description: "At least 12 characters; a few uncommon words in a row do well.", autoComplete: "new-password", minLength: 12 };
   return (
     <PasswordInput
       required
