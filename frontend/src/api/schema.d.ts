@@ -375,7 +375,7 @@ export interface paths {
         put?: never;
         /**
          * Sign In
-         * @description Sign in; sets the session cookie. Ten wrong passwords lock the account for a while.
+         * @description Sign in; sets the session cookie. After some wrong attempts from one place the next must wait.
          */
         post: operations["sign_in"];
         /**
@@ -478,7 +478,7 @@ export interface paths {
         get?: never;
         /**
          * Change Password
-         * @description Change the password; every other session ends.
+         * @description Change the password; every other session and every API token ends.
          */
         put: operations["change_password"];
         post?: never;
@@ -3015,7 +3015,7 @@ export interface components {
             };
             /** Recruiter Parameters */
             recruiter_parameters: {
-                [key: string]: string;
+                [key: string]: unknown;
             };
             /** Consented At */
             consented_at: string | null;
