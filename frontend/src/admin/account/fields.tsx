@@ -18,7 +18,11 @@ type PasswordProps = Field & Omit<PasswordInputProps, "onChange" | "value"> & { 
 
 /** `fresh`: a password to be chosen, not the present one. */
 export function PasswordField({ onChange, fresh = false, ...rest }: PasswordProps) {
-  const chosen = { description: "At least 12 characters; a few uncommon words in a row do well.", autoComplete: "new-password", minLength: 12 };
+  const chosen = {
+    description: "At least 12 characters; a few uncommon words in a row do well.",
+    autoComplete: "new-password",
+    minLength: 12,
+  };
   return (
     <PasswordInput
       required
