@@ -1,0 +1,15 @@
+/** Living eyelids for avatars: the twin of the Python package `blink_engine`. */
+export { BlinkEngine, type EngineOptions, type LidFrame } from "./engine";
+export type { Law } from "./laws";
+export {
+  type BlinkEvent,
+  DEFAULT_PARAMETERS,
+  type EventKind,
+  type Parameters,
+  type ProfileModel,
+  type Response,
+  SOURCES,
+  STATE_NAMES,
+  type StateName,
+  withRate,
+} from "./parameters";

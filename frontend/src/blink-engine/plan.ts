@@ -1,0 +1,124 @@
+/** When the next blink comes and what it looks like, as in blink_engine/plan.py: same draws, in the same order. */
+import { draw, mean } from "./laws";
+import { type BlinkEvent, type Parameters, responseChance, type StateName } from "./parameters";
+import { type BlinkShape, duration } from "./profile";
+import { RandomNumbers } from "./random-numbers";
+
+const INTERVALS = 1;
+const SHAPES = 2;
+const RESPONSES = 3;
+const ANTICIPATED_MAX = 2;
+
+export interface Blink {
+  left_onset_s: number;
+  right_onset_s: number;
+  left_peak: number;
+  right_peak: number;
+  shape: BlinkShape;
+  cause: string;
+}
+
+export const endOf = (blink: Blink): number => Math.max(blink.left_onset_s, blink.right_onset_s) + duration(blink.shape);
+
+const bounded = (value: number): number => Math.min(1, Math.max(0, value));
+
+export class BlinkPlan {
+  private readonly intervals: RandomNumbers;
+  private readonly shapes: RandomNumbers;
+  private readonly responses: RandomNumbers;
+  private lastOnset_s = -Infinity;
+  private spontaneous_s: number;
+  private answer_s = Infinity;
+  private answerCause = "";
+  private anticipated = 0;
+
+  constructor(
+    private readonly parameters: Parameters,
+    private state: StateName,
+    seed: number,
+  ) {
+    this.intervals = new RandomNumbers(seed, INTERVALS);
+    this.shapes = new RandomNumbers(seed, SHAPES);
+    this.responses = new RandomNumbers(seed, RESPONSES);
+    const interval = this.interval();
+    this.spontaneous_s = interval * this.intervals.uniform();
+  }
+
+  setState(state: StateName, time_s: number): void {
+    const ratio = mean(this.parameters.intervals[state]) / mean(this.parameters.intervals[this.state]);
+    this.spontaneous_s = time_s + Math.max(0, this.spontaneous_s - time_s) * ratio;
+    this.state = state;
+  }
+
+  notify({ kind, time_s, amplitude_deg = 0 }: BlinkEvent): void {
+    if (kind === "blink") return this.answer(time_s, kind);
+    const response = this.parameters.responses[kind];
+    const chance = this.responses.uniform();
+    const latency = this.responses.uniform();
+    if (chance >= responseChance(response, amplitude_deg)) return;
+    const delay = response.earliest_s + latency * (response.latest_s - response.earliest_s);
+    this.answer(time_s + Math.max(0, delay), kind);
+  }
+
+  /** Hands every blink that begins at or before `until_s` to `take`, in order, each once. */
+  due(until_s: number, take: (blink: Blink) => void): void {
+    while (Math.min(this.spontaneous_s, this.answer_s) <= until_s) {
+      if (this.answer_s <= this.spontaneous_s) this.takeAnswer(take);
+      else this.takeSpontaneous(take);
+    }
+  }
+
+  private takeAnswer(take: (blink: Blink) => void): void {
+    const onset_s = this.answer_s;
+    this.answer_s = Infinity;
+    this.anticipated = Math.min(ANTICIPATED_MAX, this.anticipated + 1);
+    take(this.blink(onset_s, this.answerCause));
+  }
+
+  private takeSpontaneous(take: (blink: Blink) => void): void {
+    const onset_s = this.spontaneous_s;
+    this.spontaneous_s = onset_s + this.interval();
+    if (this.anticipated > 0) this.anticipated -= 1;
+    else if (onset_s >= this.lastOnset_s + this.parameters.least_interval_s) take(this.blink(onset_s, "spontaneous"));
+  }
+
+  private answer(onset_s: number, cause: string): void {
+    const onset = Math.max(onset_s, this.lastOnset_s + this.parameters.least_interval_s);
+    if (onset >= this.answer_s) return;
+    this.answer_s = onset;
+    this.answerCause = cause;
+  }
+
+  private interval(): number {
+    return Math.max(draw(this.parameters.intervals[this.state], this.intervals), this.parameters.least_interval_s);
+  }
+
+  private blink(onset_s: number, cause: string): Blink {
+    const { profile } = this.parameters;
+    const numbers = this.shapes;
+    const kind = numbers.uniform();
+    const partial = numbers.normal();
+    const closing_s = draw(profile.closing_s, numbers);
+    const opening_s = draw(profile.opening_s, numbers);
+    const closed = numbers.normal();
+    const asymmetry = profile.asymmetry * numbers.normal();
+    const delay_s = profile.delay_s * numbers.normal();
+    const again = numbers.uniform() < profile.double_share;
+    const complete = kind < profile.long_share + profile.complete_share;
+    const law = kind < profile.long_share ? profile.long_closed_s : profile.closed_s;
+    const closed_s = complete ? law.median * Math.exp((law.spread ?? 0) * closed) : 0;
+    const peak = complete ? 1 : 1 / (1 + Math.exp(-(profile.partial_logit_median + profile.partial_logit_spread * partial)));
+    const { closing_power, opening_power } = profile;
+    const shape = { closing_s, closed_s, opening_s, closing_power, opening_power };
+    this.lastOnset_s = onset_s;
+    if (again && cause !== "double") this.answer(onset_s + duration(shape), "double");
+    return {
+      left_onset_s: onset_s + Math.max(0, -delay_s),
+      right_onset_s: onset_s + Math.max(0, delay_s),
+      left_peak: complete ? peak : bounded(peak + asymmetry / 2),
+      right_peak: complete ? peak : bounded(peak - asymmetry / 2),
+      shape,
+      cause,
+    };
+  }
+}
