@@ -41,6 +41,10 @@ COMMANDS = {
         "stimuli_builder.blinks.cli",
         "The PCA blink model: learn from recorded blinks, make new ones, hand curves to animation programs.",
     ),
+    "performance": (
+        "stimuli_builder.performance.cli",
+        "Write the blinks of a whole performance, timed by pauses and turns of speech.",
+    ),
     "bake": (
         "stimuli_builder.characters.cli",
         "Render a character's atlas of baked pictures.",

@@ -90,7 +90,10 @@ def textbook(
 def export(
     out: Annotated[Path, typer.Option(help="File to write.")],
     format_name: Annotated[
-        str, typer.Option("--format", help="csv, json, blender (a script), maya (.anim) or arkit (CSV).")
+        str,
+        typer.Option(
+            "--format", help="csv, json, blender (a script), maya (.anim), arkit (CSV), gltf or usd (.usda)."
+        ),
     ] = "csv",
     fps: Annotated[
         float | None, typer.Option(help="Frame rate of the curve; 300 for csv and json, else 30, without it.")

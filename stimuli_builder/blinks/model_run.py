@@ -1,6 +1,5 @@
 """What `stimuli model` does."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,11 +11,8 @@ from rich.table import Table
 
 from experiments.errors import InputError, did_you_mean
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
-from stimuli_builder.blinks.export.arkit import to_arkit
-from stimuli_builder.blinks.export.blender import to_blender
-from stimuli_builder.blinks.export.curve import AnimationCurve, make_curve
-from stimuli_builder.blinks.export.maya import to_maya
-from stimuli_builder.blinks.export.plain import to_csv, to_json
+from stimuli_builder.blinks.export.curve import make_curve
+from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.plots import check_figure_name, model_figure, profiles_figure, save_figure
 from stimuli_builder.blinks.profile import BlinkProfile, resample, to_full_closure
@@ -25,8 +21,6 @@ from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, textbook_profile
 from stimuli_builder.files import temporary_beside, whole_text
 
 EYES = ("auto", "each", "both")
-FORMATS = ("csv", "json", "blender", "maya", "arkit")
-_SAFE_NAME = re.compile(r"[A-Za-z_][\w.:|-]*")
 
 
 def fit_model(
@@ -150,28 +144,27 @@ class ExportJob:
     left: str = "eyeBlinkLeft"
     right: str = "eyeBlinkRight"
 
+    @property
+    def names(self) -> CurveTarget:
+        """What the curve's object and shapes are called."""
+        return CurveTarget(self.target, self.left, self.right)
+
 
 def export_curve(job: ExportJob) -> None:
     """Write an animation curve; see `stimuli model export --help`."""
     _check_export(job)
     rate = job.fps or (300.0 if job.format_name in ("csv", "json") else 30.0)
     curve = make_curve(_export_profiles(job), rate, job.lead_s, job.seed)
-    text = _written(job, curve)
+    text = write_curve(job.format_name, curve, job.names)
     with whole_text(job.out) as stream:
         stream.write(text)
     Console().print(f"{len(curve.blinks)} blinks, {curve.left.size} frames at {rate:g} fps; wrote {job.out}")
 
 
 def _check_export(job: ExportJob) -> None:
-    if job.format_name not in FORMATS:
-        raise InputError(f"unknown --format '{job.format_name}'{did_you_mean(job.format_name, FORMATS)}")
+    check_format(job.format_name, job.names)
     if sum([bool(job.profile_names), job.profiles is not None, job.model is not None]) > 1:
         raise InputError("blinks come from --profile, --profiles or --model: give one of them")
-    for option, name in (("--left", job.left), ("--right", job.right), ("--target", job.target or "face")):
-        if not _SAFE_NAME.fullmatch(name):
-            raise InputError(f"{option} '{name}': expected a name of letters, digits and _ . : | -")
-    if job.left == job.right:
-        raise InputError(f"--left and --right are both '{job.left}': each eye needs a shape of its own")
     _check_outputs(job.out, None)
 
 
@@ -189,14 +182,6 @@ def _export_profiles(job: ExportJob) -> list[BlinkProfile]:
     if job.duration is not None:
         chosen = [resample(profile, job.duration) for profile in chosen]
     return [to_full_closure(profile) for profile in chosen] if job.full_closure else chosen
-
-
-def _written(job: ExportJob, curve: AnimationCurve) -> str:
-    if job.format_name == "blender":
-        return to_blender(curve, job.target, job.left, job.right)
-    if job.format_name == "maya":
-        return to_maya(curve, job.target or "face", job.left, job.right)
-    return {"csv": to_csv, "json": to_json, "arkit": to_arkit}[job.format_name](curve)
 
 
 def _model(path: Path | None) -> BlinkModel:

@@ -1,0 +1,1 @@
+"""From speech to a whole performance of the eyelids."""

@@ -1,0 +1,109 @@
+"""The command `stimuli performance`: speech in, lid curves out."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import cast, get_args
+
+import numpy as np
+from rich.console import Console
+
+from blink_engine import Performance, StateName, default_parameters, perform
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.blinks.export.curve import AnimationCurve
+from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
+from stimuli_builder.files import check_targets, whole_text
+from stimuli_builder.performance.speech import Speech, speech_events, speech_states
+from stimuli_builder.performance.subtitles import SUFFIXES, speech_in_subtitles
+
+LOWER_UP_MM, LOWER_IN_MM = 0.75, 2.6
+"""The lower lid's full travel: the middle of the ranges of `stimuli_builder.blinks.lower_lid`."""
+
+
+@dataclass(frozen=True)
+class PerformanceJob:
+    """What `stimuli performance` is asked for; `source` None means no speech, for `duration_s`."""
+
+    out: Path
+    source: Path | None = None
+    format_name: str = "csv"
+    fps: float = 60.0
+    seed: int = 1
+    state: str = "listening"
+    duration_s: float | None = None
+    speaker: str | None = None
+    rate: float | None = None
+    target: CurveTarget = field(default_factory=CurveTarget)
+
+
+def write_performance(job: PerformanceJob) -> None:
+    """Write the lid curves of a whole performance; see `stimuli performance --help`."""
+    state = _checked(job)
+    stretches, length_s = _speech(job)
+    duration_s = job.duration_s or length_s
+    if duration_s <= 0:
+        raise InputError("expected a recording, subtitles, or --duration in seconds; got none")
+    parameters = default_parameters()
+    if job.rate is not None:
+        parameters = parameters.with_rate(state, job.rate)
+    done = perform(
+        duration_s,
+        job.fps,
+        seed=job.seed,
+        state=state,
+        events=speech_events(stretches),
+        changes=speech_states(stretches, state) if stretches else (),
+        parameters=parameters,
+    )
+    text = write_curve(job.format_name, animation_curve(done), job.target)
+    with whole_text(job.out) as stream:
+        stream.write(text)
+    spoken_s = sum(one.end_s - one.start_s for one in stretches)
+    Console().print(
+        f"{spoken_s:.1f} s of speech in {len(stretches)} stretches; {len(done.blinks)} blinks in "
+        f"{duration_s:.1f} s, {done.left.size} frames at {job.fps:g} fps; wrote {job.out}"
+    )
+    if job.source is not None and not stretches:
+        Console(stderr=True).print(f"{job.source}: nobody speaks; the blinks are those of '{job.state}'")
+
+
+def animation_curve(done: Performance) -> AnimationCurve:
+    """Return a performance as the curve that the exports write, the lower lid in mm."""
+    return AnimationCurve(
+        done.fps,
+        np.round(done.left, 6),
+        np.round(done.right, 6),
+        np.round(LOWER_UP_MM * (done.left_lower_up + done.right_lower_up) / 2, 6),
+        np.round(LOWER_IN_MM * (done.left_lower_in + done.right_lower_in) / 2, 6),
+        tuple((blink.cause, round(blink.onset_s * done.fps, 4)) for blink in done.blinks),
+    )
+
+
+def _checked(job: PerformanceJob) -> StateName:
+    check_format(job.format_name, job.target)
+    if not 1 <= job.fps <= 1000:
+        raise InputError(f"expected --fps from 1 to 1000, got {job.fps:g}")
+    if job.rate is not None and not 0.1 <= job.rate <= 60:
+        raise InputError(f"expected --rate from 0.1 to 60 blinks a minute, got {job.rate:g}")
+    if job.duration_s is not None and not 0 < job.duration_s <= 86_400:
+        raise InputError(f"expected --duration from 0 to 86400 seconds, got {job.duration_s:g}")
+    if job.state not in get_args(StateName):
+        states = list(get_args(StateName))
+        raise InputError(
+            f"unknown --state '{job.state}'{did_you_mean(job.state, states)}; one of {', '.join(states)}"
+        )
+    check_targets([job.out], [job.source])
+    return cast(StateName, job.state)
+
+
+def _speech(job: PerformanceJob) -> tuple[list[Speech], float]:
+    if job.source is None:
+        return [], 0.0
+    if not job.source.is_file():
+        raise InputError(f"{job.source}: no such file; expected a recording with sound, or subtitles")
+    if job.source.suffix.lower() in SUFFIXES:
+        return speech_in_subtitles(job.source, job.speaker)
+    if job.speaker is not None:
+        raise InputError("--speaker is for subtitles with voices; a recording has nobody's name")
+    from stimuli_builder.performance.audio import speech_in_audio
+
+    return speech_in_audio(job.source)

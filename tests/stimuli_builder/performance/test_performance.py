@@ -1,0 +1,150 @@
+"""`stimuli performance`: speech from sound and subtitles, curves for programs, clear refusals."""
+
+import json
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from experiments.errors import InputError
+from stimuli_builder.cli import app
+from stimuli_builder.performance.audio import speech_in_audio
+from stimuli_builder.performance.run import PerformanceJob, write_performance
+from stimuli_builder.performance.speech import Speech, joined, speech_events, speech_states
+from stimuli_builder.performance.subtitles import speech_in_subtitles
+
+RATE_HZ = 16_000
+SUBTITLES = """WEBVTT
+
+00:00:06.000 --> 00:00:08.000
+<v Bob>And then?
+
+00:00:01.000 --> 00:00:02.500
+<v Anna>Well.
+
+00:00:02.900 --> 00:00:05.000
+<v Anna>It was late.
+"""
+
+
+def speech_like(*spoken: tuple[float, float], length_s: float) -> np.ndarray:
+    """Vowel-like sound (harmonics of 120 Hz, two formants, syllables at 5 Hz) in stretches, else faint noise."""
+    rng = np.random.default_rng(1)
+    time = np.arange(int(length_s * RATE_HZ)) / RATE_HZ
+    voice = sum(
+        np.sin(2 * np.pi * 120 * k * time)
+        * (np.exp(-(((120 * k - 650) / 300) ** 2)) + 0.4 * np.exp(-(((120 * k - 1200) / 400) ** 2)))
+        for k in range(1, 30)
+    )
+    envelope = np.zeros_like(time)
+    for start_s, end_s in spoken:
+        envelope[(time >= start_s) & (time < end_s)] = 1
+    sound = voice * envelope * (0.6 + 0.4 * np.sin(2 * np.pi * 5 * time)) * 3000 + rng.normal(
+        0, 15, time.size
+    )
+    return np.clip(sound, -32768, 32767).astype(np.int16)
+
+
+def write_wave(path: Path, samples: np.ndarray, rate_hz: int = RATE_HZ) -> Path:
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(rate_hz)
+        file.writeframes(samples.tobytes())
+    return path
+
+
+def test_speech_is_heard_where_it_is(tmp_path: Path) -> None:
+    path = write_wave(tmp_path / "speech.wav", speech_like((1.0, 3.0), (3.6, 5.0), (8.0, 9.5), length_s=11))
+    stretches, length_s = speech_in_audio(path)
+    assert length_s == pytest.approx(11.0, abs=0.01)
+    np.testing.assert_allclose(
+        [(one.start_s, one.end_s) for one in stretches], [(1.0, 3.0), (3.6, 5.0), (8.0, 9.5)], atol=0.25
+    )
+
+
+def test_silence_has_no_speech_and_the_blinks_of_the_state(tmp_path: Path) -> None:
+    path = write_wave(tmp_path / "silence.wav", np.zeros(RATE_HZ * 60, dtype=np.int16))
+    out = tmp_path / "out.json"
+    done = CliRunner().invoke(app, ["performance", str(path), "--out", str(out), "--format", "json"])
+    assert done.exit_code == 0, done.output
+    assert "nobody speaks" in done.output
+    assert len(json.loads(out.read_text())["closure_left"]) == 3600
+
+
+def test_subtitles_out_of_order_and_by_voice(tmp_path: Path) -> None:
+    path = tmp_path / "dialogue.vtt"
+    path.write_text(SUBTITLES, encoding="utf-8")
+    anna, length_s = speech_in_subtitles(path, "Anna")
+    assert (anna, length_s) == ([Speech(1.0, 2.5), Speech(2.9, 5.0)], 8.0)
+    assert len(speech_in_subtitles(path)[0]) == 3
+    with pytest.raises(InputError, match=r"nobody is called 'Ana'.*Anna.*voices: Anna, Bob"):
+        speech_in_subtitles(path, "Ana")
+
+
+def test_what_the_engine_is_told() -> None:
+    stretches = joined([Speech(3.0, 4.0), Speech(1.0, 2.0), Speech(2.05, 2.4), Speech(7.0, 8.0)])
+    assert stretches == [Speech(1.0, 2.4), Speech(3.0, 4.0), Speech(7.0, 8.0)]
+    assert [(event.kind, event.time_s) for event in speech_events(stretches)] == [
+        ("utterance_start", 1.0),
+        ("utterance_end", 2.4),
+        ("utterance_start", 3.0),
+        ("turn_end", 4.0),
+        ("utterance_start", 7.0),
+        ("turn_end", 8.0),
+    ]
+    states = [(change.state, change.time_s) for change in speech_states(stretches)]
+    assert states == [
+        ("listening", 0.0),
+        ("speaking", 1.0),
+        ("listening", 4.0),
+        ("speaking", 7.0),
+        ("listening", 8.0),
+    ]
+
+
+def test_blinks_gather_at_turn_ends(tmp_path: Path) -> None:
+    lines = ["WEBVTT", ""]
+    for k in range(100):
+        lines += [
+            f"{k // 10:02d}:{k % 10 * 6:02d}.000 --> {k // 10:02d}:{k % 10 * 6 + 3:02d}.000",
+            "words",
+            "",
+        ]
+    path, out = tmp_path / "talk.vtt", tmp_path / "talk.json"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    write_performance(PerformanceJob(out, path, "json", fps=30))
+    names = [blink["profile_id"] for blink in json.loads(out.read_text())["blinks"]]
+    assert 50 < names.count("turn_end") <= 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["nothing.wav"], "no such file"),
+        ([], "expected a recording, subtitles, or --duration"),
+        (["--duration", "5", "--fps", "0"], "expected --fps from 1 to 1000"),
+        (["--duration", "5", "--state", "readin"], "did you mean 'reading'"),
+        (["--duration", "5", "--format", "fbx"], "unknown --format 'fbx'"),
+        (["--duration", "5", "--rate", "0"], "expected --rate"),
+        (["--duration", "5", "--left", "a", "--right", "a"], "each eye needs a shape of its own"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], told: str) -> None:
+    out = tmp_path / "out.csv"
+    done = CliRunner().invoke(app, ["performance", *arguments, "--out", str(out)])
+    assert isinstance(done.exception, InputError)
+    assert told in str(done.exception)
+    assert not out.exists()
+
+
+def test_a_file_without_sound_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "text.wav"
+    path.write_text("no sound")
+    with pytest.raises(InputError, match="expected sound that can be read"):
+        speech_in_audio(path)
+    empty = write_wave(tmp_path / "empty.wav", np.zeros(0, dtype=np.int16))
+    with pytest.raises(InputError, match="expected sound"):
+        speech_in_audio(empty)
