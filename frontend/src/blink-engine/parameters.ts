@@ -3,7 +3,7 @@ import shipped from "../../../blink_engine/defaults.json";
 import { type Law, withMean } from "./laws";
 
 export type StateName = "rest" | "reading" | "screen" | "speaking" | "listening";
-export type ReactingKind = "utterance_start" | "utterance_end" | "pause" | "turn_end" | "gaze_shift" | "head_turn";
+type ReactingKind = "utterance_start" | "utterance_end" | "pause" | "turn_end" | "gaze_shift" | "head_turn";
 export type EventKind = ReactingKind | "blink";
 
 export const STATE_NAMES: readonly StateName[] = ["rest", "reading", "screen", "speaking", "listening"];

@@ -27,11 +27,7 @@ const HAPPENINGS: Happening[] = [
 
 describe("the engine", () => {
   it.each(vectors.performances)("gives Python's curves: $state, $parameters", ({ seed, state, parameters, left, right }) => {
-    const engine = new BlinkEngine({
-      seed,
-      state: state as StateName,
-      parameters: parameters === "lively" ? LIVELY : DEFAULT_PARAMETERS,
-    });
+    const engine = new BlinkEngine({ seed, state: state as StateName, parameters: parameters === "lively" ? LIVELY : DEFAULT_PARAMETERS });
     const pending = [...HAPPENINGS];
     let worst = 0;
     left.forEach((expected, k) => {

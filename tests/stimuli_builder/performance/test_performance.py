@@ -30,7 +30,7 @@ SUBTITLES = """WEBVTT
 
 
 def speech_like(*spoken: tuple[float, float], length_s: float) -> np.ndarray:
-    """Vowel-like sound (harmonics of 120 Hz, two formants, syllables at 5 Hz) in stretches, else faint noise."""
+    """Vowel-like sound (harmonics of 120 Hz, two formants, syllables at 5 Hz), elsewhere faint noise."""
     rng = np.random.default_rng(1)
     time = np.arange(int(length_s * RATE_HZ)) / RATE_HZ
     voice = sum(
