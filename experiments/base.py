@@ -24,4 +24,4 @@ IMPLIED = "implied"
 class Declaration(BaseModel):
     """A frozen piece of a declaration; unknown keys are refused by name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_serialization_defaults_required=True)

@@ -33,6 +33,7 @@ class Kind:
     view: the rows it exports.
     roles: the clips a trial shows, in the order of their places (`shown`; `left`, `right`).
     effects: what an edit of each key of the declaration does to stored answers, by path below [trial].
+    page: what of the declaration the participant's page is told. shown: makes it.
     assign: the trials of one participant in order, by declaration, seed and slot.
     example: a [trial] as TOML, for the reference; it is what a newcomer copies.
     """
@@ -42,6 +43,8 @@ class Kind:
     view: View
     roles: tuple[str, ...]
     effects: Mapping[str, Effect]
+    page: type[Declaration]
+    shown: "Callable[[Experiment], Declaration]"
     assign: "Callable[[Experiment, int, int], list[Trial]]"
     example: str
 

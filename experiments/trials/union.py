@@ -1,10 +1,11 @@
-"""The type of the TOML's [trial]: whichever kind of the registry its key `kind` names."""
+"""The type of the TOML's [trial], and of what a page is told of it: whichever kind its key `kind` names."""
 
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from experiments.base import Declaration
 from experiments.trials import KINDS
 from experiments.trials.kind import TrialDeclaration
 
@@ -26,3 +27,15 @@ def _with_kind(value: Any) -> Any:
 
 
 AnyTrial = Annotated[TrialDeclaration, ByKind()]
+
+
+class PageByKind:
+    """Annotation: a union over what the pages of the registered kinds are told, told apart by `kind`."""
+
+    def __get_pydantic_core_schema__(self, _source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """A tagged union of the page models."""
+        choices = {name: handler.generate_schema(kind.page) for name, kind in KINDS.items()}
+        return core_schema.tagged_union_schema(choices, discriminator="kind")
+
+
+AnyPage = Annotated[Declaration, PageByKind()]

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from experiments import design
 from experiments.assignment.trial import Trial
-from experiments.definition import Experiment
+from experiments.definition import Display, Experiment
 from experiments.errors import did_you_mean
 from experiments.trials import KINDS
 from server.clock import now
@@ -76,7 +76,19 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
         kind=link.kind,
         resumable=resumable,
         screens_devices=screens_devices(experiment),
-        gates=Gates.model_validate(experiment.display.model_dump(include=set(Gates.model_fields))),
+        gates=_gates(experiment.display),
+    )
+
+
+def _gates(display: Display) -> Gates:
+    return Gates(
+        minimum_width_px=display.minimum_width_px,
+        minimum_height_px=display.minimum_height_px,
+        allow_touch=display.allow_touch,
+        full_screen=display.full_screen,
+        calibrate=display.calibrate,
+        viewing_distance=display.viewing_distance,
+        inter_ocular_mm=display.inter_ocular_mm,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
+from experiments.trials import KINDS
 from server.clock import now
 from server.context import Services
 from server.db import insert_once
@@ -58,11 +59,11 @@ def run_state(services: Services, session: Session, token: str) -> RunState:
         synthetic=run.synthetic,
         language=run.language,
         languages=list(experiment.languages),
-        texts=experiment.texts[run.language].model_dump(),
-        forms=[form.model_dump(mode="json") for form in experiment.forms],
-        trial=experiment.trial.model_dump(mode="json"),
-        display=experiment.display.model_dump(mode="json"),
-        playback=experiment.playback.model_dump(mode="json"),
+        texts=experiment.texts[run.language],
+        forms=experiment.forms,
+        trial=KINDS[experiment.trial.kind].shown(experiment),
+        display=experiment.display,
+        playback=experiment.playback,
         break_seconds_min=experiment.blocks.break_seconds_min,
         consented_at=run.consented_at,
         calibration=CalibrationState.model_validate(calibration, from_attributes=True)

@@ -6,6 +6,10 @@ from uuid import UUID
 
 from pydantic import BaseModel, Field, StringConstraints
 
+from experiments.definition import Display, Texts
+from experiments.forms import Form
+from experiments.rules import PlaybackRules
+from experiments.trials.union import AnyPage
 from server.models import STAGES
 
 Stage = Literal[
@@ -135,11 +139,11 @@ class RunState(BaseModel):
     synthetic: bool
     language: str
     languages: list[str]
-    texts: dict[str, str] = Field(description="Markdown of the run's language, by page.")
-    forms: list[dict[str, Any]] = Field(description="Declared forms, as in experiments/forms.py.")
-    trial: dict[str, Any] = Field(description="The declared trial: scale, views, start, confirm, comment.")
-    display: dict[str, Any]
-    playback: dict[str, Any] = Field(description="The declared playback rules.")
+    texts: Texts = Field(description="Markdown of the run's language, by page.")
+    forms: tuple[Form, ...]
+    trial: AnyPage
+    display: Display
+    playback: PlaybackRules
     break_seconds_min: int
     consented_at: datetime | None
     calibration: CalibrationState | None

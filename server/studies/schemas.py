@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from experiments.definition import Experiment
 from server.participants.recruiter import Recruiter
 
 StudyName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
@@ -214,7 +215,7 @@ class StudyDetail(BaseModel):
 
     summary: StudySummary
     design: DesignOut
-    definition: dict[str, Any]
+    definition: Experiment
     toml: str
     definition_sha256: str
     versions: list[VersionOut]

@@ -267,10 +267,11 @@ def detail(session: Session, name: str) -> StudyDetail:
     """A study with its declaration and versions."""
     study = find_study(session, name)
     version = active_version(session, study)
+    experiment = load_stored(version.definition)
     return StudyDetail(
         summary=summary(study, _counts(session)),
-        design=design_out(load_stored(version.definition)),
-        definition=version.definition,
+        design=design_out(experiment),
+        definition=experiment,
         toml=version.definition_toml,
         definition_sha256=version.definition_sha256,
         versions=[_version_out(row, number) for row, number in _versions(session, study)],

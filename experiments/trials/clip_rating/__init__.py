@@ -4,6 +4,7 @@ from experiments.schema.effects import Effect
 from experiments.trials.clip_rating.answer import RatingAnswer
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import ClipRating
+from experiments.trials.clip_rating.page import ShownClipRating, shown
 from experiments.trials.clip_rating.plan import assign
 from experiments.trials.kind import Kind
 
@@ -38,6 +39,8 @@ CLIP_RATING = Kind(
     view=RATINGS,
     roles=("shown",),
     effects=EFFECTS,
+    page=ShownClipRating,
+    shown=shown,
     assign=assign,
     example=EXAMPLE,
 )

@@ -1336,6 +1336,55 @@ export interface components {
             created_at: string;
         };
         /**
+         * AnalysisPlan
+         * @description The analysis fixed before the data: factor order, the test of the table, and the pairs.
+         */
+        AnalysisPlan: {
+            /**
+             * Kind
+             * @default within_anova
+             * @constant
+             */
+            kind: "within_anova";
+            /**
+             * Factors
+             * @default []
+             */
+            factors: string[];
+            /**
+             * Statistic
+             * @default multivariate
+             * @enum {string}
+             */
+            statistic: "multivariate" | "univariate";
+            /**
+             * Pairs
+             * @default []
+             */
+            pairs: string[];
+            /**
+             * Table
+             * @default two_level_factors
+             * @enum {string}
+             */
+            table: "two_level_factors" | "pairs_and_interactions" | "one_factor";
+        };
+        /**
+         * AttentionChecks
+         * @description Instructed ratings put between trials: 'please answer 2 this time'.
+         */
+        AttentionChecks: {
+            /**
+             * Per Block
+             * @default 0
+             */
+            per_block: number;
+            /** Text */
+            text: {
+                [key: string]: string;
+            };
+        };
+        /**
          * AuditOut
          * @description One line of the audit log.
          */
@@ -1393,6 +1442,41 @@ export interface components {
             label: string;
             /** Trials */
             trials: number;
+        };
+        /**
+         * Blocks
+         * @description How a participant's trials are cut into blocks.
+         *
+         *     `split_by` puts each level of a factor into a block of its own; without it a block holds every clip.
+         *     `repeats` shows each such block that often. `order` is drawn per participant: `random` shuffles the
+         *     blocks, `alternating` cycles through the levels from a random (or counterbalanced) start,
+         *     `counterbalanced` deals block orders evenly over participants, `fixed` keeps the declared order.
+         */
+        Blocks: {
+            /** Split By */
+            split_by: string | null;
+            /**
+             * Repeats
+             * @default 1
+             */
+            repeats: number;
+            /**
+             * Order
+             * @default random
+             * @enum {string}
+             */
+            order: "random" | "alternating" | "counterbalanced" | "fixed";
+            /**
+             * Trial Order
+             * @default random
+             * @enum {string}
+             */
+            trial_order: "random" | "fixed";
+            /**
+             * Break Seconds Min
+             * @default 0
+             */
+            break_seconds_min: number;
         };
         /** Body_upload_clips */
         Body_upload_clips: {
@@ -1549,6 +1633,34 @@ export interface components {
             design: components["schemas"]["DesignOut"] | null;
         };
         /**
+         * ChoiceField
+         * @description One of several answers.
+         */
+        ChoiceField: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+            /** Help */
+            help: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Required
+             * @default false
+             */
+            required: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "choice";
+            /** Options */
+            options: components["schemas"]["Option"][];
+        };
+        /**
          * ClipOut
          * @description A clip of a study, with the curve it shows.
          */
@@ -1581,6 +1693,49 @@ export interface components {
             bytes: number;
             /** Closure */
             closure: number[];
+        };
+        /**
+         * ClipRating
+         * @description The single-clip rating: start by key, one view (or `views`), answer after the clip's end.
+         */
+        ClipRating: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "clip_rating";
+            /**
+             * Expected Seconds
+             * @default 6
+             */
+            expected_seconds: number;
+            scale: components["schemas"]["Scale"];
+            /**
+             * Views
+             * @default 1
+             */
+            views: number;
+            /**
+             * Start
+             * @default key
+             * @enum {string}
+             */
+            start: "key" | "fixation";
+            /**
+             * Fixation Ms
+             * @default 500
+             */
+            fixation_ms: number;
+            /**
+             * Confirm
+             * @default false
+             */
+            confirm: boolean;
+            /**
+             * Comment
+             * @default false
+             */
+            comment: boolean;
         };
         /**
          * ClipResult
@@ -1645,6 +1800,11 @@ export interface components {
             agreed: boolean;
         };
         /**
+         * Declaration
+         * @description A frozen piece of a declaration; unknown keys are refused by name.
+         */
+        Declaration: Record<string, never>;
+        /**
          * DefinitionText
          * @description A definition to check.
          */
@@ -1675,6 +1835,80 @@ export interface components {
             blocks: components["schemas"]["BlockOut"][];
             /** Expected Minutes */
             expected_minutes: number;
+        };
+        /**
+         * Display
+         * @description How the clip must appear: size on the screen, surround, and what the device must offer.
+         */
+        Display: {
+            /**
+             * Inter Ocular Mm
+             * @default 60
+             */
+            inter_ocular_mm: number;
+            /**
+             * Calibrate
+             * @default required
+             * @enum {string}
+             */
+            calibrate: "required" | "optional" | "off";
+            /**
+             * Viewing Distance
+             * @default false
+             */
+            viewing_distance: boolean;
+            /**
+             * Full Screen
+             * @default true
+             */
+            full_screen: boolean;
+            /**
+             * Background
+             * @default #808080
+             */
+            background: string;
+            /**
+             * Minimum Width Px
+             * @default 800
+             */
+            minimum_width_px: number;
+            /**
+             * Minimum Height Px
+             * @default 500
+             */
+            minimum_height_px: number;
+            /**
+             * Allow Touch
+             * @default true
+             */
+            allow_touch: boolean;
+        };
+        /**
+         * DropFailedPlays
+         * @description Leave out trials whose clip was not shown as declared (verdict failed).
+         */
+        DropFailedPlays: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "failed_plays";
+        };
+        /**
+         * DropSlowTrials
+         * @description Leave out trials answered later than `above_ms` after the clip's end.
+         */
+        DropSlowTrials: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "slow_trials";
+            /**
+             * Above Ms
+             * @default 60000
+             */
+            above_ms: number;
         };
         /**
          * Erase
@@ -1750,6 +1984,252 @@ export interface components {
             reason: string;
         };
         /**
+         * ExcludeAttention
+         * @description Leave out participants who failed more than `more_than` attention checks.
+         */
+        ExcludeAttention: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "attention_checks_failed";
+            /**
+             * More Than
+             * @default 0
+             */
+            more_than: number;
+        };
+        /**
+         * ExcludeFast
+         * @description Leave out participants whose median response time lies below `below_ms`.
+         */
+        ExcludeFast: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "median_response_time";
+            /**
+             * Below Ms
+             * @default 200
+             */
+            below_ms: number;
+        };
+        /**
+         * ExcludeIncomplete
+         * @description Leave out participants who did not finish the run.
+         */
+        ExcludeIncomplete: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "incomplete";
+        };
+        /**
+         * ExcludePlayback
+         * @description Leave out participants with more than this share of plays that were not good.
+         */
+        ExcludePlayback: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "poor_playback_share";
+            /**
+             * More Than
+             * @default 0.2
+             */
+            more_than: number;
+        };
+        /**
+         * ExcludeStraightLining
+         * @description Leave out participants who gave one and the same answer in more than this share of trials.
+         */
+        ExcludeStraightLining: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "same_response_share";
+            /**
+             * More Than
+             * @default 0.95
+             */
+            more_than: number;
+        };
+        /**
+         * Exemplars
+         * @description How many clips a cell has, and which factors bring exemplars of their own.
+         *
+         *     Exemplar 3 of two cells shows the same blink unless the cells differ in a factor named in `own_per`.
+         */
+        Exemplars: {
+            /** Per Cell */
+            per_cell: number;
+            /**
+             * Own Per
+             * @default []
+             */
+            own_per: string[];
+            /**
+             * Seed
+             * @default 2011
+             */
+            seed: number;
+        };
+        /**
+         * Experiment
+         * @description A factorial clip-rating study, complete: this is what an `expN.toml` declares.
+         */
+        Experiment: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
+            /**
+             * Version
+             * @default 1
+             */
+            version: number;
+            /**
+             * Source
+             * @default
+             */
+            source: string;
+            /**
+             * Participants
+             * @default 20
+             */
+            participants: number;
+            /**
+             * Languages
+             * @default [
+             *       "en"
+             *     ]
+             */
+            languages: string[];
+            /** Factors */
+            factors: components["schemas"]["Factor"][];
+            /**
+             * @default {
+             *       "character": "photorealistic",
+             *       "profile": "real",
+             *       "amplitude": "full",
+             *       "motion_blur": true,
+             *       "lower_lid": "none",
+             *       "eyes": "alike",
+             *       "fps": 30,
+             *       "width_px": 960,
+             *       "height_px": 360
+             *     }
+             */
+            render: components["schemas"]["RenderSettings"];
+            exemplars: components["schemas"]["Exemplars"];
+            /**
+             * @default {
+             *       "repeats": 1,
+             *       "order": "random",
+             *       "trial_order": "random",
+             *       "break_seconds_min": 0
+             *     }
+             */
+            blocks: components["schemas"]["Blocks"];
+            /**
+             * @default {
+             *       "trials": 4
+             *     }
+             */
+            practice: components["schemas"]["Practice"];
+            /** Trial */
+            trial: components["schemas"]["ClipRating"];
+            /**
+             * @default {
+             *       "inter_ocular_mm": 60,
+             *       "calibrate": "required",
+             *       "viewing_distance": false,
+             *       "full_screen": true,
+             *       "background": "#808080",
+             *       "minimum_width_px": 800,
+             *       "minimum_height_px": 500,
+             *       "allow_touch": true
+             *     }
+             */
+            display: components["schemas"]["Display"];
+            /**
+             * @default {
+             *       "resume": "resume",
+             *       "maximum_age_hours": 72,
+             *       "lease_minutes": 120
+             *     }
+             */
+            session: components["schemas"]["Session"];
+            /**
+             * @default {
+             *       "flagged_missing_frames": 0,
+             *       "failed_missing_frames": 3,
+             *       "flagged_late_frames": 2,
+             *       "flagged_longest_gap_ms": 70,
+             *       "failed_longest_gap_ms": 250,
+             *       "fail_on_focus_lost": true,
+             *       "flag_video_fallback": true,
+             *       "max_repeats": 1
+             *     }
+             */
+            playback: components["schemas"]["PlaybackRules"];
+            /**
+             * @default {
+             *       "per_block": 0,
+             *       "text": {
+             *         "de": "Aufmerksamkeitsprüfung: Bitte antworten Sie hier mit **{response}**.",
+             *         "en": "Attention check: please answer **{response}** on this screen."
+             *       }
+             *     }
+             */
+            attention: components["schemas"]["AttentionChecks"];
+            /**
+             * Screening
+             * @default []
+             */
+            screening: (components["schemas"]["ScreenFormAnswer"] | components["schemas"]["ScreenAttention"] | components["schemas"]["ScreenDevice"])[];
+            /**
+             * Exclusions
+             * @default []
+             */
+            exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"])[];
+            /**
+             * Forms
+             * @default []
+             */
+            forms: components["schemas"]["Form"][];
+            /** Texts */
+            texts: {
+                [key: string]: components["schemas"]["Texts"];
+            };
+            /**
+             * @default {
+             *       "kind": "within_anova",
+             *       "factors": [],
+             *       "statistic": "multivariate",
+             *       "pairs": [],
+             *       "table": "two_level_factors"
+             *     }
+             */
+            analysis: components["schemas"]["AnalysisPlan"];
+        };
+        /**
+         * Factor
+         * @description A within-participant factor.
+         */
+        Factor: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: string;
+            /** Levels */
+            levels: components["schemas"]["Level"][];
+        };
+        /**
          * FactorOut
          * @description A factor and its levels.
          */
@@ -1760,6 +2240,26 @@ export interface components {
             label: string;
             /** Levels */
             levels: components["schemas"]["LevelOut"][];
+        };
+        /**
+         * Form
+         * @description One page of questions, shown before the first or after the last block.
+         */
+        Form: {
+            /** Name */
+            name: string;
+            /**
+             * When
+             * @default before
+             * @enum {string}
+             */
+            when: "before" | "after";
+            /** Title */
+            title: {
+                [key: string]: string;
+            };
+            /** Fields */
+            fields: (components["schemas"]["TextField"] | components["schemas"]["NumberField"] | components["schemas"]["ChoiceField"] | components["schemas"]["MultipleChoiceField"] | components["schemas"]["LikertField"])[];
         };
         /**
          * FormAnswers
@@ -1862,6 +2362,18 @@ export interface components {
             language: string;
         };
         /**
+         * Level
+         * @description One level of a within factor, with the label that participants never see but tables show.
+         */
+        Level: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: string;
+            /** @default {} */
+            render: components["schemas"]["RenderOverrides"];
+        };
+        /**
          * LevelOut
          * @description A level of a factor.
          */
@@ -1886,6 +2398,45 @@ export interface components {
         LevelsTable: {
             /** Csv */
             csv: string;
+        };
+        /**
+         * LikertField
+         * @description A rating from 1 to `points` with labelled ends.
+         */
+        LikertField: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+            /** Help */
+            help: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Required
+             * @default false
+             */
+            required: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "likert";
+            /**
+             * Points
+             * @default 7
+             */
+            points: number;
+            /** Low */
+            low: {
+                [key: string]: string;
+            };
+            /** High */
+            high: {
+                [key: string]: string;
+            };
         };
         /**
          * LinkOut
@@ -2106,6 +2657,34 @@ export interface components {
             heat: string;
         };
         /**
+         * MultipleChoiceField
+         * @description Any of several answers.
+         */
+        MultipleChoiceField: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+            /** Help */
+            help: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Required
+             * @default false
+             */
+            required: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "multiple_choice";
+            /** Options */
+            options: components["schemas"]["Option"][];
+        };
+        /**
          * NewAccount
          * @description The account an invited person makes.
          */
@@ -2280,6 +2859,54 @@ export interface components {
             note?: string;
         };
         /**
+         * NumberField
+         * @description A whole number within limits, such as an age in years.
+         */
+        NumberField: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+            /** Help */
+            help: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Required
+             * @default false
+             */
+            required: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "number";
+            /**
+             * Minimum
+             * @default 0
+             */
+            minimum: number;
+            /**
+             * Maximum
+             * @default 1000000
+             */
+            maximum: number;
+        };
+        /**
+         * Option
+         * @description One answer of a choice field; `value` is what is stored.
+         */
+        Option: {
+            /** Value */
+            value: string;
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+        };
+        /**
          * OwnClips
          * @description What to ask about one's own clips, where no definition is given.
          */
@@ -2366,6 +2993,66 @@ export interface components {
                 number,
                 number
             ][] | null;
+        };
+        /**
+         * PlaybackRules
+         * @description When a play is flagged or failed. Counts are frames of the clip, times are milliseconds.
+         *
+         *     A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
+         *     breaking a `flagged_*` limit is flagged, any other is good.
+         */
+        PlaybackRules: {
+            /**
+             * Flagged Missing Frames
+             * @default 0
+             */
+            flagged_missing_frames: number;
+            /**
+             * Failed Missing Frames
+             * @default 3
+             */
+            failed_missing_frames: number;
+            /**
+             * Flagged Late Frames
+             * @default 2
+             */
+            flagged_late_frames: number;
+            /**
+             * Flagged Longest Gap Ms
+             * @default 70
+             */
+            flagged_longest_gap_ms: number;
+            /**
+             * Failed Longest Gap Ms
+             * @default 250
+             */
+            failed_longest_gap_ms: number;
+            /**
+             * Fail On Focus Lost
+             * @default true
+             */
+            fail_on_focus_lost: boolean;
+            /**
+             * Flag Video Fallback
+             * @default true
+             */
+            flag_video_fallback: boolean;
+            /**
+             * Max Repeats
+             * @default 1
+             */
+            max_repeats: number;
+        };
+        /**
+         * Practice
+         * @description Practice trials before the first block; their clips are drawn over all cells by the run's seed.
+         */
+        Practice: {
+            /**
+             * Trials
+             * @default 4
+             */
+            trials: number;
         };
         /**
          * ProblemOut
@@ -2560,6 +3247,95 @@ export interface components {
             code_screened_out?: string;
         };
         /**
+         * RenderOverrides
+         * @description What one level changes of the experiment's `RenderSettings`; None leaves it as it is.
+         */
+        RenderOverrides: {
+            /** Character */
+            character: string | null;
+            /** Profile */
+            profile: string | null;
+            /** Duration Frames */
+            duration_frames: number | null;
+            /** Amplitude */
+            amplitude: ("full" | "natural") | null;
+            /** Motion Blur */
+            motion_blur: boolean | null;
+            /** Lower Lid */
+            lower_lid: ("both" | "vertical" | "horizontal" | "none") | null;
+            /** Eyes */
+            eyes: ("alike" | "separate") | null;
+            /** Fps */
+            fps: number | null;
+        };
+        /**
+         * RenderSettings
+         * @description Everything the clip builder needs for one cell.
+         *
+         *     Attributes
+         *     ----------
+         *     character: a shipped character (`photorealistic`, `cartoon`) or a character folder.
+         *     profile: one of `PROFILES`, or a CSV file of closure samples (0 open, 1 closed).
+         *     duration_frames: blink length in frames at 30 fps; None keeps the recorded length.
+         *     amplitude: `full` (FC) reaches closure 1, `natural` (NC) keeps the measured closure.
+         *     motion_blur: mean of the 300 fps samples of one output frame in linear light (MB), or one sample (NB).
+         *     lower_lid: which lower-lid signals move: both, vertical, horizontal or none.
+         *     eyes: `alike` drives both eyes by one signal, `separate` by the left and right recording.
+         *     fps: frame rate of the clip. width_px, height_px: picture size.
+         */
+        RenderSettings: {
+            /**
+             * Character
+             * @default photorealistic
+             */
+            character: string;
+            /**
+             * Profile
+             * @default real
+             */
+            profile: string;
+            /** Duration Frames */
+            duration_frames: number | null;
+            /**
+             * Amplitude
+             * @default full
+             * @enum {string}
+             */
+            amplitude: "full" | "natural";
+            /**
+             * Motion Blur
+             * @default true
+             */
+            motion_blur: boolean;
+            /**
+             * Lower Lid
+             * @default none
+             * @enum {string}
+             */
+            lower_lid: "both" | "vertical" | "horizontal" | "none";
+            /**
+             * Eyes
+             * @default alike
+             * @enum {string}
+             */
+            eyes: "alike" | "separate";
+            /**
+             * Fps
+             * @default 30
+             */
+            fps: number;
+            /**
+             * Width Px
+             * @default 960
+             */
+            width_px: number;
+            /**
+             * Height Px
+             * @default 360
+             */
+            height_px: number;
+        };
+        /**
          * ReportOut
          * @description A report that waits, runs, is done or has failed (then `message` says why).
          */
@@ -2693,38 +3469,14 @@ export interface components {
             language: string;
             /** Languages */
             languages: string[];
-            /**
-             * Texts
-             * @description Markdown of the run's language, by page.
-             */
-            texts: {
-                [key: string]: string;
-            };
-            /**
-             * Forms
-             * @description Declared forms, as in experiments/forms.py.
-             */
-            forms: {
-                [key: string]: unknown;
-            }[];
-            /**
-             * Trial
-             * @description The declared trial: scale, views, start, confirm, comment.
-             */
-            trial: {
-                [key: string]: unknown;
-            };
-            /** Display */
-            display: {
-                [key: string]: unknown;
-            };
-            /**
-             * Playback
-             * @description The declared playback rules.
-             */
-            playback: {
-                [key: string]: unknown;
-            };
+            /** @description Markdown of the run's language, by page. */
+            texts: components["schemas"]["Texts"];
+            /** Forms */
+            forms: components["schemas"]["Form"][];
+            /** Trial */
+            trial: components["schemas"]["ShownClipRating"];
+            display: components["schemas"]["Display"];
+            playback: components["schemas"]["PlaybackRules"];
             /** Break Seconds Min */
             break_seconds_min: number;
             /** Consented At */
@@ -2829,6 +3581,89 @@ export interface components {
             status: "active" | "complete" | "screened_out" | "withdrawn";
         };
         /**
+         * Scale
+         * @description The rating scale: whole numbers from `minimum` to `maximum` with labelled ends.
+         */
+        Scale: {
+            /**
+             * Minimum
+             * @default 1
+             */
+            minimum: number;
+            /**
+             * Maximum
+             * @default 7
+             */
+            maximum: number;
+            /** Question */
+            question: {
+                [key: string]: string;
+            };
+            /** Low */
+            low: {
+                [key: string]: string;
+            };
+            /** High */
+            high: {
+                [key: string]: string;
+            };
+        };
+        /**
+         * ScreenAttention
+         * @description Screen out as soon as more than `more_than` attention checks were answered otherwise than asked.
+         */
+        ScreenAttention: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "attention_checks_failed";
+            /**
+             * More Than
+             * @default 0
+             */
+            more_than: number;
+        };
+        /**
+         * ScreenDevice
+         * @description Screen out where browser, screen or window cannot show the clips as [display] asks.
+         *
+         *     Without this rule the page explains what is missing, and the link stays open for another device.
+         */
+        ScreenDevice: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "device";
+        };
+        /**
+         * ScreenFormAnswer
+         * @description Screen out by an answer: one of `refused`, or a number under `below` or over `above`.
+         *
+         *     The run ends as soon as the form is sent. A question left open screens nobody out: make it required.
+         */
+        ScreenFormAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            rule: "form_answer";
+            /** Form */
+            form: string;
+            /** Field */
+            field: string;
+            /**
+             * Refused
+             * @default []
+             */
+            refused: string[];
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+        };
+        /**
          * ScreenOut
          * @description Why the browser or the screen will not do.
          */
@@ -2851,6 +3686,28 @@ export interface components {
             uri: string;
             /** Qr Svg */
             qr_svg: string;
+        };
+        /**
+         * Session
+         * @description What happens when a participant comes back.
+         */
+        Session: {
+            /**
+             * Resume
+             * @default resume
+             * @enum {string}
+             */
+            resume: "resume" | "restart" | "block";
+            /**
+             * Maximum Age Hours
+             * @default 72
+             */
+            maximum_age_hours: number;
+            /**
+             * Lease Minutes
+             * @default 120
+             */
+            lease_minutes: number;
         };
         /**
          * SessionOut
@@ -2895,6 +3752,33 @@ export interface components {
              * @description True where `stimuli build` has made its clips on this server.
              */
             clips_ready: boolean;
+        };
+        /**
+         * ShownClipRating
+         * @description The declared single-clip rating as the page gets it.
+         */
+        ShownClipRating: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "clip_rating";
+            scale: components["schemas"]["Scale"];
+            /** Views */
+            views: number;
+            /**
+             * Start
+             * @enum {string}
+             */
+            start: "key" | "fixation";
+            /** Fixation Ms */
+            fixation_ms: number;
+            /** Confirm */
+            confirm: boolean;
+            /** Comment */
+            comment: boolean;
+            /** Expected Seconds */
+            expected_seconds: number;
         };
         /**
          * SignIn
@@ -2946,10 +3830,7 @@ export interface components {
         StudyDetail: {
             summary: components["schemas"]["StudySummary"];
             design: components["schemas"]["DesignOut"];
-            /** Definition */
-            definition: {
-                [key: string]: unknown;
-            };
+            definition: components["schemas"]["Experiment"];
             /** Toml */
             toml: string;
             /** Definition Sha256 */
@@ -2992,6 +3873,64 @@ export interface components {
              * Format: date-time
              */
             created_at: string;
+        };
+        /**
+         * TextField
+         * @description Free text.
+         */
+        TextField: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+            /** Help */
+            help: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Required
+             * @default false
+             */
+            required: boolean;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "text";
+            /**
+             * Max Length
+             * @default 500
+             */
+            max_length: number;
+        };
+        /**
+         * Texts
+         * @description The pages of one language, in Markdown. `screened_out` stands in for a few words of the page's own.
+         */
+        Texts: {
+            /** Consent */
+            consent: string;
+            /** Instructions */
+            instructions: string;
+            /** Debrief */
+            debrief: string;
+            /**
+             * Practice
+             * @default
+             */
+            practice: string;
+            /**
+             * Block Break
+             * @default
+             */
+            block_break: string;
+            /**
+             * Screened Out
+             * @default
+             */
+            screened_out: string;
         };
         /**
          * TimeBin
@@ -3158,6 +4097,19 @@ export interface components {
             expires_at: string | null;
         };
         /**
+         * TrialDeclaration
+         * @description What every kind declares; each adds its own keys, and a constant as its `kind`.
+         */
+        TrialDeclaration: {
+            /** Kind */
+            kind: string;
+            /**
+             * Expected Seconds
+             * @default 6
+             */
+            expected_seconds: number;
+        };
+        /**
          * TrialInfo
          * @description One trial as the page needs it; nothing tells the participant which cell it is.
          */
@@ -3287,6 +4239,140 @@ export interface components {
     headers: never;
     pathItems: never;
 }
+export type AccountOut = components['schemas']['AccountOut'];
+export type AnalysisPlan = components['schemas']['AnalysisPlan'];
+export type AttentionChecks = components['schemas']['AttentionChecks'];
+export type AuditOut = components['schemas']['AuditOut'];
+export type BlinkLibrary = components['schemas']['BlinkLibrary'];
+export type BlockInfo = components['schemas']['BlockInfo'];
+export type BlockOut = components['schemas']['BlockOut'];
+export type Blocks = components['schemas']['Blocks'];
+export type BodyUploadClips = components['schemas']['Body_upload_clips'];
+export type CalibrationResult = components['schemas']['CalibrationResult'];
+export type CalibrationState = components['schemas']['CalibrationState'];
+export type CellResult = components['schemas']['CellResult'];
+export type ChangeAccount = components['schemas']['ChangeAccount'];
+export type ChangePassword = components['schemas']['ChangePassword'];
+export type ChangeSettings = components['schemas']['ChangeSettings'];
+export type ChangeStatus = components['schemas']['ChangeStatus'];
+export type ChangeTexts = components['schemas']['ChangeTexts'];
+export type Checked = components['schemas']['Checked'];
+export type ChoiceField = components['schemas']['ChoiceField'];
+export type ClipOut = components['schemas']['ClipOut'];
+export type ClipRating = components['schemas']['ClipRating'];
+export type ClipResult = components['schemas']['ClipResult'];
+export type Completion = components['schemas']['Completion'];
+export type ConfirmCode = components['schemas']['ConfirmCode'];
+export type ConfirmPassword = components['schemas']['ConfirmPassword'];
+export type Consent = components['schemas']['Consent'];
+export type Declaration = components['schemas']['Declaration'];
+export type DefinitionText = components['schemas']['DefinitionText'];
+export type DesignOut = components['schemas']['DesignOut'];
+export type Display = components['schemas']['Display'];
+export type DropFailedPlays = components['schemas']['DropFailedPlays'];
+export type DropSlowTrials = components['schemas']['DropSlowTrials'];
+export type Erase = components['schemas']['Erase'];
+export type ErrorBody = components['schemas']['ErrorBody'];
+export type ErrorDetail = components['schemas']['ErrorDetail'];
+export type Event = components['schemas']['Event'];
+export type Events = components['schemas']['Events'];
+export type Exclude = components['schemas']['Exclude'];
+export type ExcludeAttention = components['schemas']['ExcludeAttention'];
+export type ExcludeFast = components['schemas']['ExcludeFast'];
+export type ExcludeIncomplete = components['schemas']['ExcludeIncomplete'];
+export type ExcludePlayback = components['schemas']['ExcludePlayback'];
+export type ExcludeStraightLining = components['schemas']['ExcludeStraightLining'];
+export type Exemplars = components['schemas']['Exemplars'];
+export type Experiment = components['schemas']['Experiment'];
+export type Factor = components['schemas']['Factor'];
+export type FactorOut = components['schemas']['FactorOut'];
+export type Form = components['schemas']['Form'];
+export type FormAnswers = components['schemas']['FormAnswers'];
+export type FunnelStep = components['schemas']['FunnelStep'];
+export type Gates = components['schemas']['Gates'];
+export type Health = components['schemas']['Health'];
+export type InvitationOut = components['schemas']['InvitationOut'];
+export type InvitationState = components['schemas']['InvitationState'];
+export type LanguageChange = components['schemas']['LanguageChange'];
+export type Level = components['schemas']['Level'];
+export type LevelOut = components['schemas']['LevelOut'];
+export type LevelsPattern = components['schemas']['LevelsPattern'];
+export type LevelsTable = components['schemas']['LevelsTable'];
+export type LikertField = components['schemas']['LikertField'];
+export type LinkOut = components['schemas']['LinkOut'];
+export type LinkPage = components['schemas']['LinkPage'];
+export type LinkState = components['schemas']['LinkState'];
+export type LinkedStudy = components['schemas']['LinkedStudy'];
+export type Margin = components['schemas']['Margin'];
+export type Me = components['schemas']['Me'];
+export type Mean = components['schemas']['Mean'];
+export type MonitorSnapshot = components['schemas']['MonitorSnapshot'];
+export type MonitoredRun = components['schemas']['MonitoredRun'];
+export type MultipleChoiceField = components['schemas']['MultipleChoiceField'];
+export type NewAccount = components['schemas']['NewAccount'];
+export type NewInvitation = components['schemas']['NewInvitation'];
+export type NewInvitationOut = components['schemas']['NewInvitationOut'];
+export type NewLinks = components['schemas']['NewLinks'];
+export type NewReport = components['schemas']['NewReport'];
+export type NewStudy = components['schemas']['NewStudy'];
+export type NewToken = components['schemas']['NewToken'];
+export type NewTokenOut = components['schemas']['NewTokenOut'];
+export type NewVersion = components['schemas']['NewVersion'];
+export type NumberField = components['schemas']['NumberField'];
+export type Option = components['schemas']['Option'];
+export type OwnClips = components['schemas']['OwnClips'];
+export type Playback = components['schemas']['Playback'];
+export type PlaybackLog = components['schemas']['PlaybackLog'];
+export type PlaybackRules = components['schemas']['PlaybackRules'];
+export type Practice = components['schemas']['Practice'];
+export type ProblemOut = components['schemas']['ProblemOut'];
+export type RatingIn = components['schemas']['RatingIn'];
+export type RatingSaved = components['schemas']['RatingSaved'];
+export type Receipt = components['schemas']['Receipt'];
+export type Received = components['schemas']['Received'];
+export type RecordedProfile = components['schemas']['RecordedProfile'];
+export type RecoveryCodes = components['schemas']['RecoveryCodes'];
+export type Recruiter = components['schemas']['Recruiter'];
+export type RenderOverrides = components['schemas']['RenderOverrides'];
+export type RenderSettings = components['schemas']['RenderSettings'];
+export type ReportOut = components['schemas']['ReportOut'];
+export type Results = components['schemas']['Results'];
+export type RunPage = components['schemas']['RunPage'];
+export type RunStart = components['schemas']['RunStart'];
+export type RunStarted = components['schemas']['RunStarted'];
+export type RunState = components['schemas']['RunState'];
+export type RunSummary = components['schemas']['RunSummary'];
+export type Saved = components['schemas']['Saved'];
+export type Scale = components['schemas']['Scale'];
+export type ScreenAttention = components['schemas']['ScreenAttention'];
+export type ScreenDevice = components['schemas']['ScreenDevice'];
+export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
+export type ScreenOut = components['schemas']['ScreenOut'];
+export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
+export type Session = components['schemas']['Session'];
+export type SessionOut = components['schemas']['SessionOut'];
+export type ShippedExperiment = components['schemas']['ShippedExperiment'];
+export type ShownClipRating = components['schemas']['ShownClipRating'];
+export type SignIn = components['schemas']['SignIn'];
+export type StageChange = components['schemas']['StageChange'];
+export type Strips = components['schemas']['Strips'];
+export type StudyDetail = components['schemas']['StudyDetail'];
+export type StudySummary = components['schemas']['StudySummary'];
+export type TextField = components['schemas']['TextField'];
+export type Texts = components['schemas']['Texts'];
+export type TimeBin = components['schemas']['TimeBin'];
+export type Timeline = components['schemas']['Timeline'];
+export type TimelineCalibration = components['schemas']['TimelineCalibration'];
+export type TimelineEvent = components['schemas']['TimelineEvent'];
+export type TimelineForm = components['schemas']['TimelineForm'];
+export type TimelineTrial = components['schemas']['TimelineTrial'];
+export type TokenOut = components['schemas']['TokenOut'];
+export type TrialDeclaration = components['schemas']['TrialDeclaration'];
+export type TrialInfo = components['schemas']['TrialInfo'];
+export type Unsupported = components['schemas']['Unsupported'];
+export type UploadOut = components['schemas']['UploadOut'];
+export type UploadedFile = components['schemas']['UploadedFile'];
+export type VersionOut = components['schemas']['VersionOut'];
 export type $defs = Record<string, never>;
 export interface operations {
     healthz: {

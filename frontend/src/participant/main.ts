@@ -1,7 +1,7 @@
 /** Where the participant's page begins: link, gates, one tab, the run, its timeline. */
 import "./style/index.css";
-import type { LinkDocument, RunDocument, StartedRun } from "../api/participant";
-import { Refused } from "../api/request";
+import type { LinkState, RunStarted, RunState } from "../api/schema";
+import { Refused } from "./request";
 import { preferred, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround } from "./flow/appearance";
 import { ended } from "./flow/ended";
@@ -33,7 +33,7 @@ interface Entry {
   root: HTMLElement;
   t: Translate;
   link_token: string;
-  link: LinkDocument;
+  link: LinkState;
   language: string;
   keeping: KeptVisit;
   kept: Kept | null;
@@ -80,7 +80,7 @@ async function visit(entry: Entry): Promise<void> {
 }
 
 /** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
-function begun({ root, t, link_token }: Entry, identity: Identity, language: string): Promise<StartedRun> {
+function begun({ root, t, link_token }: Entry, identity: Identity, language: string): Promise<RunStarted> {
   const client_id = identity.client_id();
   const start = { language, client_id, query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
   return persistently(root, t, () => startRun(link_token, start));
@@ -108,7 +108,7 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
 }
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
-async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: StartedRun, found: GateFinding[]): Promise<void> {
+async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: RunStarted, found: GateFinding[]): Promise<void> {
   const { root, t, link, keeping, kept } = entry;
   const outbox = outboxOf(root, store, keeping);
   const unsent = await flush(outbox, started, kept ? 0 : undefined);
@@ -153,8 +153,8 @@ function outboxOf(root: HTMLElement, store: OutboxStore, keeping: KeptVisit): Ou
 }
 
 /** The run's status in the answer to a write, or in its receipt. */
-function statusIn(body: unknown): RunDocument["status"] | undefined {
-  const answer = body as { status?: RunDocument["status"]; receipt?: { status: RunDocument["status"] } } | null;
+function statusIn(body: unknown): RunState["status"] | undefined {
+  const answer = body as { status?: RunState["status"]; receipt?: { status: RunState["status"] } } | null;
   return answer?.receipt?.status ?? answer?.status;
 }
 
@@ -173,7 +173,7 @@ async function oneTab(root: HTMLElement, t: Translate, link_token: string): Prom
   return (await claimTab(`palpebra ${link_token}`, true, taken)) === "held";
 }
 
-async function play(session: Session, started: StartedRun, durable: boolean): Promise<void> {
+async function play(session: Session, started: RunStarted, durable: boolean): Promise<void> {
   const { root, run, outbox, over } = session;
   const end = (): void => {
     over.abort();
@@ -195,7 +195,7 @@ async function play(session: Session, started: StartedRun, durable: boolean): Pr
 }
 
 /** Only previews and synthetic runs may answer themselves. */
-function simulation(run: RunDocument): SimulationMode | null {
+function simulation(run: RunState): SimulationMode | null {
   const wanted = new URLSearchParams(location.search).get("simulate");
   return (run.preview || run.synthetic) && (wanted === "visual" || wanted === "data-only") ? wanted : null;
 }

@@ -1,5 +1,5 @@
 /** All that the screens of one visit share. */
-import type { AssignedTrial, Calibration, Completion, LinkDocument, Receipt, RunDocument, Stage } from "../api/participant";
+import type { CalibrationState, Completion, LinkState, Receipt, RunState, StageChange, TrialInfo } from "../api/schema";
 import type { Translate } from "../i18n";
 import type { EventLog } from "./outbox/events";
 import type { Outbox, Outcome } from "./outbox/outbox";
@@ -9,9 +9,11 @@ import type { RunClock } from "./screen/run-clock";
 import type { ScreenState } from "./screen/screen-state";
 import type { Replays } from "./flow/replays";
 
+export type Stage = StageChange["stage"];
+
 export interface Session {
-  link: LinkDocument;
-  run: RunDocument;
+  link: LinkState;
+  run: RunState;
   language: string;
   t: Translate;
   root: HTMLElement;
@@ -38,7 +40,7 @@ export class RunApi {
   consent(): Promise<Outcome> {
     return this.write("/api/run/consent", { agreed: true });
   }
-  calibration(body: Calibration): Promise<Outcome> {
+  calibration(body: CalibrationState): Promise<Outcome> {
     return this.write("/api/run/calibration", body);
   }
   form(name: string, answers: object): Promise<Outcome> {
@@ -57,7 +59,7 @@ export class RunApi {
 }
 
 /** Trials of the main part and attention checks: what progress counts. */
-export function counted(run: RunDocument): AssignedTrial[] {
+export function counted(run: RunState): TrialInfo[] {
   return run.trials.filter((trial) => trial.kind !== "practice");
 }
 

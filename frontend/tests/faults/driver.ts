@@ -7,8 +7,9 @@
  * HURRY shortens the pauses between tries: at 4 a person's patience of a minute passes in a quarter of one.
  */
 import { IDBFactory } from "fake-indexeddb";
-import { isTemporary, NetworkError, request, type Answer } from "../../src/api/request";
-import type { RatingBody, RunDocument, StartedRun } from "../../src/api/participant";
+import { isTemporary, NetworkError, request, type Answer } from "../../src/participant/request";
+import type { RunStarted, RunState } from "../../src/api/schema";
+import type { RatingBody } from "../../src/participant/trials/rating";
 import { backoff } from "../../src/participant/outbox/backoff";
 import { IndexedDbStore } from "../../src/participant/outbox/indexed-db";
 import { Outbox } from "../../src/participant/outbox/outbox";
@@ -70,12 +71,12 @@ async function participant(): Promise<void> {
 
 /** One visit from load to reload; true when the run is complete. */
 async function visit(factory: IDBFactory, client_id: string): Promise<boolean> {
-  const started = await insist<StartedRun>("POST", `/api/links/${link}/runs`, {
+  const started = await insist<RunStarted>("POST", `/api/links/${link}/runs`, {
     body: { language: "en", client_id, query: {}, device: {} },
   });
   const outbox = new Outbox(await IndexedDbStore.open(factory), { send: watched(started.run_id), pause });
   const unsent = await flush(outbox, started);
-  const run = await insist<RunDocument>("GET", "/api/run", { token: started.run_token });
+  const run = await insist<RunState>("GET", "/api/run", { token: started.run_token });
   if (!run.consented_at) await outbox.put("PUT", "/api/run/consent", { agreed: true });
   const waiting = new Set(unsent.map((item) => (item.body as RatingBody).trial_index));
   for (const trial of run.trials.filter((one) => !one.answered && !waiting.has(one.trial_index))) {
@@ -94,7 +95,7 @@ async function visit(factory: IDBFactory, client_id: string): Promise<boolean> {
   return true;
 }
 
-function ratingOf(trial: RunDocument["trials"][number]): RatingBody {
+function ratingOf(trial: RunState["trials"][number]): RatingBody {
   const frames = trial.frames ?? 0;
   const period = 1000 / 30;
   const drawn = Array.from({ length: frames }, (_, index): [number, number] => [index, 10 + index * period]);

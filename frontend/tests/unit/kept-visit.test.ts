@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { AssignedTrial, LinkDocument, RunDocument, StartedRun } from "../../src/api/participant";
+import type { LinkState, RunStarted, RunState, TrialInfo } from "../../src/api/schema";
 import { applyWrite, type Kept, KeptVisit } from "../../src/participant/flow/kept-visit";
 import { owed } from "../../src/participant/flow/replays";
 
@@ -12,7 +12,7 @@ class FakeStorage {
   removeItem = (key: string): void => void this.items.delete(key);
 }
 
-const trial = (trial_index: number): AssignedTrial => ({
+const trial = (trial_index: number): TrialInfo => ({
   trial_index,
   kind: "main",
   block: 1,
@@ -42,7 +42,7 @@ function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
     resumable_until,
     calibration: null,
   };
-  return { link: {} as LinkDocument, started: { run_id: "r", run_token: "t" } as StartedRun, run: run as unknown as RunDocument };
+  return { link: {} as LinkState, started: { run_id: "r", run_token: "t" } as RunStarted, run: run as unknown as RunState };
 }
 
 const rating = (trial_index: number, play = 1) => ({

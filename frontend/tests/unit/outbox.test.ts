@@ -1,6 +1,6 @@
 import { IDBFactory } from "fake-indexeddb";
 import { describe, expect, it, vi } from "vitest";
-import { NetworkError, type Answer } from "../../src/api/request";
+import { NetworkError, type Answer } from "../../src/participant/request";
 import { backoff } from "../../src/participant/outbox/backoff";
 import { nextBatch } from "../../src/participant/outbox/batch";
 import { IndexedDbStore } from "../../src/participant/outbox/indexed-db";

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { AssignedTrial } from "../../src/api/participant";
+import type { TrialInfo } from "../../src/api/schema";
 import { luminance } from "../../src/participant/flow/appearance";
 import { findings, type Abilities } from "../../src/participant/flow/gates";
 import { owed, Replays } from "../../src/participant/flow/replays";
@@ -8,7 +8,7 @@ import { clipHeight, clipWidth, screenChange, zoomed, type ScreenShape } from ".
 import { distanceFrom } from "../../src/participant/screens/distance";
 import { keyFor, valueOf } from "../../src/participant/trials/clip-rating/scale-keys";
 
-const trial = (rest: Partial<AssignedTrial> = {}): AssignedTrial => ({
+const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
   trial_index: 0,
   kind: "main",
   block: 1,

@@ -12,27 +12,29 @@ import { languageName } from "../ui/format";
 import { useChange } from "../ui/useChange";
 import { useUnsaved } from "../ui/useUnsaved";
 
-const PAGES = { consent: "Consent", instructions: "Instructions", practice: "Practice", block_break: "Break", debrief: "Debrief" };
+type Page = Exclude<keyof Schemas["Texts"], "screened_out">;
+const PAGES: [page: Page, label: string][] = [
+  ["consent", "Consent"],
+  ["instructions", "Instructions"],
+  ["practice", "Practice"],
+  ["block_break", "Break"],
+  ["debrief", "Debrief"],
+];
 
 export function TextsTab() {
   const { study = "" } = useParams({ strict: false });
   return <Answer of={useQuery(studyQuery(study))}>{(detail) => <Texts key={detail.summary.revision} detail={detail} />}</Answer>;
 }
 
-/** The texts of one language as a record of strings. */
-function textsOf(definition: Record<string, unknown>, language: string): Record<string, string> {
-  const all = definition["texts"] as Record<string, Record<string, string>>;
-  return all[language] ?? {};
-}
-
 function Texts({ detail }: { detail: Schemas["StudyDetail"] }) {
-  const languages = detail.definition["languages"] as string[];
+  const languages = detail.definition.languages;
   const [language, setLanguage] = useState(languages[0] ?? "en");
-  const [edits, setEdits] = useState<Record<string, string>>({});
+  const [edits, setEdits] = useState<Partial<Record<Page, string>>>({});
   const mayChange = useMay("experimenter");
   const { name, revision, status } = detail.summary;
-  const present = textsOf(detail.definition, language);
-  const changed = Object.entries(edits).some(([page, text]) => text !== (present[page] ?? ""));
+  const present = detail.definition.texts[language];
+  const textOf = (page: Page): string => present?.[page] ?? "";
+  const changed = PAGES.some(([page]) => edits[page] !== undefined && edits[page] !== textOf(page));
   useUnsaved(changed);
   const save = useChange(
     () =>
@@ -67,11 +69,11 @@ function Texts({ detail }: { detail: Schemas["StudyDetail"] }) {
           </Group>
         )}
       </Group>
-      {Object.entries(PAGES).map(([page, label]) => (
+      {PAGES.map(([page, label]) => (
         <OnePage
           key={page}
           label={label}
-          text={edits[page] ?? present[page] ?? ""}
+          text={edits[page] ?? textOf(page)}
           onChange={mayChange ? (text) => setEdits({ ...edits, [page]: text }) : null}
         />
       ))}

@@ -1,5 +1,5 @@
 /** Practice and blocks: clips fetched first, trials in the stored order, failed clips again at the end. */
-import type { AssignedTrial } from "../../api/participant";
+import type { TrialInfo } from "../../api/schema";
 import { trial, type Node } from "../jspsych";
 import { blockBreak } from "../screens/block-break";
 import { calibration } from "../screens/calibration";
@@ -53,16 +53,16 @@ export function blockNodes(session: Session, block: number, next: number | null)
   ];
 }
 
-function trialsOf({ run }: Session, block: number): AssignedTrial[] {
+function trialsOf({ run }: Session, block: number): TrialInfo[] {
   return run.trials.filter((one) => one.block === block && one.kind !== "practice");
 }
 
 /** A block keeps all its clips, since any of them may be wanted again. */
-function preloadNode(session: Session, trials: AssignedTrial[]): Node {
+function preloadNode(session: Session, trials: TrialInfo[]): Node {
   return trial(preloadPage(session), { eyebrow: "", trials });
 }
 
-function fetchAhead(session: Session, trials: AssignedTrial[], next: number | null): void {
+function fetchAhead(session: Session, trials: TrialInfo[], next: number | null): void {
   const now = sourcesOf(trials);
   const ahead = next === null ? [] : sourcesOf(trialsOf(session, next));
   session.clips.keepOnly([...now, ...ahead]);
@@ -70,7 +70,7 @@ function fetchAhead(session: Session, trials: AssignedTrial[], next: number | nu
   void session.clips.load(now).then(() => session.clips.load(ahead));
 }
 
-function trialNodes(session: Session, trials: AssignedTrial[]): Node[] {
+function trialNodes(session: Session, trials: TrialInfo[]): Node[] {
   return trials.flatMap((one, place) => {
     const next = trials[place + 1] ?? null;
     return [...checks(session), trialNode(session, one.kind, () => ({ trial: one, play: 1, next }))];

@@ -1,5 +1,5 @@
 /** A run that is over: withdrawn, screened out or complete, with its code as often as it is asked for. */
-import type { RunDocument, StartedRun } from "../../api/participant";
+import type { RunStarted, RunState } from "../../api/schema";
 import type { Translate } from "../../i18n";
 import { button } from "../../ui/page";
 import { completed, showCompletion } from "../screens/finish";
@@ -11,8 +11,8 @@ import { persistently } from "./link";
 export async function ended(
   root: HTMLElement,
   t: Translate,
-  run: RunDocument,
-  started: StartedRun,
+  run: RunState,
+  started: RunStarted,
   identity: Identity,
   why = "",
 ): Promise<void> {

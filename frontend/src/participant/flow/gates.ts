@@ -1,5 +1,5 @@
 /** Can this browser, on this device, show the study? Reasons are message keys, worst first. */
-import type { Gates } from "../../api/participant";
+import type { Gates } from "../../api/schema";
 import type { MessageKey } from "../../i18n";
 import { hasVideo, hasWebCodecs, playsH264 } from "../playback/choose";
 

@@ -1,5 +1,5 @@
 /** Which visit this browser is in: a client id a link, so that starting twice gives the same run. */
-import type { LinkDocument } from "../../api/participant";
+import type { LinkState } from "../../api/schema";
 
 const RECRUITER_KEYS = 20;
 const LONGEST_VALUE = 200;
@@ -24,7 +24,7 @@ export class Identity {
   /** A preview belongs to its tab; people recruited by name share no run even on one computer. */
   constructor(
     link_token: string,
-    kind: LinkDocument["kind"],
+    kind: LinkState["kind"],
     private readonly search: string,
   ) {
     this.key = storageKey("palpebra", link_token, search);

@@ -2,13 +2,14 @@
  * What a reload without a connection needs: the link, the run's token and the run as the server gave it, brought
  * up to date with each write the server has accepted. What it has not accepted yet lies in the outbox.
  */
-import type { AssignedTrial, Calibration, LinkDocument, RatingBody, Receipt, RunDocument, StartedRun } from "../../api/participant";
+import type { CalibrationState, LinkState, Receipt, RunStarted, RunState, TrialInfo } from "../../api/schema";
+import type { RatingBody } from "../trials/rating";
 import type { OutboxItem } from "../outbox/store";
 
 export interface Kept {
-  link: LinkDocument;
-  started: StartedRun;
-  run: RunDocument;
+  link: LinkState;
+  started: RunStarted;
+  run: RunState;
 }
 type Write = Pick<OutboxItem, "kind" | "path" | "body">;
 
@@ -63,21 +64,21 @@ export class KeptVisit {
 }
 
 /** Bring a run up to date with one write: what it says counts as given, whether or not the server has it yet. */
-export function applyWrite(run: RunDocument, { path, body }: Pick<Write, "path" | "body">, answer: unknown = null): void {
+export function applyWrite(run: RunState, { path, body }: Pick<Write, "path" | "body">, answer: unknown = null): void {
   const [what = "", name = ""] = path.slice(RUN.length).split("/");
   if (what === "ratings") applyRating(run, body as RatingBody, answer);
   else if (what === "forms") run.answered_forms.push(decodeURIComponent(name));
   else if (what === "consent") run.consented_at ??= run.server_time;
-  else if (what === "calibration") run.calibration = body as Calibration;
+  else if (what === "calibration") run.calibration = body as CalibrationState;
   else if (what === "withdraw") run.status = "withdrawn";
 }
 
-function applyRating(run: RunDocument, body: RatingBody, answer: unknown): void {
+function applyRating(run: RunState, body: RatingBody, answer: unknown): void {
   const trial = run.trials.find((one) => one.trial_index === body.trial_index);
   if (!trial) return;
   const again = (answer as { receipt?: Receipt } | null)?.receipt?.again === true;
   const plays_done = Math.max(trial.plays_done, body.play);
   const plays_wanted = Math.max(trial.plays_wanted, again ? body.play + 1 : body.play);
-  Object.assign(trial, { answered: true, plays_done, plays_wanted } satisfies Partial<AssignedTrial>);
+  Object.assign(trial, { answered: true, plays_done, plays_wanted } satisfies Partial<TrialInfo>);
   run.elapsed_ms_before = Math.max(run.elapsed_ms_before, body.time_elapsed ?? 0);
 }

@@ -1,6 +1,6 @@
 /** From the link to a run: is it open, can this browser show it, and which visit is it? */
-import type { LinkDocument, RunDocument, StartedRun } from "../../api/participant";
-import { call, NetworkError, Refused, isTemporary, request } from "../../api/request";
+import type { LinkState, RunStarted, RunState } from "../../api/schema";
+import { call, NetworkError, Refused, isTemporary, request } from "../request";
 import type { MessageKey, Translate } from "../../i18n";
 import { backoff } from "../outbox/backoff";
 import { showNotice } from "../screens/notice";
@@ -28,16 +28,16 @@ export function isNoAnswer(error: unknown): boolean {
   return error instanceof NetworkError || (error instanceof Refused && isTemporary(error.status));
 }
 
-const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkDocument> =>
+const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkState> =>
   call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
 
 /** The run as the page sees it: practice is no block. */
-export async function fetchRun(token: string): Promise<RunDocument> {
-  const run = await call<RunDocument>("GET", "/api/run", { token, timeout_ms: 30_000 });
+export async function fetchRun(token: string): Promise<RunState> {
+  const run = await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 });
   return { ...run, blocks: run.blocks.filter(({ block }) => block > 0) };
 }
 
-export const startRun = (link_token: string, body: object): Promise<StartedRun> =>
+export const startRun = (link_token: string, body: object): Promise<RunStarted> =>
   call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body });
 
 const REFUSALS: Record<string, MessageKey> = {
@@ -75,7 +75,7 @@ export async function reach(
   t: Translate,
   link_token: string,
   kept: Kept | null,
-): Promise<{ link: LinkDocument; kept: Kept | null }> {
+): Promise<{ link: LinkState; kept: Kept | null }> {
   if (!kept) return { link: await persistently(root, t, () => fetchLink(link_token)), kept };
   try {
     return { link: await fetchLink(link_token, KEPT_WAIT_MS), kept: null };

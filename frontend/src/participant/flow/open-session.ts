@@ -1,5 +1,5 @@
 /** From a started run to everything its screens share. */
-import type { LinkDocument, RunDocument, StartedRun } from "../../api/participant";
+import type { LinkState, RunStarted, RunState } from "../../api/schema";
 import { translator } from "../../i18n";
 import { EventLog } from "../outbox/events";
 import type { Outbox } from "../outbox/outbox";
@@ -19,13 +19,13 @@ const SEND_FIRST_MS = 8_000;
  * Send what an earlier visit left, so that the run document knows of it. Returns what could not be sent yet: it
  * must count as given, since it may arrive after the document was made and before the page reads it.
  */
-export async function flush(outbox: Outbox, started: StartedRun, wait_ms = SEND_FIRST_MS): Promise<OutboxItem[]> {
+export async function flush(outbox: Outbox, started: RunStarted, wait_ms = SEND_FIRST_MS): Promise<OutboxItem[]> {
   await outbox.open(started.run_id, started.run_token);
   await outbox.drained(wait_ms);
   return outbox.unsent();
 }
 
-export function openSession(root: HTMLElement, link: LinkDocument, run: RunDocument, outbox: Outbox, unsent: OutboxItem[]): Session {
+export function openSession(root: HTMLElement, link: LinkState, run: RunState, outbox: Outbox, unsent: OutboxItem[]): Session {
   const screen = new ScreenState();
   unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);

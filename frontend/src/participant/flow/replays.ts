@@ -1,15 +1,15 @@
 /** Clips that did not run as declared, waiting to be shown again at the end of their block. */
-import type { AssignedTrial } from "../../api/participant";
+import type { TrialInfo } from "../../api/schema";
 
 export interface Replay {
-  trial: AssignedTrial;
+  trial: TrialInfo;
   play: number;
 }
 
 export class Replays {
   private readonly queue: Replay[] = [];
 
-  add(trial: AssignedTrial, play: number): void {
+  add(trial: TrialInfo, play: number): void {
     const known = this.queue.some((one) => one.trial.trial_index === trial.trial_index && one.play === play);
     if (!known) this.queue.push({ trial, play });
   }
@@ -26,7 +26,7 @@ export class Replays {
 }
 
 /** What an earlier visit still owes: played, but wanted once more. */
-export function owed(trials: readonly AssignedTrial[]): Replay[] {
+export function owed(trials: readonly TrialInfo[]): Replay[] {
   return trials
     .filter((trial) => trial.plays_done > 0 && trial.plays_done < trial.plays_wanted)
     .map((trial) => ({ trial, play: trial.plays_done + 1 }));

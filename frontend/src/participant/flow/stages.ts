@@ -1,6 +1,5 @@
 /** Tells the server how far the participant has come, once a stage. */
-import type { Stage } from "../../api/participant";
-import type { Session } from "../session";
+import type { Session, Stage } from "../session";
 
 export function enterStage(session: Session, stage: Stage): void {
   if (session.run.stage === stage) return;

@@ -1,5 +1,5 @@
 /** The first page: what this is, how long it takes, in which language. */
-import type { LinkDocument } from "../../api/participant";
+import type { LinkState } from "../../api/schema";
 import { languageName, translator } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
 import { button, showPage } from "../../ui/page";
@@ -7,7 +7,7 @@ import { emptied } from "../screens/notice";
 import { setLanguage } from "./appearance";
 
 /** Resolves with the language chosen when the participant starts. */
-export function startPage(root: HTMLElement, link: LinkDocument, language: string): Promise<string> {
+export function startPage(root: HTMLElement, link: LinkState, language: string): Promise<string> {
   return new Promise((resolve) => {
     const display = emptied(root);
     const draw = (chosen: string): void => {

@@ -1,5 +1,5 @@
 /** The visit as a jsPsych timeline: what is left of it, in order. */
-import type { Form } from "../../api/participant";
+import type { Form } from "../../api/schema";
 import { trial, type Node } from "../jspsych";
 import { calibration } from "../screens/calibration";
 import { consent } from "../screens/consent";

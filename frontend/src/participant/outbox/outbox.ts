@@ -4,7 +4,7 @@
  * `put` resolves when the item is kept. `receipt` resolves when the server has answered for good. Requests may
  * be repeated without harm, because the server stores each id once.
  */
-import { isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../../api/request";
+import { isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../request";
 import { backoff } from "./backoff";
 import { events, type Batch, nextBatch } from "./batch";
 import type { OutboxItem, OutboxStore } from "./store";

@@ -1,5 +1,9 @@
 /** From the frames that were drawn to the figures stored with the rating. */
-import type { PlaybackMethod, PlaybackRecord } from "../../api/participant";
+import type { PlaybackLog } from "../../api/schema";
+
+/** Every key of the server's log, with the list of drawn frames. */
+export type PlaybackRecord = Required<PlaybackLog> & { drawn: NonNullable<PlaybackLog["drawn"]> };
+type PlaybackMethod = PlaybackLog["method"];
 
 /** One showing of a clip. Times are absolute, in ms. */
 export interface Showing {

@@ -1,13 +1,13 @@
 /** What is known about this participant's screen, and whether it still holds. */
-import type { Calibration } from "../../api/participant";
+import type { CalibrationState } from "../../api/schema";
 import { type ScreenChange, screenChange, screenShape, type ScreenShape, zoomed } from "./size";
 
 export class ScreenState {
-  calibration: Calibration | null = null;
+  calibration: CalibrationState | null = null;
   refresh_rate_hz: number | null = null;
 
   /** Take over a stored calibration where it was made on a screen like this one. */
-  restore(stored: Calibration | null): void {
+  restore(stored: CalibrationState | null): void {
     if (stored && screenChange(stored, screenShape()) === "none") this.calibration = stored;
   }
 
@@ -20,7 +20,7 @@ export class ScreenState {
   }
 
   /** The calibration as it is after a zoom, to be stored as a new one. */
-  afterZoom(now: ScreenShape = screenShape()): Calibration | null {
+  afterZoom(now: ScreenShape = screenShape()): CalibrationState | null {
     if (!this.calibration) return null;
     const px_per_mm = zoomed(this.calibration.px_per_mm, this.calibration, now);
     const window_size = { window_width_px: window.innerWidth, window_height_px: window.innerHeight };

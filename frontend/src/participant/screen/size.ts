@@ -1,5 +1,5 @@
 /** From calibration to the clip's size on this screen, and what a zoom or another screen does to it. */
-import type { AssignedTrial, Calibration } from "../../api/participant";
+import type { CalibrationState, TrialInfo } from "../../api/schema";
 
 export interface ScreenShape {
   device_pixel_ratio: number;
@@ -35,18 +35,22 @@ export function zoomed(px_per_mm: number, before: ScreenShape, now: ScreenShape)
 }
 
 /** Shown width of a clip in CSS px: inter-ocular distance as declared, else its width in mm, else its own pixels. */
-export function clipWidth(trial: AssignedTrial, inter_ocular_mm: number, px_per_mm: number | null): number {
+export function clipWidth(trial: TrialInfo, inter_ocular_mm: number, px_per_mm: number | null): number {
   const own = trial.width_px ?? 640;
   if (px_per_mm === null) return own;
   if (trial.inter_ocular_px) return (own * inter_ocular_mm * px_per_mm) / trial.inter_ocular_px;
   return trial.width_mm ? trial.width_mm * px_per_mm : own;
 }
 
-export function clipHeight(trial: AssignedTrial, width: number): number {
+export function clipHeight(trial: TrialInfo, width: number): number {
   return trial.width_px && trial.height_px ? (width * trial.height_px) / trial.width_px : width / 2;
 }
 
-export function calibrationBody(px_per_mm: number, method: Calibration["method"], viewing_distance_mm: number | null): Calibration {
+export function calibrationBody(
+  px_per_mm: number,
+  method: CalibrationState["method"],
+  viewing_distance_mm: number | null,
+): CalibrationState {
   return {
     px_per_mm: Math.round(px_per_mm * 10_000) / 10_000,
     method,

@@ -1,5 +1,5 @@
 /** How many pixels a millimetre has here: by card or ruler, checked, and large enough for the clip. */
-import type { AssignedTrial, Calibration } from "../../api/participant";
+import type { CalibrationState, TrialInfo } from "../../api/schema";
 import { h } from "../../ui/element";
 import { showPage, statusLine, alertLine } from "../../ui/page";
 import { plugin, BOOL, FLOAT, STRING, type PluginClass } from "../jspsych";
@@ -20,7 +20,7 @@ interface Data {
 }
 interface Measured {
   px_per_mm: number;
-  method: Calibration["method"];
+  method: CalibrationState["method"];
 }
 
 const SIMULATED_PX_PER_MM = 96 / 25.4;
@@ -78,7 +78,7 @@ async function tellChanged(session: Session, display: HTMLElement): Promise<void
 }
 
 async function measureUntilItFits(session: Session, display: HTMLElement, eyebrow: string): Promise<Measured | null> {
-  let method: Calibration["method"] = "card";
+  let method: CalibrationState["method"] = "card";
   for (;;) {
     const measured = await (method === "card" ? byCard(session, display, eyebrow) : byRuler(session, display, eyebrow));
     if (measured === "skip") return null;
@@ -151,7 +151,7 @@ async function fits(session: Session, display: HTMLElement, measured: Measured):
   return false;
 }
 
-function widestClip(trials: readonly AssignedTrial[], inter_ocular_mm: number, px_per_mm: number): number {
+function widestClip(trials: readonly TrialInfo[], inter_ocular_mm: number, px_per_mm: number): number {
   const clips = trials.filter((trial) => trial.clip_sha256 !== null);
   return clips.reduce((widest, trial) => Math.max(widest, clipWidth(trial, inter_ocular_mm, px_per_mm)), 0);
 }

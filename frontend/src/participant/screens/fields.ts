@@ -1,9 +1,11 @@
 /** The questions of a form: each kind of field as an accessible control that knows its answer and its fault. */
-import type { FormAnswers, FormField } from "../../api/participant";
+import type { Form } from "../../api/schema";
 import { pick, type Translate } from "../../i18n";
 import { h, uniqueId, type Child } from "../../ui/element";
 
-export type FieldAnswer = FormAnswers[string];
+export type FormField = Form["fields"][number];
+export type FieldAnswer = string | number | string[] | null;
+export type FormAnswers = Record<string, FieldAnswer>;
 export interface FieldView {
   name: string;
   element: HTMLElement;

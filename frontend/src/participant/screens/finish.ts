@@ -1,6 +1,6 @@
 /** The end: the completion code appears only when the server has every answer. */
-import type { Completion } from "../../api/participant";
-import { call, Refused } from "../../api/request";
+import type { Completion } from "../../api/schema";
+import { call, Refused } from "../request";
 import { h } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { button, showPage } from "../../ui/page";

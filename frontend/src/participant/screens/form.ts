@@ -1,5 +1,6 @@
 /** A declared questionnaire on one page. */
-import type { Form, FormAnswers } from "../../api/participant";
+import type { Form } from "../../api/schema";
+import type { FormAnswers } from "./fields";
 import { pick } from "../../i18n";
 import { h } from "../../ui/element";
 import { alertLine, button, showPage, statusLine } from "../../ui/page";

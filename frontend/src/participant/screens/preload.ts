@@ -1,5 +1,5 @@
 /** Waits until a block's clips are here, with progress, another try, and a way out. */
-import type { AssignedTrial } from "../../api/participant";
+import type { TrialInfo } from "../../api/schema";
 import { h } from "../../ui/element";
 import { showPage } from "../../ui/page";
 import { progressBar } from "../../ui/progress";
@@ -11,7 +11,7 @@ import { choose, stopButton } from "./support";
 
 interface Parameters {
   eyebrow: string;
-  trials: AssignedTrial[];
+  trials: TrialInfo[];
 }
 interface Data {
   clips: number;
@@ -19,7 +19,7 @@ interface Data {
   waited_ms: number;
 }
 
-export function sourcesOf(trials: readonly AssignedTrial[]): ClipSource[] {
+export function sourcesOf(trials: readonly TrialInfo[]): ClipSource[] {
   return trials.flatMap(({ clip_sha256, clip_url }) => (clip_sha256 && clip_url ? [{ clip_sha256, clip_url }] : []));
 }
 

@@ -1,5 +1,5 @@
 /** Answers of a simulated participant: valid, and plain. */
-import type { FormField } from "../../api/participant";
+import type { FormField } from "./fields";
 import type { FieldAnswer } from "./fields";
 
 export function simulatedAnswer(field: FormField): FieldAnswer {

@@ -1,5 +1,5 @@
 /** An instructed rating between trials: the same scale without a clip. Whether it was followed, the server knows. */
-import type { AssignedTrial } from "../../api/participant";
+import type { TrialInfo } from "../../api/schema";
 import { h } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { focusHeading } from "../../ui/page";
@@ -12,7 +12,7 @@ import { askScale, type Rated } from "./clip-rating/scale";
 import { saveRating } from "./save-rating";
 
 interface Parameters {
-  trial: AssignedTrial;
+  trial: TrialInfo;
 }
 interface Data {
   response: number;
@@ -33,7 +33,7 @@ export function attentionCheck(session: Session): PluginClass<Parameters> {
   });
 }
 
-async function check(session: Session, display: HTMLElement, trial: AssignedTrial): Promise<Data> {
+async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<Data> {
   const { signal, done } = screenSignal(session);
   const below = h("div", { class: "below" });
   const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
@@ -54,7 +54,7 @@ async function check(session: Session, display: HTMLElement, trial: AssignedTria
   return { response: rated.response };
 }
 
-function store(session: Session, trial: AssignedTrial, shown_at_ms: number, rated: Rated): Promise<void> {
+function store(session: Session, trial: TrialInfo, shown_at_ms: number, rated: Rated): Promise<void> {
   return saveRating(session, trial, {
     trial_index: trial.trial_index,
     play: 1,

@@ -1,18 +1,18 @@
 /** One folder for each kind of trial. A paired comparison would join here. */
-import type { AssignedTrial, ClipRating } from "../../api/participant";
+import type { ShownClipRating, TrialInfo } from "../../api/schema";
 import { trial, type Node } from "../jspsych";
 import type { Session } from "../session";
 import { attentionCheck } from "./attention-check";
 import { clipRating, placeIn } from "./clip-rating/plugin";
 
 export interface Showable {
-  trial: AssignedTrial;
+  trial: TrialInfo;
   play: number;
-  next: AssignedTrial | null;
+  next: TrialInfo | null;
 }
 type Maker = (session: Session, what: () => Showable) => Node;
 
-const kinds: Record<ClipRating["kind"], Maker> = {
+const kinds: Record<ShownClipRating["kind"], Maker> = {
   clip_rating: (session, what) =>
     trial(clipRating(session), {
       trial: () => what().trial,
@@ -24,7 +24,7 @@ const kinds: Record<ClipRating["kind"], Maker> = {
 };
 
 /** The timeline node that shows what `what` names when its turn comes. */
-export function trialNode(session: Session, kind: AssignedTrial["kind"], what: () => Showable): Node {
+export function trialNode(session: Session, kind: TrialInfo["kind"], what: () => Showable): Node {
   if (kind === "attention") return trial(attentionCheck(session), { trial: () => what().trial });
   return kinds[session.run.trial.kind](session, what);
 }

@@ -1,9 +1,10 @@
 /** Keeps a rating, and acts on its receipt whenever that comes: a failed clip joins the repetitions. */
-import type { AssignedTrial, RatingBody } from "../../api/participant";
+import type { TrialInfo } from "../../api/schema";
+import type { RatingBody } from "./rating";
 import { receiptOf, type Session } from "../session";
 
 /** Resolves when the rating is on disk; where nothing is kept there, when the server has it. */
-export async function saveRating(session: Session, trial: AssignedTrial, body: RatingBody): Promise<void> {
+export async function saveRating(session: Session, trial: TrialInfo, body: RatingBody): Promise<void> {
   const id = crypto.randomUUID();
   const { receipt } = await session.outbox.put("PUT", `/api/run/ratings/${id}`, body, id);
   trial.plays_done = body.play;

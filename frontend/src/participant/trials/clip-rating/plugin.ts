@@ -1,5 +1,6 @@
 /** The single-clip rating: ready, the clip at actual size, then the scale. The rating is kept before it ends. */
-import type { AssignedTrial, RatingBody } from "../../../api/participant";
+import type { TrialInfo } from "../../../api/schema";
+import type { RatingBody } from "../rating";
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
 import { BOOL, FLOAT, INT, OBJECT, plugin, type PluginClass } from "../../jspsych";
@@ -18,9 +19,9 @@ import { simulatedRating } from "./simulated";
 import { stage, type Stage } from "./stage";
 
 export interface ClipRatingParameters {
-  trial: AssignedTrial;
+  trial: TrialInfo;
   play: number;
-  next: AssignedTrial | null;
+  next: TrialInfo | null;
   number: number;
   total: number;
 }
@@ -70,7 +71,7 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Clip
   return { response: body.response, rt: body.rt, frames_missing, key_to_first_frame_ms, again: parameters.play > 1 };
 }
 
-function placeFor(session: Session, display: HTMLElement, trial: AssignedTrial): Stage {
+function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
   const wanted = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
   // Only where calibration is optional can it be too wide: it is then as wide as the window.
   const width = Math.min(wanted, window.innerWidth);
@@ -159,7 +160,7 @@ function emptyBody(session: Session, { trial, play }: ClipRatingParameters): Rat
   };
 }
 
-export function placeIn(session: Session, trial: AssignedTrial): { number: number; total: number } {
+export function placeIn(session: Session, trial: TrialInfo): { number: number; total: number } {
   const kind = trial.kind === "practice" ? session.run.trials.filter((one) => one.kind === "practice") : counted(session.run);
   return { number: kind.findIndex((one) => one.trial_index === trial.trial_index) + 1, total: kind.length };
 }

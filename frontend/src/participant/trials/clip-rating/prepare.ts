@@ -1,5 +1,5 @@
 /** A clip made ready to start at once: its bytes are here, it is decoded, and the stage has its size. */
-import type { AssignedTrial } from "../../../api/participant";
+import type { TrialInfo } from "../../../api/schema";
 import { h } from "../../../ui/element";
 import { ClipBroken } from "../../playback/player";
 import { sourcesOf } from "../../screens/preload";
@@ -9,7 +9,7 @@ import type { Stage } from "./stage";
 const SOON_MS = 150;
 
 /** Decode ahead with `place` null; with a place, also blank the stage and say so where it takes long. */
-export async function prepareClip(session: Session, trial: AssignedTrial, place: Stage | null): Promise<string> {
+export async function prepareClip(session: Session, trial: TrialInfo, place: Stage | null): Promise<string> {
   const sha256 = trial.clip_sha256;
   if (!sha256) throw new ClipBroken("expected a clip, the trial has none");
   const say = setTimeout(() => place?.below.replaceChildren(h("p", { role: "status" }, session.t("decoding"))), SOON_MS);
@@ -25,7 +25,7 @@ export async function prepareClip(session: Session, trial: AssignedTrial, place:
   }
 }
 
-async function fetched(session: Session, trial: AssignedTrial, sha256: string): Promise<ArrayBuffer> {
+async function fetched(session: Session, trial: TrialInfo, sha256: string): Promise<ArrayBuffer> {
   await session.clips.load(sourcesOf([trial]));
   const bytes = session.clips.get(sha256);
   if (!bytes) throw new ClipBroken("the clip could not be loaded");

@@ -1,5 +1,5 @@
 /** Which keys mean what on the scale. */
-import type { Scale } from "../../../api/participant";
+import type { Scale } from "../../../api/schema";
 
 type Range = Pick<Scale, "minimum" | "maximum">;
 

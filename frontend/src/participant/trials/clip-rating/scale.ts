@@ -1,5 +1,5 @@
 /** The rating scale: keys, mouse and touch; optional confirmation and comment. */
-import type { ClipRating } from "../../../api/participant";
+import type { ShownClipRating } from "../../../api/schema";
 import { pick, type Translate } from "../../../i18n";
 import { h, uniqueId } from "../../../ui/element";
 import { listenKeys } from "../../../ui/keys";
@@ -13,7 +13,7 @@ export interface Rated {
   comment: string | null;
 }
 export interface ScaleOptions {
-  trial: ClipRating;
+  trial: ShownClipRating;
   language: string;
   t: Translate;
   signal: AbortSignal;

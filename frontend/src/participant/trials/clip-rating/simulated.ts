@@ -1,5 +1,5 @@
 /** The rating of a simulated participant: stored like any other, with a playback of method none. */
-import type { RatingBody } from "../../../api/participant";
+import type { RatingBody } from "../rating";
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";

@@ -1,0 +1,5 @@
+/** What the page sends of one play: the server's own type, every key given. */
+import type { RatingIn } from "../../api/schema";
+import type { PlaybackRecord } from "../playback/record";
+
+export type RatingBody = Required<Omit<RatingIn, "playback">> & { playback: PlaybackRecord };
