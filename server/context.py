@@ -12,6 +12,7 @@ from server.clips.store import ClipStore, FolderStore
 from server.db import Database, open_database
 from server.group_commit import GroupCommit
 from server.rate_limit import RateLimit
+from server.results.cache import ResultsCache
 from server.settings import Settings
 from server.stopping import Stopping
 from server.versions import Versions
@@ -31,6 +32,7 @@ class Services:
     sign_ins: SignInThrottle
     passwords: PasswordWork
     stopping: Stopping
+    results: ResultsCache
 
 
 def open_services(settings: Settings) -> Services:
@@ -47,6 +49,7 @@ def open_services(settings: Settings) -> Services:
         sign_ins=SignInThrottle(settings),
         passwords=PasswordWork(),
         stopping=Stopping(),
+        results=ResultsCache(),
     )
 
 

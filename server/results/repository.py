@@ -1,12 +1,13 @@
 """What the results page reads: aggregates in SQL, one row a participant and clip at most."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, and_, func, select
 from sqlalchemy.orm import Session
 
-from server.models import AssignedTrial, Rating, StudyRun, VersionClip
+from server.models import AssignedTrial, Rating, Study, StudyRun, VersionClip
+from server.results.cache import Revision
 
 
 class ClipCount(NamedTuple):
@@ -27,6 +28,24 @@ def usable(study_id: int, phase: str) -> ColumnElement[bool]:
         AssignedTrial.kind == "main",
         Rating.response.is_not(None),
         Rating.verdict != "failed",
+    )
+
+
+def revision(session: Session, study: Study, phase: str) -> Revision:
+    """What the results of a phase depend on, asked of the runs and the newest rating alone."""
+    query = select(
+        func.count(),
+        func.sum(StudyRun.trials_answered),
+        func.count(StudyRun.excluded_at),
+        func.max(StudyRun.excluded_at),
+        func.count(StudyRun.erased_at),
+        func.max(StudyRun.erased_at),
+    ).where(StudyRun.study_id == study.id, StudyRun.phase == phase, StudyRun.preview.is_(False))
+    runs, answered, *decisions = session.execute(query).one()
+    newest = session.execute(select(Rating.id, Rating.rating_id).order_by(Rating.id.desc()).limit(1)).first()
+    # A number is given out again where the newest rating was erased (SQLite), hence the rating's own id.
+    return Revision(
+        (study.id, study.active_version, *decisions), (runs, answered, tuple(newest) if newest else None)
     )
 
 
@@ -82,17 +101,15 @@ def response_times(session: Session, study_id: int, phase: str) -> list[tuple[in
 def playback(session: Session, study_id: int, phase: str) -> dict[str, list[tuple[str, int]]]:
     """Counts of plays by verdict, by method and by the rule behind a verdict; failed plays included."""
     run = and_(StudyRun.study_id == study_id, StudyRun.phase == phase, StudyRun.preview.is_(False))
-    counts = {}
-    for name, column in (
-        ("verdict", Rating.verdict),
-        ("method", Rating.method),
-        ("rule", Rating.verdict_rule),
-    ):
-        query = (
-            _joined(select(column, func.count())).where(run, AssignedTrial.kind == "main").group_by(column)
-        )
-        counts[name] = [(str(word), number) for word, number in session.execute(query) if word]
-    return counts
+    columns = (Rating.verdict, Rating.method, Rating.verdict_rule)
+    query = (
+        _joined(select(*columns, func.count())).where(run, AssignedTrial.kind == "main").group_by(*columns)
+    )
+    counts: dict[str, Counter[str]] = {name: Counter() for name in ("verdict", "method", "rule")}
+    for *words, number in session.execute(query):
+        for name, word in zip(counts, words, strict=True):
+            counts[name][word] += number if word else 0
+    return {name: sorted((+found).items()) for name, found in counts.items()}
 
 
 def onset_delays(session: Session, study_id: int, phase: str) -> list[float]:

@@ -1,5 +1,7 @@
 """What the results page shows."""
 
+from datetime import datetime
+
 from pydantic import BaseModel, Field
 
 
@@ -63,6 +65,7 @@ class Results(BaseModel):
 
     study: str
     phase: str
+    counted_at: datetime
     participants: int
     ratings: int
     scale_minimum: int

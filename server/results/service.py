@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.trials.clip_rating.declaration import clip_rating_of
+from server.clock import now
 from server.models import Study, StudyVersion, VersionClip
 from server.results import repository, summary
 from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results, TimeBin
@@ -24,6 +25,7 @@ def results(session: Session, study: Study, definition: Experiment, phase: str) 
     return Results(
         study=study.name,
         phase=phase,
+        counted_at=now(),
         participants=len(means),
         ratings=sum(clip.ratings for clip in clips),
         scale_minimum=scale.minimum,

@@ -68,10 +68,10 @@ class Owner:
         headers = {"cookie": self.cookie, "origin": self.address, "content-type": "application/json"}
         return urllib.request.urlopen(urllib.request.Request(self.address + path, body, headers))
 
-    def time_of(self, path: str) -> tuple[float, int]:
+    def time_of(self, path: str, body: bytes | None = None) -> tuple[float, int]:
         """Seconds and lines of a download; nothing of it is kept."""
         begun, lines = time.monotonic(), 0
-        with self.open(path) as answer:
+        with self.open(path, body) as answer:
             while piece := answer.read(1 << 20):
                 lines += piece.count(b"\n")
         return time.monotonic() - begun, lines
@@ -98,6 +98,50 @@ def export(folder: Path, rows: int) -> None:
     finally:
         process.stop()
     command_line(process, folder, rows)
+
+
+LINKS = 5_000
+MANY_RUNS = 100_000
+
+
+def pages(folder: Path, rows: int) -> None:
+    """The pages of a study with very many ratings, links and runs, each asked for by itself."""
+    process = filled(folder, max(1, rows // TRIALS))
+    more_runs(process, MANY_RUNS)
+    process.start()
+    try:
+        owner = Owner(process)
+        made = owner.time_of(f"{STUDY}/links", f'{{"kind": "personal", "count": {LINKS}}}'.encode())[0]
+        print_line(f"making {LINKS} links", f"{1000 * made:.0f} ms")
+        counted, _ = owner.time_of(f"{STUDY}/results")
+        print_line(
+            f"results of {rows:,} ratings, first answer of a worker", f"{1000 * counted:.0f} ms", "< 300 ms"
+        )
+        for name, path in (
+            ("results, later", "results"),
+            ("links, a page", "links"),
+            (f"participants of {MANY_RUNS:,}, a page", "runs"),
+            ("participants, searched", "runs?search=p77"),
+        ):
+            spent = statistics.median(owner.time_of(f"{STUDY}/{path}")[0] for _ in range(5))
+            print_line(f"{name}, median of 5", f"{1000 * spent:.0f} ms", "< 300 ms")
+        first, _ = owner.time_of(f"{STUDY}/monitor")
+        print_line("monitor, first answer", f"{1000 * first:.0f} ms", "< 300 ms")
+    finally:
+        process.stop()
+
+
+def more_runs(process: ServerProcess, total: int) -> None:
+    """Runs without a rating, so that there are `total`."""
+    with migrated_services(process.settings) as services, services.database.write() as session:
+        names = [row[1] for row in session.execute(text("PRAGMA table_info(study_runs)"))]
+        own = {"id": "NULL", "public_id": "'m' || i", "client_id": "'m' || i", "token_hash": "'m' || i"}
+        values = ", ".join(own.get(name, name) for name in names)
+        series = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < :more)"
+        there = session.execute(text("SELECT count(*) FROM study_runs")).scalar_one()
+        one = "(SELECT * FROM study_runs ORDER BY id LIMIT 1)"
+        statement = f"INSERT INTO study_runs ({', '.join(names)}) {series} SELECT {values} FROM {one}, n"
+        session.execute(text(statement), {"more": total - there})
 
 
 def command_line(process: ServerProcess, folder: Path, rows: int) -> None:
@@ -175,7 +219,7 @@ def change(process: ServerProcess, number: int) -> None:
 
 def main() -> None:
     rows = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
-    for measure in (monitor, lambda folder: export(folder, rows)):
+    for measure in (monitor, lambda folder: pages(folder, rows), lambda folder: export(folder, rows)):
         with tempfile.TemporaryDirectory() as folder:
             measure(Path(folder))
 

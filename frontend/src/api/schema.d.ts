@@ -1009,6 +1009,9 @@ export interface paths {
         /**
          * Get Results
          * @description Means with within-participant error bars, distributions, response times and playback so far.
+         *
+         *     With the ETag of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting
+         *     takes long `counted_at` may lie some time back.
          */
         get: operations["get_results"];
         put?: never;
@@ -3372,6 +3375,11 @@ export interface components {
             study: string;
             /** Phase */
             phase: string;
+            /**
+             * Counted At
+             * Format: date-time
+             */
+            counted_at: string;
             /** Participants */
             participants: number;
             /** Ratings */
@@ -6746,7 +6754,9 @@ export interface operations {
             query?: {
                 phase?: "pilot" | "live";
             };
-            header?: never;
+            header?: {
+                "if-none-match"?: string | null;
+            };
             path: {
                 study: string;
             };
@@ -6762,6 +6772,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Results"];
                 };
+            };
+            /** @description Nothing has changed. */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The request's content is not acceptable */
             422: {

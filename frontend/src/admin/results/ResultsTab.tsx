@@ -5,7 +5,7 @@ import { useMemo, useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
-import { words } from "../ui/format";
+import { when, words } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
 import { cellPlot, delayPlot, type Factors, labelsOf, marginPlot, timePlot } from "./plots";
@@ -58,8 +58,8 @@ function Shown({ study, data, factors }: { study: string; data: Schemas["Results
   return (
     <Stack>
       <Alert>
-        {data.participants} participants, {data.ratings.toLocaleString()} ratings. These are means as data arrive, for a look at whether all
-        is well; the analysis is the report below.
+        {data.participants} participants, {data.ratings.toLocaleString()} ratings, counted {when(data.counted_at)}. These are means as data
+        arrive, for a look at whether all is well; the analysis is the report below.
       </Alert>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {singles.map((margin) => (
