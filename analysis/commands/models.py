@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, show_tables, working
+from analysis.commands.output import JsonOption, names_in, save_json, show_tables, working
 
 if TYPE_CHECKING:
     from analysis.read.model_csv import ModelInput
@@ -78,7 +78,8 @@ def mixed(
     with working("fitting"):
         result = fit_mixed(data.rows, participant, rating, data.within, data.item, slopes.value)
     _show(file, data, mixed_text(result))
-    show_tables(mixed_effects_table(result, file.stem), mixed_components_table(result, file.stem))
+    named = (result, file.stem, data.synthetic)
+    show_tables(mixed_effects_table(*named), mixed_components_table(*named))
     save_json(json, asdict(result), data.synthetic)
 
 
@@ -105,7 +106,8 @@ def ordinal(
     with working("fitting"):
         result = fit_ordinal(data.rows, participant, rating, data.within, data.item)
     _show(file, data, ordinal_text(result))
-    show_tables(ordinal_effects_table(result, file.stem), ordinal_coefficients_table(result, file.stem))
+    named = (result, file.stem, data.synthetic)
+    show_tables(ordinal_effects_table(*named), ordinal_coefficients_table(*named))
     save_json(json, asdict(result), data.synthetic)
 
 
@@ -113,11 +115,7 @@ def _read(file: Path, participant: str, rating: str, within: str, item: str) -> 
     from analysis.read.model_csv import read_model_input
 
     with working("reading ratings"):
-        return read_model_input(file, participant, rating, _names(within), _names(item))
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
+        return read_model_input(file, participant, rating, names_in(within), names_in(item))
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 JsonOption = Annotated[Path | None, typer.Option(help="Write every number to this JSON file.")]
 
 
+def names_in(text: str) -> list[str]:
+    """Column names separated by commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
 def show_tables(*tables: "Table") -> None:
     """Print tables, at most 80 columns wide."""
     from analysis.report.formats import as_text

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from analysis.commands.output import names_in
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
@@ -92,7 +93,20 @@ def anova(
     file: Annotated[Path, typer.Argument(help="CSV file, one row a trial (or one a cell).")],
     participant: Annotated[str, typer.Option(help="Column that names the participant.")],
     rating: Annotated[str, typer.Option(help="Column with the number measured.")],
-    within: Annotated[str, typer.Option(help="Columns of the within factors, separated by commas.")],
+    within: Annotated[
+        str, typer.Option(help="Columns of factors within participants, separated by commas.")
+    ] = "",
+    between: Annotated[
+        str, typer.Option(help="Columns of factors between participants, separated by commas.")
+    ] = "",
+    covariate: Annotated[
+        str, typer.Option(help="Columns of numbers that belong to participants, separated by commas.")
+    ] = "",
+    type: Annotated[int, typer.Option(help="Type of sums of squares, 2 or 3.", min=2, max=3)] = 3,
+    centre: Annotated[bool, typer.Option(help="Centre covariates at their mean over participants.")] = True,
+    covariate_by_group: Annotated[
+        bool, typer.Option("--covariate-by-group", help="Let slopes of covariates differ between groups.")
+    ] = False,
     json: Annotated[Path | None, typer.Option(help="Write every number to this JSON file.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write figures and the whole report to this folder.")
@@ -105,7 +119,7 @@ def anova(
         bool, typer.Option("--two-factor-pairs", help="Also compare all cells of every two-factor margin.")
     ] = False,
 ) -> None:
-    """Within-participant ANOVA of a long table: any number of factors, univariate and multivariate.
+    """ANOVA of a long table: factors within and between participants, covariates, groups of any sizes.
 
     Examples:
 
@@ -113,21 +127,28 @@ def anova(
 
       analysis anova ratings.csv --participant id --rating score --within face,blur --json results.json
 
+      analysis anova long.csv --participant id --rating score --within phase --between group --covariate age
+
     The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants: docs/analysis.md.
     """
     from analysis.plans.result import analyse_cells
     from analysis.read.long_csv import read_long_table
+    from analysis.read.participant_columns import design_of
     from analysis.within.cell_means import cell_table
 
-    factors = [name.strip() for name in within.split(",") if name.strip()]
-    if not factors:
-        raise InputError("--within names no column; expected e.g. --within face,blur")
+    factors, groups, covariates = names_in(within), names_in(between), names_in(covariate)
+    if not [*factors, *groups, *covariates]:
+        raise InputError("no factor named; expected e.g. --within face,blur or --between group")
     with _working("reading ratings"):
-        data = read_long_table(file, participant, rating, factors, trial, _scale(scale))
+        data = read_long_table(file, participant, rating, factors, trial, _scale(scale), groups, covariates)
+        cells = cell_table(data.rows, participant, rating, factors)
+        people = cells.participants
         analysis = analyse_cells(
-            cell_table(data.rows, participant, rating, factors),
+            cells,
+            between=design_of(data.rows, participant, people, groups, covariates, centre, covariate_by_group),
+            sum_of_squares=2 if type == 2 else 3,
             name=file.stem,
-            title=f"Within-participant analysis of {file.name}",
+            title=f"Analysis of {file.name}",
             source=data.source,
             rating=rating,
             synthetic=data.synthetic,

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import TYPE_CHECKING
 
-from analysis.within.anova import AnovaResult, within_anova
+from analysis.within.anova import AnovaResult, SumOfSquares, linear_anova
+from analysis.within.between import BetweenDesign, no_groups
 from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.marginal_means import MarginalMean, marginal_means
 from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of
@@ -70,16 +72,19 @@ def analyse_cells(
     rating: str,
     synthetic: bool = False,
     two_factor_pairs: bool = False,
+    between: BetweenDesign | None = None,
+    sum_of_squares: SumOfSquares = 3,
     decisions: tuple[str, ...] = (),
     labels: Labels | None = None,
     experiment: "Experiment | None" = None,
     exclusions: "Exclusions | None" = None,
 ) -> Analysis:
     """Run every test on a table of cell means."""
-    anova = within_anova(cells.y, cells.factors, cells.levels)
+    design = between or no_groups(len(cells.y))
+    anova = linear_anova(cells.y, cells.factors, cells.levels, design, sum_of_squares)
     pairs = one_factor_pairs(anova)
     if two_factor_pairs:
-        doubles = [e.factors for e in anova.effects if len(e.factors) == 2]
+        doubles = combinations(anova.all_factors, 2)
         pairs += tuple(pair for factors in doubles for pair in pairs_of(anova, factors))
     return Analysis(
         name=name,
@@ -91,7 +96,7 @@ def analyse_cells(
         anova=anova,
         means=marginal_means(anova),
         pairs=pairs,
-        decisions=(*decisions, *cell_decisions(cells)),
+        decisions=(*decisions, *cell_decisions(cells), *group_decisions(anova)),
         labels=labels or Labels(),
         experiment=experiment,
         exclusions=exclusions,
@@ -108,4 +113,23 @@ def cell_decisions(cells: CellTable) -> tuple[str, ...]:
     if low != high:
         said.append(f"cells hold {low} to {high} ratings; every cell mean weighs the same")
     said += [f"participant {who} gave one and the same rating throughout; kept" for who in cells.constant]
+    return tuple(said)
+
+
+def group_decisions(anova: AnovaResult) -> tuple[str, ...]:
+    """What was done about groups and covariates: sizes of uneven groups, the type of tests, centring."""
+    said, design = [], anova.between
+    sizes = design.group_sizes() if design.factors else {}
+    if len(set(sizes.values())) > 1:
+        named = ", ".join(f"{' '.join(levels)} {size}" for levels, size in sizes.items())
+        kind = "III (every group mean weighs the same)" if anova.sum_of_squares == 3 else "II"
+        said.append(f"groups differ in size ({named}); sums of squares of type {kind}")
+    for covariate in design.covariates:
+        if covariate.centred:
+            said.append(
+                f"covariate '{covariate.name}' centred at its mean {covariate.centre:.4g}: other effects and "
+                "means are those of a participant with this value"
+            )
+        else:
+            said.append(f"covariate '{covariate.name}' not centred: effects within are those at its value 0")
     return tuple(said)

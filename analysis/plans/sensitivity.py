@@ -7,6 +7,7 @@ from typing import Any
 from analysis.plans.result import Analysis
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
+from analysis.report.tables import caption
 from analysis.report.write import Section
 from experiments.errors import InputError
 
@@ -79,7 +80,14 @@ def mixed_model(analysis: Analysis) -> Section:
         rows.append((ours.effect, *cells))
     header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)")
     notes = (result.formula, *_parts(result.components), *result.notes)
-    table = Table("mixed", f"Linear mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    table = Table(
+        "mixed",
+        caption("Linear mixed model", analysis.name, analysis.synthetic),
+        header,
+        tuple(rows),
+        1,
+        notes,
+    )
     slopes = "every effect" if every else "the main effects"
     text = (
         f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
@@ -118,7 +126,14 @@ def ordinal_model(analysis: Analysis) -> Section:
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
     spreads = f"SD of participants {fixed(result.sd_participant, 3)}, of blinks {fixed(result.sd_item, 3)}."
     notes = (result.formula, f"Thresholds: {thresholds}. {spreads}", *result.notes)
-    table = Table("ordinal", f"Ordinal mixed model, {analysis.name}", header, tuple(rows), 1, notes)
+    table = Table(
+        "ordinal",
+        caption("Ordinal mixed model", analysis.name, analysis.synthetic),
+        header,
+        tuple(rows),
+        1,
+        notes,
+    )
     text = (
         "Ratings as ordered categories: cumulative logit with free thresholds, crossed random intercepts of "
         "participants and blinks, Laplace approximation, joint Wald tests. Without by-participant slopes its "
@@ -145,7 +160,9 @@ def bayes_factors(analysis: Analysis) -> Section:
         name = f"{pair.effect}: {pair.level_a} - {pair.level_b}"
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
     header = ("Margin: pair", "t", "BF10", "BF01", "evidence")
-    table = Table("bayes", f"Bayes factors of pairs, {analysis.name}", header, tuple(rows), 1)
+    table = Table(
+        "bayes", caption("Bayes factors of pairs", analysis.name, analysis.synthetic), header, tuple(rows), 1
+    )
     text = (
         "BF10 says how much better a difference predicts the data than none, BF01 the reverse. JZS prior, "
         "Cauchy scale r = √2/2. Between 1/3 and 3 the data do not tell."
@@ -159,7 +176,7 @@ def _factor(value: float) -> str:
     if value >= 1000:
         return f"{value:.1e}"
     if value < 0.001:
-        return "<0.001"
+        return "<.001"
     return fixed(value, 2 if value >= 0.1 else 3)
 
 

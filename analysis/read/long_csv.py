@@ -29,8 +29,25 @@ def read_long_table(
     within: Sequence[str],
     trial: str | None = None,
     scale: tuple[float, float] | None = None,
+    between: Sequence[str] = (),
+    covariates: Sequence[str] = (),
 ) -> LongData:
-    """Read one row a trial. `trial` names a column that tells a participant's trials apart.
+    """Read one row a trial.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file.
+    participant, rating : str
+        Columns of ids and of ratings.
+    within, between : sequence of str
+        Columns of factors, within and between participants.
+    trial : str, optional
+        Column that tells a participant's trials apart.
+    scale : (float, float), optional
+        Lowest and highest rating.
+    covariates : sequence of str
+        Columns of numbers that belong to participants; participants without one are left out and named.
 
     Raises
     ------
@@ -38,10 +55,10 @@ def read_long_table(
         As `read_text_table`; a column in two roles; ratings that are text or outside `scale`; one trial
         with two ratings.
     """
-    _refuse_shared_roles([participant, rating, *within, *([trial] if trial else [])])
-    wanted = [participant, rating, *within, *([trial] if trial else [])]
+    wanted = [participant, rating, *within, *between, *covariates, *([trial] if trial else [])]
+    _refuse_shared_roles(wanted)
     table = read_text_table(path, wanted, ("synthetic",))
-    for name in (participant, *within):
+    for name in (participant, *within, *between):
         texts_required(table, name)
     values = numbers(table, rating)
     refuse_out_of_scale(table, rating, values, scale)
@@ -54,9 +71,26 @@ def read_long_table(
         keep &= ~_repeats(table, [participant, trial], values, within)
     else:
         _report_copies(table, wanted, values)
-    rows = table.columns.assign(**{rating: values})[keep].reset_index(drop=True)
+    measured = {name: numbers(table, name) for name in covariates}
+    for name, given in measured.items():
+        keep &= _with_covariate(table, participant, name, given)
+    if not keep.any():
+        raise InputError(f"{path.name}: no participant has a rating and every covariate")
+    rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
     return LongData(rows, path.name, tuple(table.decisions), synthetic)
+
+
+def _with_covariate(
+    table: TextTable, participant: str, name: str, given: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Rows of participants whose covariate is known; the others are named."""
+    who = table.columns[participant].to_numpy()
+    lacking = list(dict.fromkeys(who[np.isnan(given)]))
+    if lacking:
+        people = f"participant{'s' if len(lacking) > 1 else ''} {', '.join(map(str, lacking))}"
+        table.decisions.append(f"left out for want of '{name}': {people}")
+    return np.asarray(~np.isin(who, lacking), dtype=bool)
 
 
 def _refuse_shared_roles(names: list[str]) -> None:

@@ -39,6 +39,17 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
                 for f, names in zip(cells.factors, cells.levels, strict=True)
             },
         },
+        "between": _between(analysis),
+        "covariates": [
+            {
+                "name": c.name,
+                "centre": c.centre,
+                "mean": float(c.values.mean()),
+                "sd": float(c.values.std(ddof=1)),
+            }
+            for c in analysis.anova.between.covariates
+        ],
+        "type": analysis.anova.sum_of_squares,
         "n_participants": analysis.n_participants,
         "participants": list(cells.participants),
         "confidence": analysis.anova.confidence,
@@ -54,9 +65,19 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
     }
 
 
+def _between(analysis: Analysis) -> list[dict[str, Any]]:
+    design = analysis.anova.between
+    return [
+        {"factor": name, "levels": list(levels)}
+        for name, levels in zip(design.factors, design.levels, strict=True)
+    ]
+
+
 def _effect(effect: Effect) -> dict[str, Any]:
     return {
         "effect": effect.effect,
+        "between": list(effect.between),
+        "within": list(effect.within),
         "univariate": asdict(effect.univariate),
         "univariate_reason": effect.univariate_reason,
         "multivariate": None if effect.multivariate is None else asdict(effect.multivariate),
@@ -66,6 +87,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
         "eta_sq_partial": effect.eta_sq_partial,
         "eta_sq_partial_ci": list(effect.eta_sq_partial_ci),
         "eta_sq_generalized": effect.eta_sq_generalized,
+        "omega_sq_partial": effect.omega_sq_partial,
     }
 
 

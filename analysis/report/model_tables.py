@@ -4,37 +4,42 @@ from analysis.models.mixed import MixedResult
 from analysis.models.ordinal import OrdinalResult
 from analysis.report.formats import Table
 from analysis.report.numbers import fixed, p_value
+from analysis.report.tables import caption
 
 
-def mixed_effects_table(result: MixedResult, name: str) -> Table:
+def mixed_effects_table(result: MixedResult, name: str, synthetic: bool) -> Table:
     """Type III tests with Satterthwaite's df."""
     rows = tuple(
         (e.effect, fixed(e.f_value), str(e.df_effect), fixed(e.df_error, 1), p_value(e.p_value))
         for e in result.effects
     )
-    return Table("mixed", f"Linear mixed model, {name}", ("Effect", "F", "df1", "df2", "p"), rows, 1)
+    return Table(
+        "mixed", caption("Linear mixed model", name, synthetic), ("Effect", "F", "df1", "df2", "p"), rows, 1
+    )
 
 
-def mixed_components_table(result: MixedResult, name: str) -> Table:
+def mixed_components_table(result: MixedResult, name: str, synthetic: bool) -> Table:
     """Standard deviations of the random terms."""
     rows = tuple((c.group, c.term or "residual", fixed(c.sd, 3)) for c in result.components)
-    return Table("mixed-random", f"Random effects, {name}", ("Group", "Term", "SD"), rows, 2)
+    return Table("mixed-random", caption("Random effects", name, synthetic), ("Group", "Term", "SD"), rows, 2)
 
 
-def ordinal_effects_table(result: OrdinalResult, name: str) -> Table:
+def ordinal_effects_table(result: OrdinalResult, name: str, synthetic: bool) -> Table:
     """Joint Wald tests of the effects on the logit scale."""
     rows = tuple((e.effect, fixed(e.chi2), str(e.df), p_value(e.p_value)) for e in result.effects)
-    return Table("ordinal", f"Ordinal mixed model, {name}", ("Effect", "chi2", "df", "p"), rows, 1)
+    return Table(
+        "ordinal", caption("Ordinal mixed model", name, synthetic), ("Effect", "chi2", "df", "p"), rows, 1
+    )
 
 
-def ordinal_coefficients_table(result: OrdinalResult, name: str) -> Table:
+def ordinal_coefficients_table(result: OrdinalResult, name: str, synthetic: bool) -> Table:
     """Sum-coded coefficients on the logit scale."""
     rows = tuple(
         (c.name, fixed(c.estimate, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_value))
         for c in result.coefficients
     )
     header = ("Coefficient", "b", "SE", "z", "p")
-    return Table("ordinal-coefficients", f"Ordinal coefficients, {name}", header, rows, 1)
+    return Table("ordinal-coefficients", caption("Ordinal coefficients", name, synthetic), header, rows, 1)
 
 
 def mixed_text(result: MixedResult) -> str:

@@ -5,6 +5,9 @@ import math
 DASH = "–"
 """Printed where a number does not exist."""
 
+SMALLEST_P = 0.001
+"""Below this only `<.001` is printed, in tables as in sentences."""
+
 
 def fixed(value: float, digits: int = 2) -> str:
     """`value` with a fixed number of decimals; a dash where it does not exist; no negative zero."""
@@ -24,16 +27,7 @@ def p_value(value: float) -> str:
     """p with three decimals and no leading zero; `<.001` below that."""
     if not math.isfinite(value):
         return DASH
-    return "<.001" if value < 0.0005 else share(value)
-
-
-def paper_p(value: float) -> str:
-    """p as the paper prints it: two decimals, three below .01, `<0.001` below that."""
-    if not math.isfinite(value):
-        return DASH
-    if value < 0.001:
-        return "<0.001"
-    return fixed(value, 3 if value < 0.01 else 2)
+    return "<.001" if value < SMALLEST_P else share(value)
 
 
 def apa_p(value: float) -> str:

@@ -4,7 +4,7 @@ import math
 
 from analysis.plans.result import Analysis
 from analysis.report.numbers import apa_p, fixed, share, share_interval
-from analysis.report.tables import effect_label, uses_multivariate
+from analysis.report.tables import corrected_df, effect_label, has_sphericity, uses_multivariate
 from analysis.within.effect_tests import Effect
 
 SIGNIFICANCE = 0.05
@@ -24,7 +24,11 @@ def _sentence(analysis: Analysis, effect: Effect, multivariate: bool) -> str:
         return f"The {kind} {name} could not be tested: {effect.univariate_reason}."
     verdict = "was significant" if p < SIGNIFICANCE else "was not significant"
     sentence = f"The {kind} {name} {verdict}, {_statistics(effect, multivariate)}."
-    return sentence + (_direction(analysis, effect, p < SIGNIFICANCE) if len(effect.factors) == 1 else "")
+    return sentence + (
+        _direction(analysis, effect, p < SIGNIFICANCE)
+        if len(effect.factors) == 1 and effect.factors[0] in analysis.anova.all_factors
+        else ""
+    )
 
 
 def _p(effect: Effect, multivariate: bool) -> float:
@@ -34,24 +38,24 @@ def _p(effect: Effect, multivariate: bool) -> float:
 
 
 def _statistics(effect: Effect, multivariate: bool) -> str:
-    u, m = effect.univariate, effect.multivariate
-    size = (
-        f"partial η² = {share(effect.eta_sq_partial, 2)}, 95% CI {share_interval(effect.eta_sq_partial_ci)}"
-    )
-    if multivariate and m is not None:
-        trace = f", Pillai's trace = {share(m.pillai, 2)}" if m.df_effect > 1 else ""
-        test = f"F({m.df_effect}, {m.df_error}) = {fixed(m.f_value)}, {apa_p(m.p_value)}{trace}"
-        corrected = f" (univariate {_corrected(effect)})" if m.df_effect > 1 else ""
-        return f"{test}, {size}{corrected}"
-    if u.df_effect > 1:
-        return f"{_corrected(effect)}, {size}"
-    return f"F({u.df_effect}, {u.df_error}) = {fixed(u.f_value)}, {apa_p(u.p_value)}, {size}"
+    m = effect.multivariate
+    if multivariate and m is not None and has_sphericity(effect):
+        test = f"F({m.df_effect}, {m.df_error}) = {fixed(m.f_value)}, {apa_p(m.p_value)}"
+        size = _size(m.eta_sq_partial, m.eta_sq_partial_ci)
+        return f"{test}, Pillai's trace = {share(m.pillai, 2)}, {size} (univariate {_univariate(effect)})"
+    return _univariate(effect)
 
 
-def _corrected(effect: Effect) -> str:
+def _univariate(effect: Effect) -> str:
+    """The univariate F with its own df, p and size, corrected where sphericity may fail."""
     u = effect.univariate
-    df = f"{fixed(u.df_effect * u.epsilon_gg)}, {fixed(u.df_error * u.epsilon_gg)}"
-    return f"F({df}) = {fixed(u.f_value)}, {apa_p(u.p_gg)}, Greenhouse-Geisser ε = {share(u.epsilon_gg, 2)}"
+    correction = f", Greenhouse-Geisser ε = {share(u.epsilon_gg, 2)}" if has_sphericity(effect) else ""
+    test = f"F({corrected_df(u)}) = {fixed(u.f_value)}, {apa_p(u.p_gg)}{correction}"
+    return f"{test}, {_size(effect.eta_sq_partial, effect.eta_sq_partial_ci)}"
+
+
+def _size(eta: float, interval: tuple[float, float]) -> str:
+    return f"partial η² = {share(eta, 2)}, 95% CI {share_interval(interval)}"
 
 
 def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:

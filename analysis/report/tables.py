@@ -10,14 +10,14 @@ from analysis.report.numbers import (
     fixed,
     interval,
     p_value,
-    paper_p,
     share,
     share_interval,
     sum_text,
 )
-from analysis.within.effect_tests import Effect
+from analysis.within.effect_tests import Effect, UnivariateTest
 
 TIMES = " × "
+SYNTHETIC_MARK = " [SYNTHETIC DATA]"
 
 
 def all_tables(analysis: Analysis) -> tuple[Table, ...]:
@@ -34,12 +34,12 @@ def paper_table(analysis: Analysis) -> Table:
     One-factor designs also show the SD over participants, which is what the paper's Table III prints.
     """
     multivariate = uses_multivariate(analysis)
-    spread = len(analysis.anova.factors) == 1
+    spread = len(analysis.anova.factors) == 1 and not analysis.anova.between.terms[1:]
     rows: list[tuple[str, ...]] = []
-    for factor in analysis.anova.factors:
+    for factor in analysis.anova.all_factors:
         rows += _factor_rows(analysis, factor, multivariate, spread)
     rows += _interaction_rows(analysis, multivariate)
-    univariate = "univariate, df (q, q (N - 1)), p by Greenhouse-Geisser"
+    univariate = "univariate, df and p corrected by Greenhouse-Geisser"
     kind = "multivariate, df (q, N - q)" if multivariate else univariate
     notes = [
         f"N = {analysis.n_participants}. F: {kind}. SE: standard error over participants.",
@@ -50,22 +50,34 @@ def paper_table(analysis: Analysis) -> Table:
 
 
 def uses_multivariate(analysis: Analysis) -> bool:
-    """Whether the table's tests are the multivariate ones: where planned, and where every effect has one."""
+    """Whether the table's tests are multivariate: where planned, if every effect has an exact one."""
     planned = analysis.experiment is None or analysis.experiment.analysis.statistic == "multivariate"
-    return planned and all(e.multivariate is not None for e in analysis.anova.effects)
+    tests = [effect.multivariate for effect in analysis.anova.effects]
+    return planned and all(test is not None and test.exact for test in tests)
+
+
+def caption(what: str, name: str, synthetic: bool) -> str:
+    """Title of a table: what it shows, of which data, and that they are synthetic where they are."""
+    return f"{what}, {name}{SYNTHETIC_MARK if synthetic else ''}"
 
 
 def _title(analysis: Analysis, what: str) -> str:
-    mark = " [SYNTHETIC DATA]" if analysis.synthetic else ""
-    return f"{what}, {analysis.name}{mark}"
+    return caption(what, analysis.name, analysis.synthetic)
 
 
 def _test_cells(effect: Effect, multivariate: bool) -> tuple[str, str, str]:
     if multivariate and effect.multivariate is not None:
         m = effect.multivariate
-        return fixed(m.f_value), f"{m.df_effect}, {m.df_error}", paper_p(m.p_value)
+        return fixed(m.f_value), f"{m.df_effect}, {m.df_error}", p_value(m.p_value)
     u = effect.univariate
-    return fixed(u.f_value), f"{u.df_effect}, {u.df_error}", paper_p(u.p_gg)
+    return fixed(u.f_value), corrected_df(u), p_value(u.p_gg)
+
+
+def corrected_df(test: UnivariateTest) -> str:
+    """Greenhouse-Geisser's df, whole numbers where nothing is corrected."""
+    if not test.epsilon_gg < 1:
+        return f"{test.df_effect}, {test.df_error}"
+    return f"{fixed(test.df_effect_gg)}, {fixed(test.df_error_gg)}"
 
 
 def _factor_rows(analysis: Analysis, factor: str, multivariate: bool, spread: bool) -> list[tuple[str, ...]]:
@@ -85,7 +97,7 @@ def _interaction_rows(analysis: Analysis, multivariate: bool) -> list[tuple[str,
     return [
         (effect_label(analysis, effect.factors), "", "", *_test_cells(effect, multivariate))
         for effect in analysis.anova.effects
-        if len(effect.factors) > 1
+        if len(effect.factors) > 1 or effect.factors[0] not in analysis.anova.all_factors
     ]
 
 
@@ -129,6 +141,11 @@ def univariate_table(analysis: Analysis) -> Table:
     return Table("univariate", _title(analysis, "Univariate tests"), header, rows, 1, notes)
 
 
+def has_sphericity(effect: Effect) -> bool:
+    """Whether an effect has several contrasts within participants, so that sphericity may fail."""
+    return effect.mauchly is not None or effect.univariate.epsilon_gg < 1
+
+
 def sphericity_table(analysis: Analysis) -> Table:
     """Mauchly's test, both epsilons, and p with corrected df; effects with one contrast are left out."""
     rows = tuple(
@@ -137,14 +154,16 @@ def sphericity_table(analysis: Analysis) -> Table:
             share(e.mauchly.w) if e.mauchly else DASH,
             p_value(e.mauchly.p_value) if e.mauchly else DASH,
             share(e.univariate.epsilon_gg),
+            f"{fixed(e.univariate.df_effect_gg, 1)}, {fixed(e.univariate.df_error_gg, 1)}",
             p_value(e.univariate.p_gg),
             fixed(e.univariate.epsilon_hf, 3),
+            f"{fixed(e.univariate.df_effect_hf, 1)}, {fixed(e.univariate.df_error_hf, 1)}",
             p_value(e.univariate.p_hf),
         )
         for e in analysis.anova.effects
-        if e.univariate.df_effect > 1
+        if has_sphericity(e)
     )
-    header = ("Effect", "W", "p(W)", "ε GG", "p GG", "ε HF", "p HF")
+    header = ("Effect", "W", "p(W)", "ε GG", "df GG", "p GG", "ε HF", "df HF", "p HF")
     notes = (
         "W: Mauchly's test, textbook form. GG: Greenhouse-Geisser, HF: Huynh-Feldt (printed uncapped, used "
         "as min(1, ε)). Effects with one contrast cannot violate sphericity and are left out.",
@@ -154,7 +173,7 @@ def sphericity_table(analysis: Analysis) -> Table:
 
 
 def multivariate_table(analysis: Analysis) -> Table:
-    """The four multivariate statistics and their exact F."""
+    """The four multivariate statistics and their F."""
     rows = tuple(
         (
             e.effect,
@@ -172,25 +191,36 @@ def multivariate_table(analysis: Analysis) -> Table:
     )
     header = ("Effect", "Pillai", "Wilks", "H-L", "Roy", "F", "df", "p")
     notes = (
-        "H-L: Hotelling-Lawley trace. All four give this one exact F.",
+        "H-L: Hotelling-Lawley trace. "
+        + (
+            "All four give this one exact F."
+            if all(e.multivariate.exact for e in analysis.anova.effects if e.multivariate)
+            else "F is Pillai's; where an effect has several dimensions it is an approximation."
+        ),
         *_reasons(analysis, "multivariate_reason"),
     )
     return Table("multivariate", _title(analysis, "Multivariate tests"), header, rows, 1, notes)
 
 
 def effect_size_table(analysis: Analysis) -> Table:
-    """Partial and generalised eta squared."""
+    """Sizes of the univariate effects and, beside them, of the multivariate ones."""
     rows = tuple(
         (
             e.effect,
             share(e.eta_sq_partial),
             share_interval(e.eta_sq_partial_ci),
             share(e.eta_sq_generalized),
+            share(e.omega_sq_partial),
+            share(e.multivariate.eta_sq_partial) if e.multivariate else DASH,
+            share_interval(e.multivariate.eta_sq_partial_ci) if e.multivariate else DASH,
         )
         for e in analysis.anova.effects
     )
-    notes = ("Interval: 95%, noncentral F of the univariate test (Steiger 2004).",)
-    header = ("Effect", "partial η²", "95% CI", "generalised η²")
+    notes = (
+        "ηₚ², ω²ₚ (partial), ηG² (generalised): of the univariate test; its interval uses the df of "
+        "Greenhouse-Geisser. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F (Steiger 2004).",
+    )
+    header = ("Effect", "ηₚ²", "95% CI", "ηG²", "ω²ₚ", "mv ηₚ²", "95% CI")
     return Table("effects", _title(analysis, "Effect sizes"), header, rows, 1, notes)
 
 
@@ -226,8 +256,9 @@ def pairs_table(analysis: Analysis) -> Table:
         for p in analysis.pairs
     )
     notes = (
-        f"Paired t tests on participants' marginal means, df = {analysis.n_participants - 1}. Bonf., Holm: p "
-        "adjusted for the pairs of the margin. Interval: 95%, unadjusted. dz: mean difference over its SD.",
+        f"t tests on participants' marginal means, df = {analysis.anova.df_error}, paired within people. "
+        "Bonf., Holm: p adjusted for the pairs of the margin. Interval: 95%, unadjusted. dz: mean difference "
+        "over its SD.",
     )
     header = ("Margin: pair", "Diff.", "95% CI", "t", "p", "Bonf.", "Holm", "dz")
     return Table("pairs", _title(analysis, "Pairs"), header, rows, 1, notes, folded=len(rows) > 24)

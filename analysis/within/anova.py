@@ -1,21 +1,28 @@
-"""The n-way within-participant ANOVA: univariate and multivariate tests of every effect."""
+"""The n-way ANOVA of cell means within and between participants, by the multivariate linear model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.within.between import BetweenDesign, no_groups, term_directions
 from analysis.within.contrasts import effect_members, effect_scores, rotate
-from analysis.within.effect_tests import Effect, above_noise, effects_of, reduce_scores
+from analysis.within.effect_tests import Effect, Scores, effects_of, error_scores, hypothesis_scores
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
+SumOfSquares = Literal[2, 3]
 
 
 @dataclass(frozen=True)
 class AnovaResult:
-    """Every effect of a within-participant design, and the cell means (N, a, b, ...) it came from."""
+    """Every effect of a design, and the cell means (N, a, b, ...) it came from.
+
+    `factors` and `levels` are those within participants, in axis order; `between` holds groups and
+    covariates. `ss_participants` is the error between participants: what groups and covariates leave.
+    """
 
     effects: tuple[Effect, ...]
     factors: tuple[str, ...]
@@ -24,6 +31,23 @@ class AnovaResult:
     ss_participants: float
     confidence: float
     y: Floats = field(repr=False, compare=False)
+    between: BetweenDesign = field(repr=False, compare=False)
+    sum_of_squares: SumOfSquares = 3
+
+    @property
+    def all_factors(self) -> tuple[str, ...]:
+        """Factors between participants, then those within."""
+        return (*self.between.factors, *self.factors)
+
+    @property
+    def all_levels(self) -> tuple[tuple[str, ...], ...]:
+        """Levels of `all_factors`."""
+        return (*self.between.levels, *self.levels)
+
+    @property
+    def df_error(self) -> int:
+        """Participants less coefficients between them: N - 1 where all are of one group."""
+        return self.n_participants - int(self.between.matrix.shape[1])
 
     def effect(self, name: str) -> Effect:
         """Return the effect called `name`, its factors in any order."""
@@ -46,46 +70,124 @@ def within_anova(
 
     Parameters
     ----------
-    y : (N, a, b, ...) participants' cell means, one axis a factor; complete, finite, N >= 2.
-    factors : names of the factors, in axis order.
-    levels : level names of each factor, in index order; numbers from 1 where None.
-    confidence : coverage of the intervals of partial eta squared.
+    y : (N, a, b, ...) array
+        Participants' cell means, one axis a factor; complete, finite, N >= 2.
+    factors : sequence of str
+        Names of the factors, in axis order.
+    levels : sequence of sequences of str, optional
+        Level names of each factor, in index order; numbers from 1 if not given.
+    confidence : float
+        Coverage of the intervals of partial eta squared.
+
+    Returns
+    -------
+    AnovaResult
 
     Raises
     ------
     InputError
         One participant, a factor with one level, missing values, or names that do not fit the shape.
+    """
+    if not factors:
+        raise InputError("expected at least one factor")
+    cells = np.asarray(y, dtype=np.float64)
+    return linear_anova(cells, factors, levels, no_groups(len(cells)), 3, confidence)
+
+
+def linear_anova(
+    y: ArrayLike,
+    factors: Sequence[str],
+    levels: Sequence[Sequence[str]] | None,
+    between: BetweenDesign,
+    sum_of_squares: SumOfSquares = 3,
+    confidence: float = 0.95,
+) -> AnovaResult:
+    r"""Analysis of variance of any within x between x covariate design, groups of any sizes.
+
+    Parameters
+    ----------
+    y : (N, a, b, ...) array
+        Participants' cell means, one axis a within factor; (N,) where there is none.
+    factors : sequence of str
+        Names of the within factors, in axis order.
+    levels : sequence of sequences of str, optional
+        Level names of each within factor.
+    between : BetweenDesign
+        Groups and covariates of the same N participants.
+    sum_of_squares : {2, 3}
+        Type II or III.
+    confidence : float
+        Coverage of the intervals of partial eta squared.
+
+    Returns
+    -------
+    AnovaResult
+
+    Raises
+    ------
+    InputError
+        As `within_anova`; no effect at all.
 
     Notes
     -----
-    Univariate, Greenhouse-Geisser, Huynh-Feldt (Lecoutre's correction equals it here), Mauchly, and the
-    multivariate test Hotelling-Lawley on (q, N - q) df that the paper prints.
-    Source: Maxwell & Delaney (2004), chapters 11-14; Olejnik & Algina (2003) for generalised eta squared.
+    :math:`Y M = X B + R` with Y (N, K) cell means, M orthonormal contrasts (K, q) of the within part of an
+    effect, X (N, p) the design between participants. For a term with orthonormal directions U (r, N)
+    (see `term_directions`)
+
+    1. :math:`H = (U Y M)' (U Y M)`, :math:`E = R'R`, error df :math:`\nu = N - p`;
+    2. univariate :math:`F = \frac{\mathrm{tr} H / (r q)}{\mathrm{tr} E / (q \nu)}` on
+       :math:`r q, q \nu`, both times :math:`\epsilon` where corrected: Greenhouse-Geisser
+       :math:`\epsilon = (\mathrm{tr} E)^2 / (q \, \mathrm{tr} E^2)`, Huynh-Feldt with Lecoutre's df
+       :math:`((\nu + 1) q \epsilon - 2) / (q (\nu - q \epsilon))`;
+    3. multivariate statistics from the eigenvalues of :math:`E^{-1} H` (see `four_statistics`).
+
+    Sources: Maxwell & Delaney (2004), chapters 11-14; Fox & Weisberg (2019), appendix on multivariate linear
+    models; Olejnik & Algina (2003) for generalised eta squared, all factors manipulated.
     """
     cells = _checked(y, factors, levels)
-    n, k = cells.shape[0], cells[0].size
+    n, k = len(cells), cells[0].size
     floor = n * k * (8 * np.finfo(float).eps * float(np.abs(cells).max())) ** 2
-    participant_means = cells.reshape(n, -1).mean(axis=1)
-    spread = participant_means - participant_means.mean()
-    ss_participants = above_noise(k * float(spread @ spread), floor)
-    centred = cells - participant_means.reshape(-1, *[1] * len(factors))
-    rotated = rotate(centred)
-    scores = [reduce_scores(effect_scores(rotated, m), m, floor) for m in effect_members(len(factors))]
+    people = cells.reshape(n, -1).mean(axis=1)
+    rotated = rotate(cells - people.reshape(-1, *[1] * len(factors)))
+    strata: dict[tuple[int, ...], Floats] = {(): np.sqrt(k) * (people - people.mean())[:, None]}
+    strata |= {m: effect_scores(rotated, m) for m in effect_members(len(factors))}
+    scores, total = _scores(strata, between, sum_of_squares, floor)
+    if not scores:
+        raise InputError("expected a factor or a covariate; name one with --within, --between or --covariate")
     names = levels or [[str(i + 1) for i in range(size)] for size in cells.shape[1:]]
     return AnovaResult(
-        effects=effects_of(scores, n, list(factors), ss_participants, confidence),
+        effects=effects_of(scores, list(factors), sum(total.values()), confidence),
         factors=tuple(factors),
         levels=tuple(tuple(str(level) for level in group) for group in names),
         n_participants=n,
-        ss_participants=ss_participants,
+        ss_participants=total[()],
         confidence=confidence,
         y=cells,
+        between=between,
+        sum_of_squares=sum_of_squares,
     )
+
+
+def _scores(
+    strata: dict[tuple[int, ...], Floats], between: BetweenDesign, sum_of_squares: int, floor: float
+) -> tuple[list[Scores], dict[tuple[int, ...], float]]:
+    """Scores of every effect, those of fewer factors first, and the error sum of squares of every stratum."""
+    basis = np.linalg.qr(between.matrix)[0]
+    directions = term_directions(between, sum_of_squares)
+    df, scores, total = len(basis) - basis.shape[1], [], {}
+    for members, z in strata.items():
+        residual = z - basis @ (basis.T @ z)
+        error = error_scores(residual - basis @ (basis.T @ residual), members, df, floor)
+        total[members] = error.ss
+        for term, rows in zip(between.terms, directions, strict=True):
+            if term or members:
+                scores.append(hypothesis_scores(rows @ z, term, error, floor))
+    return sorted(scores, key=lambda s: len(s.between) + len(s.error.members)), total
 
 
 def _checked(y: ArrayLike, factors: Sequence[str], levels: Sequence[Sequence[str]] | None) -> Floats:
     cells = np.asarray(y, dtype=np.float64)
-    if cells.ndim != len(factors) + 1 or not factors:
+    if cells.ndim != len(factors) + 1:
         raise InputError(
             f"expected one axis for participants and one for each of {list(factors)}, got {cells.shape}"
         )

@@ -85,7 +85,7 @@ def cell_table(
     who, people = _codes(rows[participant], None, participant)
     coded = [_codes(rows[name], (levels or {}).get(name), name) for name in within]
     shape = tuple(len(names) for _, names in coded)
-    cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape)
+    cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape) if within else np.zeros_like(who)
     values = rows[rating].to_numpy(dtype=np.float64)
     slot, slots = who * int(np.prod(shape)) + cell, len(people) * int(np.prod(shape))
     counts = np.bincount(slot, minlength=slots).reshape(len(people), *shape)

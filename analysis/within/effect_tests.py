@@ -1,6 +1,7 @@
 """The tests of one effect from its contrast scores: univariate, corrected, multivariate, Mauchly."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from scipy import special
 
 from analysis.within.contrasts import effect_name
 from analysis.within.eta_squared import partial_eta_squared, partial_eta_squared_ci
+from analysis.within.multivariate import FourStatistics, four_statistics
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +23,7 @@ SINGULAR_RATIO = 1e-10
 class UnivariateTest:
     """Univariate F with sphericity corrections; NaN where undefined (`univariate_reason` says why).
 
-    `epsilon_hf` is uncapped; `p_hf` uses min(1, epsilon_hf).
+    `epsilon_hf` is uncapped; `p_hf` and the df of Huynh-Feldt use min(1, epsilon_hf).
     """
 
     ss: float
@@ -34,11 +36,20 @@ class UnivariateTest:
     p_gg: float
     epsilon_hf: float
     p_hf: float
+    df_effect_gg: float
+    df_error_gg: float
+    df_effect_hf: float
+    df_error_hf: float
 
 
 @dataclass(frozen=True)
 class MultivariateTest:
-    """The four multivariate statistics and their one exact F on (q, N - q) df."""
+    """The four multivariate statistics and one F.
+
+    F, its df and p are exact and the same for all four where the effect has one direction between
+    participants or one contrast within; else they are Pillai's, and `statistics` has those of each.
+    `eta_sq_partial` is V / s = F df1 / (F df1 + df2), the size that belongs to this F.
+    """
 
     pillai: float
     wilks: float
@@ -48,6 +59,10 @@ class MultivariateTest:
     df_effect: int
     df_error: int
     p_value: float
+    eta_sq_partial: float
+    eta_sq_partial_ci: tuple[float, float]
+    exact: bool
+    statistics: FourStatistics
 
 
 @dataclass(frozen=True)
@@ -60,10 +75,16 @@ class Mauchly:
 
 @dataclass(frozen=True)
 class Effect:
-    """All that is known about one effect. A test that does not exist is None, and its reason is given."""
+    """All that is known about one effect. A test that does not exist is None, and its reason is given.
+
+    `eta_sq_partial` and its interval belong to the univariate F; the interval uses Greenhouse-Geisser's df.
+    `factors` are those between participants and covariates first, then those within.
+    """
 
     effect: str
     factors: tuple[str, ...]
+    between: tuple[str, ...]
+    within: tuple[str, ...]
     univariate: UnivariateTest
     univariate_reason: str | None
     multivariate: MultivariateTest | None
@@ -73,23 +94,40 @@ class Effect:
     eta_sq_partial: float
     eta_sq_partial_ci: tuple[float, float]
     eta_sq_generalized: float
+    omega_sq_partial: float
 
 
 @dataclass(frozen=True)
-class Scores:
-    """What one effect's contrast scores (N, q) boil down to; every test is arithmetic on these.
+class ErrorScores:
+    """The error of one set of within contrasts, shared by every effect between participants tested on it.
 
-    `hotelling` is N zbar' E^-1 zbar and `log_w` the log of Mauchly's W, NaN where they do not exist
-    (`reason` says why); `epsilon` is Greenhouse-Geisser's.
+    `residual` is (N, q) with `df` = N - p error df; `epsilon` is Greenhouse-Geisser's, `log_w` the log of
+    Mauchly's W, NaN where it does not exist. `whiten` (q, q) gives scores with E = I; None where E is
+    singular or df < q, and `reason` says which.
     """
 
     members: tuple[int, ...]
     q: int
+    df: int
     ss: float
-    ss_error: float
     epsilon: float
-    hotelling: float
     log_w: float
+    whiten: Floats | None = field(repr=False)
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Scores:
+    """One effect: its term between participants, its within contrasts, its sum of squares.
+
+    `eigenvalues` are those of E^-1 H (empty where they do not exist).
+    """
+
+    between: tuple[str, ...]
+    error: ErrorScores
+    rank: int
+    ss: float
+    eigenvalues: Floats = field(repr=False)
     reason: str | None
 
 
@@ -98,128 +136,165 @@ def above_noise(value: float, floor: float) -> float:
     return value if value > floor else 0.0
 
 
-def reduce_scores(z: Floats, members: tuple[int, ...], floor: float) -> Scores:
-    """Reduce contrast scores `z` (N, q) of the factors at `members`; sums below `floor` are zero."""
-    n, q = z.shape
-    mean = z.mean(axis=0)
-    residual = z - mean
-    ss = above_noise(n * float(mean @ mean), floor)
-    ss_error = above_noise(float(np.vdot(residual, residual)), floor)
-    if ss_error == 0.0:
-        return Scores(members, q, ss, 0.0, np.nan, np.nan, np.nan, NO_ERROR if ss else NO_VARIANCE)
+def error_scores(residual: Floats, members: tuple[int, ...], df: int, floor: float) -> ErrorScores:
+    """Reduce residuals (N, q) of the within contrasts at `members`; a sum below `floor` is zero."""
+    q = residual.shape[1]
+    ss = above_noise(float(np.vdot(residual, residual)), floor)
+    if ss == 0.0:
+        return ErrorScores(members, q, df, 0.0, np.nan, np.nan, None, NO_ERROR)
     if q == 1:
-        return Scores(members, 1, ss, ss_error, 1.0, ss / ss_error, 0.0, None)
+        return ErrorScores(members, 1, df, ss, 1.0, 0.0, np.array([[1 / np.sqrt(ss)]]), None)
     error = residual.T @ residual
-    epsilon = min(1.0, ss_error**2 / (q * float(np.vdot(error, error))))
-    if n <= q:
-        reason = f"needs more participants than contrasts: N = {n}, contrasts = {q}"
-        return Scores(members, q, ss, ss_error, epsilon, np.nan, np.nan, reason)
-    hotelling, log_det = _hotelling(residual, mean)
-    singular = "the error matrix is singular" if np.isnan(hotelling) else None
-    return Scores(
-        members, q, ss, ss_error, epsilon, hotelling, log_det - q * float(np.log(ss_error / q)), singular
-    )
+    epsilon = min(1.0, ss**2 / (q * float(np.vdot(error, error))))
+    if df < q:
+        reason = f"needs more participants than contrasts: error df = {df}, contrasts = {q}"
+        return ErrorScores(members, q, df, ss, epsilon, np.nan, None, reason)
+    whiten, log_det = _whitening(residual)
+    reason_singular = "the error matrix is singular" if whiten is None else None
+    log_w = log_det - q * float(np.log(ss / q))
+    return ErrorScores(members, q, df, ss, epsilon, log_w, whiten, reason_singular)
 
 
-def _hotelling(residual: Floats, mean: Floats) -> tuple[float, float]:
-    """N zbar' E^-1 zbar and log det E by the singular values of the residuals; NaN where E is singular."""
+def _whitening(residual: Floats) -> tuple[Floats | None, float]:
+    """A matrix W with W' E W = I by the singular values of the residuals, and log det E."""
     scale = np.sqrt(np.einsum("ij,ij->j", residual, residual))
     if (scale <= SINGULAR_RATIO * scale.max()).any():
-        return np.nan, np.nan
+        return None, np.nan
     _, singular, right = np.linalg.svd(residual / scale, full_matrices=False)
     if singular[-1] <= SINGULAR_RATIO * singular[0]:
-        return np.nan, np.nan
-    along = (right @ (mean / scale)) / singular
-    return len(residual) * float(along @ along), 2 * float(np.log(singular).sum() + np.log(scale).sum())
+        return None, np.nan
+    log_det = 2 * float(np.log(singular).sum() + np.log(scale).sum())
+    return (right / singular[:, None]).T / scale[:, None], log_det
+
+
+def hypothesis_scores(directed: Floats, between: tuple[str, ...], error: ErrorScores, floor: float) -> Scores:
+    """Scores of one effect from `directed` (r, q), the within contrasts along the term's directions."""
+    ss = above_noise(float(np.vdot(directed, directed)), floor)
+    rank = len(directed)
+    if error.ss == 0.0:
+        return Scores(between, error, rank, ss, np.empty(0), NO_ERROR if ss else NO_VARIANCE)
+    if error.whiten is None:
+        return Scores(between, error, rank, ss, np.empty(0), error.reason)
+    roots: Floats = np.asarray(np.linalg.svd(directed @ error.whiten, compute_uv=False), dtype=np.float64)
+    return Scores(between, error, rank, ss, roots**2, None)
 
 
 def effects_of(
-    scores: list[Scores], n: int, factors: list[str], ss_participants: float, confidence: float
+    scores: Sequence[Scores], factors: Sequence[str], ss_error_total: float, confidence: float
 ) -> tuple[Effect, ...]:
-    """Every effect from its scores; p values and intervals of all effects are computed together."""
-    univariate = _univariate(scores, n)
-    ss, ss_error = np.array([s.ss for s in scores]), np.array([s.ss_error for s in scores])
-    f, q = np.array([u.f_value for u in univariate]), np.array([s.q for s in scores])
-    eta, ci = partial_eta_squared(ss, ss_error), partial_eta_squared_ci(f, q, q * (n - 1), confidence)
-    with np.errstate(invalid="ignore"):
-        generalized = ss / (ss + ss_participants + ss_error.sum())
-    multivariate = _multivariate(scores, n)
+    """Every effect from its scores; p values and intervals of all effects are computed together.
+
+    `factors` are the within factors; `ss_error_total` is the sum of the errors of all strata.
+    """
+    univariate = _univariate(scores)
+    multivariate = _multivariate(scores, confidence)
+    ss, ss_error = np.array([s.ss for s in scores]), np.array([s.error.ss for s in scores])
+    f = np.array([u.f_value for u in univariate])
+    d1, d2 = np.array([(u.df_effect, u.df_error) for u in univariate], dtype=np.float64).T
+    shrink = np.nan_to_num(np.array([s.error.epsilon for s in scores]), nan=1.0)
+    eta = partial_eta_squared(ss, ss_error)
+    ci = partial_eta_squared_ci(f, d1 * shrink, d2 * shrink, confidence)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        generalized = ss / (ss + ss_error_total)
+        omega = (f - 1) * d1 / (f * d1 + d2 + 1)
     return tuple(
         Effect(
-            effect=effect_name([factors[m] for m in s.members]),
-            factors=tuple(factors[m] for m in s.members),
+            effect=effect_name([*s.between, *(factors[m] for m in s.error.members)]),
+            factors=(*s.between, *(factors[m] for m in s.error.members)),
+            between=s.between,
+            within=tuple(factors[m] for m in s.error.members),
             univariate=univariate[i],
-            univariate_reason=s.reason if s.ss_error == 0 else None,
+            univariate_reason=s.reason if s.error.ss == 0 else None,
             multivariate=multivariate[i],
             multivariate_reason=s.reason,
-            mauchly=_mauchly(s, n),
-            mauchly_reason="one contrast: sphericity holds by definition" if s.q == 1 else s.reason,
+            mauchly=_mauchly(s.error),
+            mauchly_reason="one contrast: sphericity holds by definition" if s.error.q == 1 else s.reason,
             eta_sq_partial=float(eta[i]),
             eta_sq_partial_ci=(float(ci[i, 0]), float(ci[i, 1])),
             eta_sq_generalized=float(generalized[i]),
+            omega_sq_partial=float(omega[i]),
         )
         for i, s in enumerate(scores)
     )
 
 
-def _univariate(scores: list[Scores], n: int) -> list[UnivariateTest]:
-    columns = np.array([(s.ss, s.ss_error, s.q, s.epsilon) for s in scores])
-    ss, ss_error, q, gg = columns.T
-    nu = n - 1
+def _univariate(scores: Sequence[Scores]) -> list[UnivariateTest]:
+    columns = np.array([(s.ss, s.error.ss, s.rank, s.error.q, s.error.df, s.error.epsilon) for s in scores])
+    ss, ss_error, r, q, nu, gg = columns.T
     with np.errstate(invalid="ignore", divide="ignore"):
-        f = np.where(ss_error > 0, (ss / q) / (ss_error / (q * nu)), np.nan)
+        f = np.where(ss_error > 0, (ss / (r * q)) / (ss_error / (q * nu)), np.nan)
         # with q eps = nu (few participants) Huynh-Feldt has no finite value; its cap, 1, is used
         room = nu - q * gg > 1e-9 * nu
-        hf = np.where(q == 1, gg, np.where(room, (n * q * gg - 2) / (q * (nu - q * gg)), np.nan))
+        hf = np.where(q == 1, gg, np.where(room, ((nu + 1) * q * gg - 2) / (q * (nu - q * gg)), np.nan))
     used = np.where(np.isnan(hf), 1.0, np.minimum(1.0, hf))
     shrink = np.stack([np.ones_like(q), gg, used])
-    p, p_gg, p_hf = special.fdtrc(shrink * q, shrink * q * nu, f)
+    df1, df2 = shrink * r * q, shrink * q * nu
+    p, p_gg, p_hf = special.fdtrc(df1, df2, f)
     return [
         UnivariateTest(
             ss=s.ss,
-            ss_error=s.ss_error,
-            df_effect=s.q,
-            df_error=s.q * nu,
+            ss_error=s.error.ss,
+            df_effect=s.rank * s.error.q,
+            df_error=s.error.q * s.error.df,
             f_value=float(f[i]),
             p_value=float(p[i]),
-            epsilon_gg=s.epsilon,
+            epsilon_gg=s.error.epsilon,
             p_gg=float(p_gg[i]),
             epsilon_hf=float(hf[i]),
             p_hf=float(p_hf[i]),
+            df_effect_gg=float(df1[1, i]),
+            df_error_gg=float(df2[1, i]),
+            df_effect_hf=float(df1[2, i]),
+            df_error_hf=float(df2[2, i]),
         )
         for i, s in enumerate(scores)
     ]
 
 
-def _multivariate(scores: list[Scores], n: int) -> list[MultivariateTest | None]:
-    q = np.array([s.q for s in scores])
-    size = np.array([s.hotelling for s in scores])
-    f = size * (n - q) / q
-    p = special.fdtrc(q, np.maximum(n - q, 1), f)
-    return [
-        None
-        if s.reason is not None
-        else MultivariateTest(
-            pillai=float(size[i] / (1 + size[i])),
-            wilks=float(1 / (1 + size[i])),
-            hotelling_lawley=float(size[i]),
-            roy=float(size[i]),
-            f_value=float(f[i]),
-            df_effect=s.q,
-            df_error=n - s.q,
-            p_value=float(p[i]),
-        )
-        for i, s in enumerate(scores)
+def _multivariate(scores: Sequence[Scores], confidence: float) -> list[MultivariateTest | None]:
+    every = [
+        None if s.reason else four_statistics(s.eigenvalues, s.error.q, s.rank, s.error.df) for s in scores
     ]
+    known = [i for i, four in enumerate(every) if four is not None]
+    triples = [(four.pillai.f_value, four.pillai.df_effect, four.pillai.df_error) for four in every if four]
+    tests: list[MultivariateTest | None] = [None] * len(every)
+    if not triples:
+        return tests
+    f_value, df_effect, df_error = np.array(triples).T
+    intervals = partial_eta_squared_ci(f_value, df_effect, df_error, confidence)
+    for i, interval in zip(known, intervals, strict=True):
+        four = every[i]
+        if four is not None:
+            smaller = min(scores[i].rank, scores[i].error.q)
+            tests[i] = _one_test(four, smaller, (float(interval[0]), float(interval[1])))
+    return tests
 
 
-def _mauchly(s: Scores, n: int) -> Mauchly | None:
-    if s.q == 1 or s.reason is not None:
+def _one_test(four: FourStatistics, smaller: int, interval: tuple[float, float]) -> MultivariateTest:
+    first = four.pillai
+    return MultivariateTest(
+        pillai=first.value,
+        wilks=four.wilks.value,
+        hotelling_lawley=four.hotelling_lawley.value,
+        roy=four.roy.value,
+        f_value=first.f_value,
+        df_effect=round(first.df_effect),
+        df_error=round(first.df_error),
+        p_value=first.p_value,
+        eta_sq_partial=first.value / smaller,
+        eta_sq_partial_ci=interval,
+        exact=smaller == 1,
+        statistics=four,
+    )
+
+
+def _mauchly(error: ErrorScores) -> Mauchly | None:
+    if error.q == 1 or error.whiten is None:
         return None
-    q, nu = s.q, n - 1
+    q, nu = error.q, error.df
     rho = 1 - (2 * q**2 + q + 2) / (6 * q * nu)
-    chi2, df = -nu * rho * s.log_w, q * (q + 1) / 2 - 1
+    chi2, df = -nu * rho * error.log_w, q * (q + 1) / 2 - 1
     # R's mauchly.test has 3k for 3q here (k cells); this is the textbook's form, so p differs by up to .003
     omega = (q + 2) * (q - 1) * (q - 2) * (2 * q**3 + 6 * q**2 + 3 * q + 2) / (288 * (nu * q * rho) ** 2)
     first, second = special.chdtrc(df, chi2), special.chdtrc(df + 4, chi2)
-    return Mauchly(float(np.exp(s.log_w)), float(np.clip(first + omega * (second - first), 0, 1)))
+    return Mauchly(float(np.exp(error.log_w)), float(np.clip(first + omega * (second - first), 0, 1)))

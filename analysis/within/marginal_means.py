@@ -1,4 +1,4 @@
-"""Estimated marginal means with their errors, and within-participant error bars."""
+"""Estimated marginal means with their errors."""
 
 from dataclasses import dataclass
 from itertools import combinations, product
@@ -9,13 +9,14 @@ from scipy import special
 
 from analysis.within.anova import AnovaResult
 from analysis.within.contrasts import effect_name
+from analysis.within.estimates import Margin, margin_of
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class MarginalMean:
-    """Mean over participants of one margin's level, its SE and confidence interval on N - 1 df.
+    """Mean over participants of one margin's level, its SE and confidence interval on N - p df.
 
     `effect` names the margin; `levels` gives the level of each of its factors.
     """
@@ -42,6 +43,8 @@ def level_combinations(result: AnovaResult, members: tuple[int, ...]) -> list[di
 
 def margins_shown(n_factors: int) -> list[tuple[int, ...]]:
     """Every margin of one and of two factors, then the cells."""
+    if n_factors == 0:
+        return []
     margins = [m for order in (1, 2) for m in combinations(range(n_factors), order)]
     cells = tuple(range(n_factors))
     return margins if cells in margins else [*margins, cells]
@@ -50,28 +53,24 @@ def margins_shown(n_factors: int) -> list[tuple[int, ...]]:
 def marginal_means(result: AnovaResult, confidence: float = 0.95) -> tuple[MarginalMean, ...]:
     """Estimated marginal means of every margin of one and two factors and of the cells.
 
-    The mean of participants' marginal means, SE = sd / sqrt(N), interval from t(N - 1): SPSS's, and
-    emmeans' with model = "multivariate".
+    Means of the multivariate linear model, groups and levels averaged over with equal weight, covariates at
+    their mean; intervals from t on N - p df. With one group this is the mean of participants' marginal
+    means with SE = sd / sqrt(N): SPSS's, and emmeans' with model = "multivariate".
     """
+    names = result.all_factors
     return tuple(
         mean
-        for members in margins_shown(len(result.factors))
-        for mean in _means_of(result, members, confidence)
+        for members in margins_shown(len(names))
+        for mean in means_of(margin_of(result, [names[m] for m in members]), confidence)
     )
 
 
-def _means_of(result: AnovaResult, members: tuple[int, ...], confidence: float) -> list[MarginalMean]:
-    values = margin(result, members)
-    means, errors = values.mean(axis=0), standard_error(values)
-    reach = float(special.stdtrit(result.n_participants - 1, 0.5 + confidence / 2))
-    name = effect_name([result.factors[m] for m in members])
+def means_of(margin: Margin, confidence: float = 0.95) -> list[MarginalMean]:
+    """The means of one margin."""
+    means, errors = margin.contrasts(np.eye(len(margin.combinations)))
+    reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2))
+    name = effect_name(margin.names)
     return [
         MarginalMean(name, levels, float(m), float(se), (float(m - reach * se), float(m + reach * se)))
-        for levels, m, se in zip(level_combinations(result, members), means, errors, strict=True)
+        for levels, m, se in zip(margin.combinations, means, errors, strict=True)
     ]
-
-
-def standard_error(values: Floats) -> Floats:
-    """Standard error of the mean over participants (axis 0)."""
-    error: Floats = values.std(axis=0, ddof=1) / np.sqrt(values.shape[0])
-    return error

@@ -10,17 +10,18 @@ from scipy import special
 
 from analysis.within.anova import AnovaResult
 from analysis.within.contrasts import effect_name
-from analysis.within.marginal_means import level_combinations, margin
-from experiments.errors import InputError, did_you_mean
+from analysis.within.estimates import Margin, margin_of
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Paired t test of two levels of a margin, on participants' marginal means, N - 1 df, never pooled.
+    """t test of two levels of a margin on N - p error df; within participants it is the paired t test.
 
     `difference` is level_a minus level_b; `t`, `p` and `dz` are NaN where the difference does not vary.
+    `dz` divides by the SD of the difference, pooled over groups; between groups it is Cohen's d, over the
+    pooled SD of participants' means, and NaN where both group and level differ.
     Levels of a margin of several factors are joined with ':'.
     """
 
@@ -49,51 +50,67 @@ def adjust(p: Floats) -> tuple[Floats, Floats]:
 
 def pairs_of(result: AnovaResult, factors: Sequence[str], confidence: float = 0.95) -> tuple[Pair, ...]:
     """All pairs of levels of the margin of `factors` (names, any order)."""
-    for name in factors:
-        if name not in result.factors:
-            raise InputError(f"no factor is called '{name}'{did_you_mean(name, result.factors)}")
-    members = tuple(sorted(result.factors.index(name) for name in set(factors)))
-    values = margin(result, members)
-    names = [":".join(levels.values()) for levels in level_combinations(result, members)]
-    first, second = (np.array(side) for side in zip(*combinations(range(len(names)), 2), strict=True))
-    differences = values[:, first] - values[:, second]
-    effect = effect_name([result.factors[m] for m in members])
-    labels = [(names[a], names[b]) for a, b in zip(first, second, strict=True)]
-    return _tested(effect, labels, differences, float(np.abs(values).max()), confidence)
+    margin = margin_of(result, factors)
+    names = [":".join(levels.values()) for levels in margin.combinations]
+    pairs = list(combinations(range(len(names)), 2))
+    weights = np.zeros((len(pairs), len(names)))
+    for row, (a, b) in enumerate(pairs):
+        weights[row, a], weights[row, b] = 1.0, -1.0
+    labels = [(names[a], names[b]) for a, b in pairs]
+    scale = float(np.abs(result.y).max())
+    return _tested(effect_name(margin.names), labels, margin, weights, scale, confidence)
 
 
 def one_factor_pairs(result: AnovaResult, confidence: float = 0.95) -> tuple[Pair, ...]:
     """Pairs of every margin of one factor; the adjustments count the pairs of that margin."""
-    return tuple(pair for name in result.factors for pair in pairs_of(result, [name], confidence))
+    return tuple(pair for name in result.all_factors for pair in pairs_of(result, [name], confidence))
 
 
 def _tested(
-    effect: str, labels: list[tuple[str, str]], differences: Floats, scale: float, confidence: float
+    effect: str,
+    labels: list[tuple[str, str]],
+    margin: Margin,
+    weights: Floats,
+    scale: float,
+    confidence: float,
 ) -> tuple[Pair, ...]:
-    n = len(differences)
-    mean, spread = differences.mean(axis=0), differences.std(axis=0, ddof=1)
-    spread = np.where(spread > 16 * np.finfo(float).eps * scale, spread, 0.0)
-    se = spread / np.sqrt(n)
+    estimate, se = margin.contrasts(weights)
+    se = np.where(se > 16 * np.finfo(float).eps * scale / np.sqrt(margin.df + 1), se, 0.0)
+    spread = _spread(margin, weights)
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.where(spread > 0, mean / se, np.nan)
-        dz = np.where(spread > 0, mean / spread, np.nan)
-    p = 2 * special.stdtr(n - 1, -np.abs(t))
+        t = np.where(se > 0, estimate / se, np.nan)
+        size = np.where(se > 0, estimate / spread, np.nan)
+    p = 2 * special.stdtr(margin.df, -np.abs(t))
     bonferroni, holm = adjust(p)
-    reach = float(special.stdtrit(n - 1, 0.5 + confidence / 2)) * se
+    reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2)) * se
     return tuple(
         Pair(
             effect=effect,
             level_a=a,
             level_b=b,
-            difference=float(mean[i]),
+            difference=float(estimate[i]),
             se=float(se[i]),
             t=float(t[i]),
-            df=n - 1,
+            df=margin.df,
             p=float(p[i]),
             p_bonferroni=float(bonferroni[i]),
             p_holm=float(holm[i]),
-            ci=(float(mean[i] - reach[i]), float(mean[i] + reach[i])),
-            dz=float(dz[i]),
+            ci=(float(estimate[i] - reach[i]), float(estimate[i] + reach[i])),
+            dz=float(size[i]),
         )
         for i, (a, b) in enumerate(labels)
     )
+
+
+def _spread(margin: Margin, weights: Floats) -> Floats:
+    """What differences are divided by: SD of the difference, or of participants' means between groups.
+
+    A difference of cells that differ in group and in level has neither: NaN.
+    """
+    groups = weights.reshape(len(weights), len(margin.rows), -1)
+    inside = (groups.sum(axis=2) == 0).all(axis=1)
+    across = (groups.sum(axis=1) == 0).all(axis=1)
+    scale = np.where(inside[:, None, None], 1.0, 0.5) * np.abs(groups).sum(axis=1, keepdims=True)
+    signed = np.where(inside[:, None], groups.sum(axis=1), scale[:, 0])
+    spread = np.sqrt(((margin.residual @ signed.T) ** 2).sum(axis=0) / margin.df)
+    return np.where(inside | across, spread, np.nan)

@@ -82,7 +82,7 @@ def test_a_seed_below_zero_is_a_usage_error() -> None:
         (("run", "exp3", "--database", "what"), "is no database URL"),
         (("check-paper", "nowhere.toml"), "no file"),
         (("anova", "nowhere.csv", "--participant", "a", "--rating", "b", "--within", "c"), "no file"),
-        (("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", ","), "names no column"),
+        (("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", ","), "no factor named"),
         (
             ("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", "c", "--scale", "7"),
             "like 1:7",

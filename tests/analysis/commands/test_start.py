@@ -44,5 +44,4 @@ def test_anova_of_a_file_needs_no_database_no_page_and_no_figure(tmp_path: Path)
         "numba",
         "statsmodels",
         "pingouin",
-        "pydantic",
     }

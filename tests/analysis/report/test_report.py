@@ -13,7 +13,7 @@ from analysis.plans.study import analyse_study
 from analysis.read.study_ratings import StudyRatings, load_csv
 from analysis.report.formats import Table, as_latex, as_markdown, as_text, latex_text, wrap
 from analysis.report.json_output import as_data, as_json
-from analysis.report.numbers import apa_p, fixed, interval, p_value, paper_p, share, sum_text
+from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables, paper_table
 from analysis.report.write import write_report
@@ -57,15 +57,28 @@ def test_one_sentence_an_effect_with_its_numbers(analysis) -> None:
     assert all(re.search(r"F\([\d.]+, [\d.]+\) = [\d.]+, p [=<] \.\d{3}", text) for text in said)
 
 
+STATISTIC = re.compile(r"F\(([\d.]+), ([\d.]+)\) = ([\d.]+), p [=<] [^()]*?partial η² = (\.\d\d)")
+
+
+def test_every_f_of_a_sentence_stands_beside_its_own_effect_size(analysis) -> None:
+    found = [STATISTIC.findall(text) for text in sentences(analysis)]
+    assert all(found)
+    for df1, df2, f, eta in (match for matches in found for match in matches):
+        size = float(f) * float(df1) / (float(f) * float(df1) + float(df2))
+        assert float(eta) == pytest.approx(size, abs=0.0101), (f, df1, df2)
+
+
 def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:
     data = json.loads(as_json(analysis), parse_constant=pytest.fail)
     effect = data["effects"][0]
     assert set(effect["univariate"]) == {
         *("ss", "ss_error", "df_effect", "df_error", "f_value", "p_value"),
         *("epsilon_gg", "p_gg", "epsilon_hf", "p_hf"),
+        *("df_effect_gg", "df_error_gg", "df_effect_hf", "df_error_hf"),
     }
     assert set(effect["multivariate"]) == {
-        *("pillai", "wilks", "hotelling_lawley", "roy", "f_value", "df_effect", "df_error", "p_value")
+        *("pillai", "wilks", "hotelling_lawley", "roy", "f_value", "df_effect", "df_error", "p_value"),
+        *("eta_sq_partial", "eta_sq_partial_ci", "exact", "statistics"),
     }
     assert {"mauchly", "eta_sq_partial", "eta_sq_partial_ci", "eta_sq_generalized"} <= set(effect)
     assert set(data["marginal_means"][0]) == {"effect", "levels", "mean", "se", "ci"}
@@ -132,8 +145,8 @@ def test_names_are_escaped_everywhere(tmp_path) -> None:
 def test_undefined_tests_are_dashes_with_a_reason(tmp_path) -> None:
     analysis = analysis_of("exp2", tmp_path, 5)
     text = " ".join(" ".join(as_text(table).split()) for table in all_tables(analysis))
-    assert "needs more participants than contrasts: N = 5" in text
-    assert "univariate, df (q, q (N - 1)), p by Greenhouse-Geisser" in text
+    assert "needs more participants than contrasts: error df = 4" in text
+    assert "univariate, df and p corrected by Greenhouse-Geisser" in text
 
 
 def test_bayes_factors_stand_beside_the_planned_pairs(tmp_path) -> None:
@@ -150,9 +163,9 @@ def test_bayes_factors_stand_beside_the_planned_pairs(tmp_path) -> None:
         (p_value(0.0206), ".021"),
         (p_value(1.0), "1.000"),
         (p_value(float("nan")), "–"),
-        (paper_p(0.0206), "0.02"),
-        (paper_p(0.0036), "0.004"),
-        (paper_p(0.0001), "<0.001"),
+        (p_value(0.00061), "<.001"),
+        (apa_p(0.00061), "p < .001"),
+        (p_value(0.001), ".001"),
         (apa_p(0.0001), "p < .001"),
         (share(-0.25), "-.250"),
         (fixed(-0.001), "0.00"),

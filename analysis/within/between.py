@@ -1,0 +1,223 @@
+"""What differs between participants: groups and covariates, as the design matrix of the linear model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.within.contrasts import orthonormal_basis
+from experiments.errors import InputError
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+RANK_RATIO = 1e-9
+"""A column whose part outside the others is smaller than this share of it adds nothing to them."""
+
+
+@dataclass(frozen=True)
+class Covariate:
+    """A number that belongs to a participant.
+
+    Attributes
+    ----------
+    name : str
+    values : (N,) array
+        As given, in the covariate's own unit.
+    centre : float
+        What is subtracted before fitting: effects without the covariate are those of a participant with
+        this value.
+    centred : bool
+        Whether `centre` is the mean over participants.
+    """
+
+    name: str
+    values: Floats = field(repr=False)
+    centre: float
+    centred: bool = True
+
+
+@dataclass(frozen=True)
+class BetweenDesign:
+    """Groups and covariates of N participants, and the terms of their linear model.
+
+    Attributes
+    ----------
+    factors, levels : tuple
+        Between factors and the names of their levels.
+    codes : (N, g) array
+        Level of each participant on each of g between factors.
+    covariates : tuple of Covariate
+    terms : tuple of tuple of str
+        Names of every term's factors and covariates; the first, the intercept, has none.
+    columns : tuple of tuple of int
+        Columns of `matrix` that belong to each term.
+    matrix : (N, p) array
+        Intercept, sum-to-zero contrasts of the factors, centred covariates in units of their SD.
+    """
+
+    factors: tuple[str, ...]
+    levels: tuple[tuple[str, ...], ...]
+    codes: Integers = field(repr=False)
+    covariates: tuple[Covariate, ...] = ()
+    terms: tuple[tuple[str, ...], ...] = ((),)
+    columns: tuple[tuple[int, ...], ...] = ((0,),)
+    matrix: Floats = field(repr=False, default_factory=lambda: np.ones((0, 1)))
+
+    @property
+    def n_participants(self) -> int:
+        """N."""
+        return len(self.matrix)
+
+    def row(self, at: dict[str, int]) -> Floats:
+        """Design row (p,) of the participant with the levels `at` and every covariate at its mean.
+
+        Factors that `at` leaves out are averaged over their levels with equal weight: their contrasts are 0.
+        """
+        parts = {name: self._factor_row(name, at) for name in self.factors}
+        for covariate in self.covariates:
+            parts[covariate.name] = np.array([_standardised(covariate, covariate.values.mean())])
+        return np.concatenate([_product([parts[name][None] for name in term])[0] for term in self.terms])
+
+    def _factor_row(self, name: str, at: dict[str, int]) -> Floats:
+        size = len(self.levels[self.factors.index(name)])
+        if name not in at:
+            return np.zeros(size - 1)
+        return orthonormal_basis(size)[at[name], 1:]
+
+    def group_sizes(self) -> dict[tuple[str, ...], int]:
+        """Participants in every combination of levels."""
+        sizes = dict.fromkeys(product(*self.levels), 0)
+        for row in self.codes:
+            sizes[tuple(self.levels[k][code] for k, code in enumerate(row))] += 1
+        return sizes
+
+
+def no_groups(n: int) -> BetweenDesign:
+    """The design of `n` participants of one group: an intercept."""
+    return BetweenDesign((), (), np.zeros((n, 0), np.int64), matrix=np.ones((n, 1)))
+
+
+def between_design(
+    factors: Sequence[str],
+    levels: Sequence[Sequence[str]],
+    codes: Integers,
+    covariates: Sequence[Covariate] = (),
+    covariate_by_group: bool = False,
+) -> BetweenDesign:
+    """Build the design of groups and covariates.
+
+    Parameters
+    ----------
+    factors, levels : sequence
+        Between factors and their levels.
+    codes : (N, g) array of int
+        Each participant's level on each factor.
+    covariates : sequence of Covariate
+    covariate_by_group : bool
+        Whether every covariate also interacts with the between factors (slopes that differ by group).
+
+    Raises
+    ------
+    InputError
+        A group with nobody in it, a covariate that does not vary or that the groups already determine, or
+        fewer participants than coefficients and one.
+    """
+    effects = [c for order in range(1, len(factors) + 1) for c in combinations(factors, order)]
+    terms: list[tuple[str, ...]] = [(), *((c.name,) for c in covariates), *effects]
+    if covariate_by_group:
+        terms += [(c.name, *effect) for c in covariates for effect in effects]
+    _refuse_empty_groups(factors, levels, codes)
+    parts: dict[str, Floats] = {
+        name: orthonormal_basis(len(levels[k]))[codes[:, k], 1:] for k, name in enumerate(factors)
+    }
+    for covariate in covariates:
+        if np.ptp(covariate.values) == 0:
+            raise InputError(f"the covariate '{covariate.name}' is the same for everyone; leave it out")
+        parts[covariate.name] = _standardised(covariate, covariate.values)[:, None]
+    blocks = [_product([parts[name] for name in term], len(codes)) for term in terms]
+    ends = np.cumsum([block.shape[1] for block in blocks])
+    columns = tuple(tuple(range(end - block.shape[1], end)) for block, end in zip(blocks, ends, strict=True))
+    matrix = np.concatenate(blocks, axis=1)
+    _refuse_deficient(matrix, terms, columns)
+    names = tuple(tuple(str(level) for level in group) for group in levels)
+    return BetweenDesign(tuple(factors), names, codes, tuple(covariates), tuple(terms), columns, matrix)
+
+
+def _standardised(covariate: Covariate, values: Floats) -> Floats:
+    return np.asarray((values - covariate.centre) / covariate.values.std(), dtype=np.float64)
+
+
+def _product(parts: Sequence[Floats], n: int = 1) -> Floats:
+    """Products of every column of one part with every column of the others, (n, columns)."""
+    block = np.ones((n, 1))
+    for part in parts:
+        block = (block[:, :, None] * part[:, None, :]).reshape(len(block), -1)
+    return block
+
+
+def _refuse_empty_groups(factors: Sequence[str], levels: Sequence[Sequence[str]], codes: Integers) -> None:
+    for name, group in zip(factors, levels, strict=True):
+        if len(group) < 2:
+            raise InputError(
+                f"expected at least 2 levels of '{name}', got {len(group)}; leave the factor out"
+            )
+    met = {tuple(row) for row in codes.tolist()}
+    empty = [at for at in product(*(range(len(group)) for group in levels)) if at not in met]
+    if empty:
+        said = "; ".join(
+            " ".join(
+                f"{name}={levels[k][code]}" for k, (name, code) in enumerate(zip(factors, at, strict=True))
+            )
+            for at in empty[:5]
+        )
+        raise InputError(
+            f"nobody with complete data is in {said}: the groups are not fully crossed; leave a factor out"
+        )
+
+
+def _refuse_deficient(
+    matrix: Floats, terms: Sequence[tuple[str, ...]], columns: Sequence[tuple[int, ...]]
+) -> None:
+    n, p = matrix.shape
+    if n <= p > 1:
+        raise InputError(
+            f"expected more participants than coefficients between participants, got {n} for {p}; "
+            "the tests have no error term"
+        )
+    for term, own in zip(terms, columns, strict=True):
+        others = np.delete(matrix, own, axis=1)
+        if others.shape[1] and len(_outside(matrix[:, own], others)[0]) < len(own):
+            raise InputError(
+                f"'{':'.join(term)}' is determined by the other groups and covariates; leave one out"
+            )
+
+
+def _outside(own: Floats, others: Floats) -> tuple[Floats, Floats]:
+    """Orthonormal rows (r, N) of what `own` spans outside `others`, and their singular values."""
+    basis = np.linalg.qr(others)[0] if others.shape[1] else others
+    rest = own - basis @ (basis.T @ own)
+    rest = rest - basis @ (basis.T @ rest)
+    left, singular, _ = np.linalg.svd(rest, full_matrices=False)
+    size = np.linalg.norm(own, axis=0).max()
+    return left.T[singular > RANK_RATIO * size], singular
+
+
+def term_directions(design: BetweenDesign, sum_of_squares: int) -> list[Floats]:
+    """Orthonormal directions (r, N) in participant space that each term of the design is tested on.
+
+    Type III: what the term adds to all other terms. Type II: what it adds to all terms that do not contain
+    it, so that the intercept adds to nothing. For scores z the hypothesis matrix is (U z)' (U z).
+    """
+    directions = []
+    for term, own in zip(design.terms, design.columns, strict=True):
+        others = [
+            column
+            for other, columns in zip(design.terms, design.columns, strict=True)
+            if other != term and (sum_of_squares == 3 or not set(term) <= set(other))
+            for column in columns
+        ]
+        directions.append(_outside(design.matrix[:, own], design.matrix[:, others])[0])
+    return directions

@@ -1,0 +1,91 @@
+"""Linear estimates of the multivariate model: means of margins and contrasts of them, with their errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.within.anova import AnovaResult
+from experiments.errors import InputError, did_you_mean
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A margin of groups x within levels: what its means are linear in.
+
+    `names` are its factors, between before within; `combinations` their levels, last fastest. `rows` (G, p)
+    are the groups' design rows; `fitted` (p, W) the coefficients and `residual` (N, W) the residuals of the
+    W within means; `unscaled` (p, p) is (X'X)^-1 and `df` the error df.
+    """
+
+    names: tuple[str, ...]
+    combinations: tuple[dict[str, str], ...]
+    rows: Floats = field(repr=False)
+    fitted: Floats = field(repr=False)
+    residual: Floats = field(repr=False)
+    unscaled: Floats = field(repr=False)
+    df: int
+
+    @property
+    def means(self) -> Floats:
+        """Estimated means (G * W,) in the order of `combinations`."""
+        return np.asarray(self.rows @ self.fitted).ravel()
+
+    def contrasts(self, weights: Floats) -> tuple[Floats, Floats]:
+        r"""Estimates (c,) and standard errors (c,) of contrasts `weights` (c, G * W).
+
+        Notes
+        -----
+        With weights :math:`D` (G, W) of one contrast, group rows C and within means :math:`Y_M = X B + R`:
+        estimate :math:`\mathrm{tr}(D' C B)`, variance
+        :math:`\mathrm{sum}(C (X'X)^{-1} C' \circ T'T) / \nu`, :math:`T = R D'`. Differences are taken before
+        squaring, so that nothing cancels.
+        """
+        grid = weights.reshape(len(weights), len(self.rows), -1)
+        estimates = np.einsum("cgw,gp,pw->c", grid, self.rows, self.fitted, optimize=True)
+        spread = self.rows @ self.unscaled @ self.rows.T
+        turned = np.einsum("nw,cgw->cng", self.residual, grid, optimize=True)
+        squares = np.einsum("cng,cnh->cgh", turned, turned, optimize=True)
+        variance = np.einsum("gh,cgh->c", spread, squares) / self.df
+        return estimates, np.sqrt(np.maximum(variance, 0.0))
+
+
+def margin_of(result: AnovaResult, names: Sequence[str]) -> Margin:
+    """The margin of the factors `names` (any order): others are averaged over with equal weight.
+
+    Raises
+    ------
+    InputError
+        A name that is no factor; covariates have no margin.
+    """
+    for name in names:
+        if name not in result.all_factors:
+            raise InputError(f"no factor is called '{name}'{did_you_mean(name, result.all_factors)}")
+    groups = [k for k, name in enumerate(result.between.factors) if name in names]
+    members = [m for m, name in enumerate(result.factors) if name in names]
+    design = result.between
+    rows = np.array(
+        [
+            design.row({design.factors[k]: code for k, code in zip(groups, at, strict=True)})
+            for at in product(*(range(len(design.levels[k])) for k in groups))
+        ]
+    )
+    away = tuple(axis + 1 for axis in range(len(result.factors)) if axis not in members)
+    means = result.y.mean(axis=away).reshape(result.n_participants, -1)
+    x = design.matrix
+    fitted, *_ = np.linalg.lstsq(x, means, rcond=None)
+    levels = [design.levels[k] for k in groups] + [result.levels[m] for m in members]
+    ordered = (*(design.factors[k] for k in groups), *(result.factors[m] for m in members))
+    return Margin(
+        names=ordered,
+        combinations=tuple(dict(zip(ordered, at, strict=True)) for at in product(*levels)),
+        rows=rows,
+        fitted=fitted,
+        residual=means - x @ fitted,
+        unscaled=np.asarray(np.linalg.inv(x.T @ x), dtype=np.float64),
+        df=result.df_error,
+    )

@@ -1,0 +1,115 @@
+"""`analysis anova` with groups and covariates: the JSON, the words, and what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from analysis.cli import app
+
+OBK = Path(__file__).parents[2] / "golden" / "r" / "between" / "obk.csv"
+
+
+def anova(file: Path, *arguments: str):
+    return CliRunner().invoke(app, ["anova", str(file), "--participant", "id", "--rating", "y", *arguments])
+
+
+def test_a_whole_mixed_design_to_json(tmp_path) -> None:
+    out = tmp_path / "o.json"
+    result = anova(
+        OBK,
+        "--within",
+        "phase,hour",
+        "--between",
+        "treatment,gender",
+        "--covariate",
+        "age",
+        "--json",
+        str(out),
+    )
+    assert result.exit_code == 0, result.output
+    data = json.loads(out.read_text())
+    assert [b["factor"] for b in data["between"]] == ["treatment", "gender"]
+    assert data["covariates"][0]["name"] == "age"
+    assert data["type"] == 3
+    assert len(data["effects"]) == 19
+    assert "covariate 'age' centred at its mean" in " ".join(result.output.split())
+    assert "groups differ in size" in result.output
+
+
+def test_the_type_of_sums_of_squares_is_chosen(tmp_path) -> None:
+    ss = {}
+    for kind in ("2", "3"):
+        out = tmp_path / f"{kind}.json"
+        arguments = ("--within", "phase", "--between", "treatment,gender", "--type", kind)
+        assert anova(OBK, *arguments, "--json", str(out)).exit_code == 0
+        effects = json.loads(out.read_text())["effects"]
+        ss[kind] = next(e["univariate"]["ss"] for e in effects if e["effect"] == "treatment")
+    assert ss["2"] != pytest.approx(ss["3"], rel=1e-3)
+
+
+HEAD = "id,group,age,face,y\n"
+FULL = HEAD + "".join(
+    f"{who},{'g' if who < 4 else 'h'},{20 + who * who},{face},{who + k * (who % 3)}\n"
+    for who in range(8)
+    for k, face in enumerate("ab")
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "message"),
+    [
+        (
+            FULL.replace("3,g,29,b", "3,h,29,b"),
+            ("--between", "group"),
+            "'group' differs within participant 3 (g",
+        ),
+        (FULL.replace("3,g,29,b", "3,g,30,b"), ("--covariate", "age"), "'age' differs within participant 3"),
+        (FULL.replace(",h,", ",g,"), ("--between", "group"), "at least 2 levels of 'group', got 1"),
+        (FULL, ("--between", "face"), "'face' differs within participant 0"),
+        (FULL, ("--between", "group", "--covariate", "group"), "'group' is named for two roles"),
+        (FULL, ("--covariate", "face"), "'face' should be a number, got 'a' in line 2"),
+        (FULL.replace(",face,y", ",hair,y"), ("--between", "group,hair"), "differs within participant"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(tmp_path, text, arguments, message) -> None:
+    file = tmp_path / "t.csv"
+    file.write_text(text)
+    result = anova(file, *arguments)
+    assert message in str(result.exception)
+    assert "\n" not in str(result.exception)
+
+
+def test_an_empty_group_is_named(tmp_path) -> None:
+    file = tmp_path / "t.csv"
+    rows = [
+        (0, "g", "m"),
+        (1, "g", "m"),
+        (2, "g", "f"),
+        (3, "h", "m"),
+        (4, "h", "m"),
+        (5, "h", "m"),
+        (6, "g", "f"),
+    ]
+    file.write_text("id,group,sex,y\n" + "".join(f"{i},{g},{s},{i * i % 5}\n" for i, g, s in rows))
+    assert "nobody with complete data is in group=h sex=f" in str(
+        anova(file, "--between", "group,sex").exception
+    )
+
+
+def test_a_participant_without_a_covariate_is_left_out_and_named(tmp_path) -> None:
+    file = tmp_path / "t.csv"
+    file.write_text(FULL.replace("3,g,29,", "3,g,,"))
+    result = anova(file, "--within", "face", "--covariate", "age")
+    assert result.exit_code == 0, result.exception
+    assert "left out for want of 'age': participant 3" in result.output
+    assert "7 participants" in result.output
+
+
+def test_a_covariate_that_the_groups_determine_is_refused(tmp_path) -> None:
+    file = tmp_path / "t.csv"
+    file.write_text("id,g,x,y\n" + "".join(f"{i},{'ab'[i % 2]},{i % 2},{i * i % 7}\n" for i in range(8)))
+    assert "determined by the other groups" in str(
+        anova(file, "--between", "g", "--covariate", "x").exception
+    )
