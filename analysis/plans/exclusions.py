@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Literal, assert_never
 
 import numpy as np
 import pandas as pd
@@ -97,16 +99,14 @@ def _participant_reasons(
     for run, why in _by_hand(rows):
         reasons.setdefault(run, []).append(why)
     for rule in experiment.exclusions:
-        found = _FINDERS.get(type(rule))
-        if found is None:
+        finder = _finder(rule)
+        if isinstance(finder, _OfTrials):
             continue
-        needed, finder = found
-        source = attention if isinstance(rule, rules.ExcludeAttention) else plays
-        if needed not in rows.columns:
-            not_applied.append(f"{rule.rule}: the data have no column '{needed}'")
+        if finder.needed not in rows.columns:
+            not_applied.append(f"{rule.rule}: the data have no column '{finder.needed}'")
             continue
-        source = rows if isinstance(rule, rules.ExcludeIncomplete) else source
-        for run, why in finder(rule, source):
+        source = {"rows": rows, "plays": plays, "attention": attention}[finder.source]
+        for run, why in finder.find(source):
             reasons.setdefault(run, []).append(f"{rule.rule}: {why}")
     return reasons, not_applied
 
@@ -162,13 +162,41 @@ def _fast(rule: rules.ExcludeFast, rows: pd.DataFrame) -> Finding:
     return [(str(run), f"median {rt:.0f} ms") for run, rt in medians.items() if rt < rule.below_ms]
 
 
-_FINDERS: dict[type, tuple[str, Callable[..., Finding]]] = {
-    rules.ExcludeIncomplete: ("run_status", _incomplete),
-    rules.ExcludeAttention: ("expected_response", _attention),
-    rules.ExcludePlayback: ("verdict", _playback),
-    rules.ExcludeStraightLining: ("response", _straight),
-    rules.ExcludeFast: ("rt", _fast),
-}
+@dataclass(frozen=True)
+class _OfRuns:
+    """Finds runs to leave out among all rows, main plays or attention checks; needs one column for it."""
+
+    needed: str
+    source: Literal["rows", "plays", "attention"]
+    find: Callable[[pd.DataFrame], Finding]
+
+
+@dataclass(frozen=True)
+class _OfTrials:
+    """Finds trials to leave out among those that remain; needs one column for it."""
+
+    needed: str
+    find: Callable[[pd.DataFrame], Mask]
+
+
+def _finder(rule: rules.ExclusionRule) -> _OfRuns | _OfTrials:
+    match rule:
+        case rules.ExcludeIncomplete():
+            return _OfRuns("run_status", "rows", partial(_incomplete, rule))
+        case rules.ExcludeAttention():
+            return _OfRuns("expected_response", "attention", partial(_attention, rule))
+        case rules.ExcludePlayback():
+            return _OfRuns("verdict", "plays", partial(_playback, rule))
+        case rules.ExcludeStraightLining():
+            return _OfRuns("response", "plays", partial(_straight, rule))
+        case rules.ExcludeFast():
+            return _OfRuns("rt", "plays", partial(_fast, rule))
+        case rules.DropFailedPlays():
+            return _OfTrials("verdict", _failed)
+        case rules.DropSlowTrials():
+            return _OfTrials("rt", partial(_slow, rule))
+        case _:
+            assert_never(rule)
 
 
 def _later_runs(people: dict[str, str], reasons: dict[str, list[str]], ratings: StudyRatings) -> None:
@@ -189,23 +217,22 @@ def _drop_trials(
     dropped: list[DroppedTrials] = []
     missing: list[str] = []
     for rule in experiment.exclusions:
-        if isinstance(rule, rules.DropFailedPlays):
-            needed = "verdict"
-        elif isinstance(rule, rules.DropSlowTrials):
-            needed = "rt"
-        else:
+        finder = _finder(rule)
+        if isinstance(finder, _OfRuns):
             continue
-        if needed not in rows.columns:
-            missing.append(f"{rule.rule}: the data have no column '{needed}'")
+        if finder.needed not in rows.columns:
+            missing.append(f"{rule.rule}: the data have no column '{finder.needed}'")
             continue
-        bad = _bad_trials(rule, rows)
+        bad = finder.find(rows)
         if bad.any():
             dropped.append(DroppedTrials(rule.rule, int(bad.sum()), int(rows["run"][bad].nunique())))
         rows = rows[~bad]
     return rows, tuple(dropped), missing
 
 
-def _bad_trials(rule: rules.DropFailedPlays | rules.DropSlowTrials, rows: pd.DataFrame) -> Mask:
-    if isinstance(rule, rules.DropFailedPlays):
-        return (rows["verdict"] == "failed").to_numpy()
+def _failed(rows: pd.DataFrame) -> Mask:
+    return (rows["verdict"] == "failed").to_numpy()
+
+
+def _slow(rule: rules.DropSlowTrials, rows: pd.DataFrame) -> Mask:
     return (rows["rt"] > rule.above_ms).to_numpy()

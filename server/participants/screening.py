@@ -1,7 +1,7 @@
 """Screening: a run ends as screened out where a declared rule says so. Its slot is then free again."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple, assert_never
 
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
@@ -16,19 +16,40 @@ from server.trials import repository as trials
 EVENT = "screened_out"
 
 
+class _Declared(NamedTuple):
+    """The rules of an experiment by the moment at which they are looked at."""
+
+    answers: list[ScreenFormAnswer]
+    attention: list[ScreenAttention]
+    devices: list[ScreenDevice]
+
+
+def _declared(experiment: Experiment) -> _Declared:
+    declared = _Declared([], [], [])
+    for rule in experiment.screening:
+        match rule:
+            case ScreenFormAnswer():
+                declared.answers.append(rule)
+            case ScreenAttention():
+                declared.attention.append(rule)
+            case ScreenDevice():
+                declared.devices.append(rule)
+            case _:
+                assert_never(rule)
+    return declared
+
+
 def screens_devices(experiment: Experiment) -> bool:
     """True where a browser or screen that will not do ends the run."""
-    return any(isinstance(rule, ScreenDevice) for rule in experiment.screening)
+    return bool(_declared(experiment).devices)
 
 
 def by_form(
     session: Session, run: StudyRun, experiment: Experiment, form: str, answers: Mapping[str, Any]
 ) -> None:
     """End the run where a rule refuses one of these (checked) answers."""
-    for rule in experiment.screening:
-        if not isinstance(rule, ScreenFormAnswer) or rule.form != form or rule.field not in answers:
-            continue
-        if rule.screens_out(answers[rule.field]):
+    for rule in _declared(experiment).answers:
+        if rule.form == form and rule.field in answers and rule.screens_out(answers[rule.field]):
             return _end(session, run, {"rule": rule.rule, "form": form, "field": rule.field})
     return None
 
@@ -45,7 +66,7 @@ def _end(session: Session, run: StudyRun, data: dict[str, Any]) -> None:
 
 def by_attention(connection: Connection, run_id: int, experiment: Experiment) -> bool:
     """End the run where too many attention checks have failed; True where it did."""
-    limits = [rule.more_than for rule in experiment.screening if isinstance(rule, ScreenAttention)]
+    limits = [rule.more_than for rule in _declared(experiment).attention]
     failed = trials.failed_checks(connection, run_id) if limits else 0
     if not limits or failed <= min(limits):
         return False

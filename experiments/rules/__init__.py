@@ -1,0 +1,54 @@
+"""Rules declared before the data, one file a rule: playback, attention checks, screening, exclusions.
+
+A new rule is its file and its place in a union below. Every use matches the union to its end
+(`assert_never`), so type-checking names the uses that do not know it.
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from experiments.rules.attention import AttentionChecks
+from experiments.rules.drop_failed_plays import DropFailedPlays
+from experiments.rules.drop_slow_trials import DropSlowTrials
+from experiments.rules.exclude_attention import ExcludeAttention
+from experiments.rules.exclude_fast import ExcludeFast
+from experiments.rules.exclude_incomplete import ExcludeIncomplete
+from experiments.rules.exclude_playback import ExcludePlayback
+from experiments.rules.exclude_straight_lining import ExcludeStraightLining
+from experiments.rules.playback import PlaybackRules
+from experiments.rules.screen_attention import ScreenAttention
+from experiments.rules.screen_device import ScreenDevice
+from experiments.rules.screen_form_answer import ScreenFormAnswer
+
+ScreeningRule = Annotated[ScreenFormAnswer | ScreenAttention | ScreenDevice, Field(discriminator="rule")]
+"""Ends a run while it goes on."""
+
+ExclusionRule = Annotated[
+    ExcludeIncomplete
+    | ExcludeAttention
+    | ExcludePlayback
+    | ExcludeStraightLining
+    | ExcludeFast
+    | DropFailedPlays
+    | DropSlowTrials,
+    Field(discriminator="rule"),
+]
+"""Leaves out a participant's run, or single trials, when the study is analysed."""
+
+__all__ = [
+    "AttentionChecks",
+    "DropFailedPlays",
+    "DropSlowTrials",
+    "ExcludeAttention",
+    "ExcludeFast",
+    "ExcludeIncomplete",
+    "ExcludePlayback",
+    "ExcludeStraightLining",
+    "ExclusionRule",
+    "PlaybackRules",
+    "ScreenAttention",
+    "ScreenDevice",
+    "ScreenFormAnswer",
+    "ScreeningRule",
+]

@@ -1,0 +1,14 @@
+"""Exclusion by failed attention checks."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.base import Declaration
+
+
+class ExcludeAttention(Declaration):
+    """Leave out participants who failed more than `more_than` attention checks."""
+
+    rule: Literal["attention_checks_failed"] = "attention_checks_failed"
+    more_than: Annotated[int, Field(ge=0)] = 0

@@ -1,0 +1,14 @@
+"""Exclusion by response time."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.base import Declaration
+
+
+class ExcludeFast(Declaration):
+    """Leave out participants whose median response time lies below `below_ms`."""
+
+    rule: Literal["median_response_time"] = "median_response_time"
+    below_ms: Annotated[float, Field(gt=0)] = 200.0

@@ -1,0 +1,24 @@
+"""When a play of a clip is flagged or failed."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from experiments.base import Declaration
+
+
+class PlaybackRules(Declaration):
+    """When a play is flagged or failed. Counts are frames of the clip, times are milliseconds.
+
+    A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
+    breaking a `flagged_*` limit is flagged, any other is good.
+    """
+
+    flagged_missing_frames: Annotated[int, Field(ge=0)] = 0
+    failed_missing_frames: Annotated[int, Field(ge=0)] = 3
+    flagged_late_frames: Annotated[int, Field(ge=0)] = 2
+    flagged_longest_gap_ms: Annotated[float, Field(gt=0)] = 70.0
+    failed_longest_gap_ms: Annotated[float, Field(gt=0)] = 250.0
+    fail_on_focus_lost: bool = True
+    flag_video_fallback: bool = True
+    max_repeats: Annotated[int, Field(ge=0, le=5)] = 1

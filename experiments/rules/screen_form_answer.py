@@ -1,0 +1,61 @@
+"""Screening by an answer of a form."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from experiments.base import Declaration, Name
+from experiments.errors import did_you_mean
+from experiments.forms import (
+    ChoiceField,
+    Form,
+    FormField,
+    LikertField,
+    MultipleChoiceField,
+    NumberField,
+)
+
+
+class ScreenFormAnswer(Declaration):
+    """Screen out by an answer: one of `refused`, or a number under `below` or over `above`.
+
+    The run ends as soon as the form is sent. A question left open screens nobody out: make it required.
+    """
+
+    rule: Literal["form_answer"] = "form_answer"
+    form: Name
+    field: Name
+    refused: tuple[str, ...] = ()
+    below: int | None = None
+    above: int | None = None
+
+    def screens_out(self, answer: object) -> bool:
+        """True where this answer (text, number, or list of texts) ends the run."""
+        if isinstance(answer, int):
+            low = self.below is not None and answer < self.below
+            return low or (self.above is not None and answer > self.above)
+        given = answer if isinstance(answer, list) else [answer]
+        return any(value in self.refused for value in given)
+
+    def fault(self, forms: Sequence[Form]) -> str | None:
+        """What is wrong with this rule, given the declared forms; None where nothing is."""
+        form = next((form for form in forms if form.name == self.form), None)
+        if form is None:
+            return f"no form is called '{self.form}'{did_you_mean(self.form, [form.name for form in forms])}"
+        field = next((field for field in form.fields if field.name == self.field), None)
+        if field is None:
+            near = did_you_mean(self.field, [field.name for field in form.fields])
+            return f"form '{form.name}' has no field '{self.field}'{near}"
+        return self._fault_of(field)
+
+    def _fault_of(self, field: FormField) -> str | None:
+        limits = self.below is not None or self.above is not None
+        if isinstance(field, NumberField | LikertField):
+            fits = limits and not self.refused
+            return None if fits else f"'{field.name}' is a number: give `below` or `above`, not `refused`"
+        if not isinstance(field, ChoiceField | MultipleChoiceField):
+            return f"'{field.name}' is free text; only choices and numbers can be screened"
+        if limits or not self.refused:
+            return f"'{field.name}' is a choice: give `refused`, not `below` or `above`"
+        values = [option.value for option in field.options]
+        wrong = next((value for value in self.refused if value not in values), None)
+        return f"'{field.name}' has no option '{wrong}'{did_you_mean(wrong, values)}" if wrong else None

@@ -1,0 +1,66 @@
+"""A rule that can be declared is applied, or the type-checker says so."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import REPOSITORY
+
+NEW = '''from typing import Literal
+
+from experiments.base import Declaration
+
+
+class NewRule(Declaration):
+    """A rule that nothing applies."""
+
+    rule: Literal["new_rule"] = "new_rule"
+'''
+SETTINGS = "[mypy]\nfollow_imports = skip\nignore_missing_imports = True\n"
+PYDANTIC = "from typing import Any\nclass BaseModel: ...\ndef __getattr__(name: str) -> Any: ...\n"
+"""Enough of it for the classes to be classes; the whole would take the checker ten seconds."""
+
+
+@pytest.mark.parametrize(
+    ("union", "user"),
+    [
+        ("ExclusionRule = Annotated[", "analysis/plans/exclusions.py"),
+        ("ScreeningRule = Annotated[", "server/participants/screening.py"),
+    ],
+)
+def test_a_rule_without_its_finder_fails_type_checking(tmp_path: Path, union: str, user: str) -> None:
+    shutil.copytree(REPOSITORY / "experiments" / "rules", tmp_path / "experiments" / "rules")
+    for needed in ("base", "errors", "definition", "__init__"):
+        shutil.copy(REPOSITORY / "experiments" / f"{needed}.py", tmp_path / "experiments")
+    (tmp_path / "mypy.ini").write_text(SETTINGS)
+    (tmp_path / "pydantic.pyi").write_text(PYDANTIC)
+    (tmp_path / user).parent.mkdir(parents=True)
+    shutil.copy(REPOSITORY / user, tmp_path / user)
+    rules = tmp_path / "experiments" / "rules" / "__init__.py"
+    (rules.parent / "new_rule.py").write_text(NEW)
+    text = rules.read_text(encoding="utf-8")
+    assert union in text
+    text = text.replace(union, f"{union}NewRule | ", 1)
+    rules.write_text(f"from experiments.rules.new_rule import NewRule\n{text}")
+    complaints = unhandled(tmp_path, user)
+    assert len(complaints) == 1
+    assert 'Argument 1 to "assert_never"' in complaints[0]
+
+
+def unhandled(folder: Path, user: str) -> list[str]:
+    """What mypy says of the new rule, in the copied files alone."""
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--no-incremental",
+        "--cache-dir=/dev/null",
+        "pydantic.pyi",
+        user,
+    ]
+    command += [user, *(str(path.relative_to(folder)) for path in (folder / "experiments").rglob("*.py"))]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
+    return [line for line in done.stdout.splitlines() if "NewRule" in line]
