@@ -1,5 +1,7 @@
 """The command `server`: it only gathers the command groups, each of which lives with its subject."""
 
+import os
+
 import typer
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -9,6 +11,7 @@ from experiments.errors import InputError
 from server.errors import ApiError
 from server.settings import Settings
 
+PRIVATE = 0o077
 app = typer.Typer(
     name="server",
     help="Run rating studies: serve participants and experimenters, manage studies, take out the data.",
@@ -51,5 +54,12 @@ def _setting(problem: ErrorDetails) -> str:
 
 
 def main() -> None:
-    """Run `server`; bad input ends in one line on stderr and exit code 2."""
-    run_command_line(_call)
+    """Run `server`; bad input ends in one line on stderr and exit code 2.
+
+    What it writes (database, clips, reports, exports) is for its own user alone.
+    """
+    before = os.umask(PRIVATE)
+    try:
+        run_command_line(_call)
+    finally:
+        os.umask(before)

@@ -21,6 +21,7 @@ from server.context import Services
 from server.models import Account, Study
 from server.operations.logs import logging_configuration
 from server.operations.metrics import MULTIPROCESS_VARIABLE
+from server.operations.modes import close_to_others
 from server.protocol import BoundedHttp
 from server.settings import Settings
 from server.studies.links import general_link, link_url
@@ -55,6 +56,7 @@ def run(
     _check_free(host, port)
     settings = Settings()
     with migrated_services(settings) as services:
+        close_to_others(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
         if welcome:
             _welcome(services)

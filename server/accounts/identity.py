@@ -17,7 +17,7 @@ from server.models import Account, AdminSession, ApiToken
 from server.tokens import hash_token
 
 Role = Literal["viewer", "experimenter", "owner"]
-Scope = Literal["read", "write", "export"]
+Scope = Literal["read", "personal", "write", "export"]
 COOKIE = "palpebra_session"
 _RANK: dict[str, int] = {"viewer": 0, "experimenter": 1, "owner": 2}
 _SEEN_EVERY = timedelta(minutes=1)
@@ -48,6 +48,11 @@ class Identity:
     role: str
     session_id: int | None = None
     scopes: frozenset[str] | None = None
+
+    @property
+    def sees_persons(self) -> bool:
+        """True for browsers, and for tokens with the scope `personal`."""
+        return self.scopes is None or "personal" in self.scopes
 
 
 def check_origin(request: Request, services: Services) -> None:
@@ -135,6 +140,8 @@ Viewer = Annotated[Identity, Depends(_Access("viewer", "read"))]
 """May look at everything but accounts."""
 Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]
 """May download data."""
+PersonalReader = Annotated[Identity, Depends(_Access("viewer", "personal"))]
+"""May look at single persons: their answers, recruiters' ids and devices. Scope `read` alone does not do."""
 EXPERIMENTER = _Access("experimenter", "write")
 Experimenter = Annotated[Identity, Depends(EXPERIMENTER)]
 """May change studies."""

@@ -61,7 +61,7 @@ class NewToken(_In):
     """An API token: its name, what it may do, and for how many days."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=100)]
-    scopes: Annotated[list[Scope], Field(min_length=1, max_length=3)]
+    scopes: Annotated[list[Scope], Field(min_length=1, max_length=4)]
     days: Annotated[int, Field(ge=1, le=3650)] | None = 365
 
 

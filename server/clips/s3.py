@@ -3,7 +3,10 @@
 import hashlib
 import logging
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
@@ -13,8 +16,13 @@ from server.settings import Settings
 
 log = logging.getLogger("palpebra")
 PRESIGNED_S = 3600
-CONNECT_S, READ_S = 3, 10
+CONNECT_S, READ_S = 2, 3
+AWAY_S = 5.0
+"""A store that gave no answer is left alone for so long: requests are refused at once."""
+AT_ONCE = 12
+"""Questions to the store under way: threads a hanging store may hold of the forty that serve."""
 SPOOL_BYTES = 1 << 24
+AWAY = "The store of the clips does not answer; please try again."
 IMMUTABLE = "public, max-age=31536000, immutable"
 
 
@@ -30,6 +38,8 @@ class S3Store:
         self.client, self.bucket, self.presigned = client, bucket, presigned
         self.prefix = f"{prefix.strip('/')}/" if prefix.strip("/") else ""
         self._sizes: dict[str, int] = {}
+        self._away_until = 0.0
+        self._free = threading.BoundedSemaphore(AT_ONCE)
 
     def add(self, source: BinaryIO, sha256: str) -> bool:
         """Check the hash of a local copy, then upload: an object appears whole or not at all."""
@@ -67,7 +77,8 @@ class S3Store:
             return
         part = f"bytes={start}-{end - 1}"
         found = self._answer(self.client.get_object, Key=self._name(sha256), Range=part)
-        yield from found["Body"].iter_chunks(CHUNK_BYTES)
+        with self._asking():
+            yield from found["Body"].iter_chunks(CHUNK_BYTES)
 
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
@@ -80,10 +91,10 @@ class S3Store:
 
         try:
             if sha256 is None:
-                self.client.head_bucket(Bucket=self.bucket)
+                self._answer(self.client.head_bucket)
             else:
-                self.client.head_object(Bucket=self.bucket, Key=self._name(sha256))
-        except (BotoCoreError, ClientError) as error:
+                self._answer(self.client.head_object, Key=self._name(sha256))
+        except (BotoCoreError, ClientError, ClipsAway) as error:
             return f"bucket {self.bucket}: {error}"
         return None
 
@@ -101,14 +112,25 @@ class S3Store:
 
     def _answer(self, ask: Callable[..., Any], **what: str) -> Any:
         """What the store answers; ClipsAway where no answer comes."""
+        with self._asking():
+            return ask(Bucket=self.bucket, **what)
+
+    @contextmanager
+    def _asking(self) -> Iterator[None]:
+        """ClipsAway where the store does not answer, did not lately, or has kept too many waiting."""
         from botocore.exceptions import ConnectionError as NoConnection
         from botocore.exceptions import HTTPClientError
 
+        if time.monotonic() < self._away_until or not self._free.acquire(blocking=False):
+            raise ClipsAway(AWAY, headers={"retry-after": "5"})
         try:
-            return ask(Bucket=self.bucket, **what)
+            yield
         except (NoConnection, HTTPClientError) as error:
+            self._away_until = time.monotonic() + AWAY_S
             log.error("the object store is away: %s", type(error).__name__)
-            raise ClipsAway("The store of the clips does not answer; please try again.") from error
+            raise ClipsAway(AWAY, headers={"retry-after": "5"}) from error
+        finally:
+            self._free.release()
 
     def _name(self, sha256: str) -> str:
         return f"{self.prefix}{sha256}.mp4"
@@ -129,7 +151,7 @@ def open_s3(settings: Settings) -> S3Store:
         config=Config(
             s3={"addressing_style": style},
             signature_version="s3v4",
-            retries={"mode": "standard"},
+            retries={"total_max_attempts": 1, "mode": "standard"},
             # A store that hangs must not hold the threads that all other requests need.
             connect_timeout=CONNECT_S,
             read_timeout=READ_S,

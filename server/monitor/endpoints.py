@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
-from server.accounts.identity import NotSignedIn, Viewer, identify
+from server.accounts.identity import Identity, NotSignedIn, Viewer, identify
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
@@ -26,17 +26,21 @@ RETRY_MS = 1000
 _maps = HeatMaps()
 
 
-def _snapshot(services: Services, name: str) -> MonitorSnapshot:
+def _snapshot(services: Services, name: str, who: Identity) -> MonitorSnapshot:
     with services.database.read() as session:
         study = find_study(session, name)
         lease = timedelta(minutes=active_definition(session, study).session.lease_minutes)
-        return service.snapshot(session, study, _maps.of(study.id), lease)
+        shown = service.snapshot(session, study, _maps.of(study.id), lease)
+    if who.sees_persons:
+        return shown
+    nameless = [run.model_copy(update={"participant": run.run}) for run in shown.runs]
+    return shown.model_copy(update={"runs": nameless})
 
 
 @router.get("/monitor")
-def get_monitor(services: ServicesDep, _who: Viewer, study: str) -> MonitorSnapshot:
+def get_monitor(services: ServicesDep, who: Viewer, study: str) -> MonitorSnapshot:
     """The monitor at this moment."""
-    return _snapshot(services, study)
+    return _snapshot(services, study, who)
 
 
 def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
@@ -56,13 +60,13 @@ async def _waited(services: Services) -> bool:
 
 
 @router.get("/monitor/stream", response_class=StreamingResponse)
-def stream_monitor(request: Request, services: ServicesDep, _who: Viewer, study: str) -> StreamingResponse:
+def stream_monitor(request: Request, services: ServicesDep, who: Viewer, study: str) -> StreamingResponse:
     """Server-sent events: the whole monitor first, then every two seconds what has changed.
 
     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
     when the session ends or the server does; the browser then connects again by itself.
     """
-    first = _snapshot(services, study)
+    first = _snapshot(services, study, who)
 
     async def events() -> AsyncIterator[str]:
         before: MonitorSnapshot | None = None
@@ -76,7 +80,7 @@ def stream_monitor(request: Request, services: ServicesDep, _who: Viewer, study:
                 return
             try:
                 await run_in_threadpool(identify, request, services)
-                current = await run_in_threadpool(_snapshot, services, study)
+                current = await run_in_threadpool(_snapshot, services, study, who)
             except (NotSignedIn, NotFound):  # signed out, or the study was deleted meanwhile
                 return
 

@@ -7,6 +7,7 @@ import stat
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Literal
 from urllib.parse import urlsplit
 
@@ -15,6 +16,7 @@ from sqlalchemy import func, select, text
 from server.context import Services
 from server.migrate import current_revision, newest_revision
 from server.models import Account, Clip, Study
+from server.operations.modes import open_to_others
 
 Verdict = Literal["ok", "warning", "failed"]
 LEAST_FREE_BYTES = 2 * 1024**3
@@ -54,6 +56,18 @@ def data_folder(services: Services) -> Iterator[Finding]:
     fine = free >= LEAST_FREE_BYTES
     advice = "" if fine else "make room: a full disk stops every rating"
     yield Finding("data folder", "ok" if fine else "warning", f"{folder}, {free / 1e9:.1f} GB free", advice)
+
+
+def file_modes(services: Services) -> Iterator[Finding]:
+    """Nothing in the data folder can be read by other users."""
+    folder = services.settings.data_folder
+    found = list(islice(open_to_others(folder), 1000))
+    if not found:
+        yield Finding("file modes", "ok", "for this user alone")
+        return
+    more = "or more " if len(found) == 1000 else ""
+    said = f"{len(found)} {more}open to other users, such as {found[0]}"
+    yield Finding("file modes", "failed", said, f"run: chmod -R go= {folder}")
 
 
 def secret_key(services: Services) -> Iterator[Finding]:
@@ -169,6 +183,7 @@ def people(services: Services) -> Iterator[Finding]:
 CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     python,
     data_folder,
+    file_modes,
     secret_key,
     database,
     clips,

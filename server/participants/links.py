@@ -16,6 +16,7 @@ from server.clock import now
 from server.context import Services
 from server.models import Link, Study, StudyRun
 from server.participants import repository
+from server.participants.bounds import checked_device
 from server.participants.recruiter import NO_RECRUITER, Recruiter
 from server.participants.refusals import (
     LanguageUnknown,
@@ -236,7 +237,7 @@ def _new_run(
         trials_total=len(trials),
         completion_code=new_token()[:10],
         recruiter_parameters=start.query,
-        device=start.device,
+        device=checked_device(start.device),
     )
     repository.add_all(session, [run])
     repository.add_trials(session, _trial_rows(run, loaded, trials))

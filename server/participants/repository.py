@@ -14,6 +14,7 @@ from server.models import (
     FormAnswer,
     Link,
     Rating,
+    RunEvent,
     Study,
     StudyRun,
     StudyVersion,
@@ -186,6 +187,18 @@ def latest_calibration(session: Session, run: StudyRun) -> Calibration | None:
     """The calibration that counts."""
     query = select(Calibration).where(Calibration.study_run_id == run.id)
     return session.scalar(query.order_by(Calibration.id.desc()).limit(1))
+
+
+def calibrations(session: Session, run: StudyRun) -> int:
+    """How many calibrations a run has."""
+    query = select(func.count()).select_from(Calibration).where(Calibration.study_run_id == run.id)
+    return session.scalar(query) or 0
+
+
+def events(session: Session, run: StudyRun) -> int:
+    """How many events a run has."""
+    query = select(func.count()).select_from(RunEvent).where(RunEvent.study_run_id == run.id)
+    return session.scalar(query) or 0
 
 
 def answered_forms(session: Session, run: StudyRun) -> list[str]:

@@ -11,7 +11,7 @@ from server.clock import now
 from server.context import Services
 from server.db import insert_once
 from server.models import Calibration, FormAnswer, RunEvent, StudyRun
-from server.participants import repository, screening
+from server.participants import bounds, repository, screening
 from server.participants.completion import completion_code
 from server.participants.forms import checked_answers
 from server.participants.links import find_link, refusal_to_resume, resumable_until
@@ -100,6 +100,7 @@ def save_consent(services: Services, session: Session, token: str, agreed: bool)
 def save_calibration(session: Session, token: str, result: CalibrationResult) -> Saved:
     """Add a calibration; the ratings that follow carry it."""
     run = open_run(session, token)
+    bounds.check_calibrations(repository.calibrations(session, run))
     session.add(Calibration(study_run_id=run.id, **result.model_dump()))
     run.px_per_mm, run.viewing_distance_mm = result.px_per_mm, result.viewing_distance_mm
     return _saved(run)
@@ -108,7 +109,7 @@ def save_calibration(session: Session, token: str, result: CalibrationResult) ->
 def save_device(session: Session, token: str, device: dict[str, Any]) -> Saved:
     """Add what the page found out about browser and screen to what is known."""
     run = open_run(session, token)
-    run.device = {**run.device, **device}
+    run.device = bounds.checked_device({**run.device, **device})
     return _saved(run)
 
 
@@ -171,6 +172,7 @@ def save_events(session: Session, token: str, events: list[Event]) -> int:
     """Store events, each once; also after the run's end."""
     run = find_run(session, token, lock=True)
     run.last_seen_at = now()
+    bounds.check_events([event.data for event in events], repository.events(session, run))
     rows = [
         {
             "event_id": str(event.id),
@@ -193,7 +195,7 @@ def _with_zone(event: Event) -> Any:
 def save_unsupported(session: Session, report: Unsupported) -> None:
     """Store why a browser was turned away before a run began."""
     link = find_link(session, report.link_token)
-    data = {"reason": report.reason, **report.data}
+    data = bounds.checked_data({"reason": report.reason, **report.data})
     session.add(RunEvent(event_id=new_public_id(), link_id=link.id, type="unsupported", data=data))
 
 

@@ -10,6 +10,7 @@ from experiments.definition import Experiment
 from experiments.rules import ScreenAttention, ScreenDevice, ScreenFormAnswer
 from server.clock import now
 from server.models import RunEvent, StudyRun
+from server.participants.bounds import checked_data
 from server.tokens import new_public_id
 from server.trials import repository as trials
 
@@ -56,7 +57,7 @@ def by_form(
 
 def by_device(session: Session, run: StudyRun, reason: str, data: Mapping[str, Any]) -> None:
     """End the run of a browser or screen that cannot show the clips as declared."""
-    _end(session, run, {**data, "rule": "device", "reason": reason})
+    _end(session, run, checked_data({**data, "rule": "device", "reason": reason}))
 
 
 def _end(session: Session, run: StudyRun, data: dict[str, Any]) -> None:

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server.accounts.identity import Experimenter, Viewer
+from server.accounts.audit import record
+from server.accounts.identity import Experimenter, PersonalReader
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.runs import service
@@ -17,7 +18,7 @@ router = APIRouter(prefix="/api/admin/studies/{study}/runs", tags=["participants
 @router.get("")
 def list_runs(
     services: ServicesDep,
-    _who: Viewer,
+    _who: PersonalReader,
     study: str,
     show: Show = "everybody",
     search: Annotated[str, Query(max_length=200, description="Part of participant or run.")] = "",
@@ -30,10 +31,12 @@ def list_runs(
 
 
 @router.get("/{run}")
-def get_timeline(services: ServicesDep, _who: Viewer, study: str, run: str) -> Timeline:
+def get_timeline(services: ServicesDep, who: PersonalReader, study: str, run: str) -> Timeline:
     """One run: each trial with its frames and rating, forms, calibrations, events."""
-    with services.database.read() as session:
-        return service.timeline(session, find_study(session, study), run)
+    with services.database.write() as session:
+        found = service.timeline(session, find_study(session, study), run)
+        record(session, who, "personal data read", "run", run, study=study)
+        return found
 
 
 @router.put("/{run}/exclusion", status_code=204)

@@ -3,13 +3,14 @@
 import secrets
 from datetime import timedelta
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
 from server.errors import Conflict, Invalid
-from server.models import AssignedTrial, Rating, Study, StudyRun, VersionClip
+from server.models import AssignedTrial, AuditEntry, Rating, Study, StudyRun, VersionClip
 from server.runs import repository
 from server.runs.schemas import (
     RunPage,
@@ -135,8 +136,21 @@ def erase(session: Session, study: Study, public_id: str, confirm: str, who: Ide
     ratings = repository.delete_personal_rows(session, run)
     run.participant, run.device, run.recruiter_parameters = "erased", {}, {}
     run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
+    run.completion_code = ""
+    if run.link.kind == "personal":
+        run.link.label = "erased"
+    _forget_in_audit(session, public_id)
     # Nobody can go on with an erased run: its tokens fit nothing any more.
     run.token_hash, run.client_id = secrets.token_hex(32), secrets.token_hex(16)
     run.status = "withdrawn" if run.status == "active" else run.status
-    run.erased_at = now()
+    run.erased_at = run.started_at = run.last_seen_at = now()
+    run.consented_at = run.completed_at = run.excluded_at = None
     record(session, who, "run erased", "run", public_id, study=study.name, ratings=ratings)
+
+
+def _forget_in_audit(session: Session, public_id: str) -> None:
+    """Take from the audit log what was written about a person; that something was done stays."""
+    query = select(AuditEntry).where(AuditEntry.target_kind == "run", AuditEntry.target == public_id)
+    for entry in session.scalars(query):
+        if "reason" in entry.details:
+            entry.details = {**entry.details, "reason": "erased"}

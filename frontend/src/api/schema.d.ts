@@ -2813,7 +2813,7 @@ export interface components {
             /** Name */
             name: string;
             /** Scopes */
-            scopes: ("read" | "write" | "export")[];
+            scopes: ("read" | "personal" | "write" | "export")[];
             /**
              * Days
              * @default 365
@@ -2830,7 +2830,7 @@ export interface components {
             /** Name */
             name: string;
             /** Scopes */
-            scopes: ("read" | "write" | "export")[];
+            scopes: ("read" | "personal" | "write" | "export")[];
             /**
              * Created At
              * Format: date-time
@@ -4093,7 +4093,7 @@ export interface components {
             /** Name */
             name: string;
             /** Scopes */
-            scopes: ("read" | "write" | "export")[];
+            scopes: ("read" | "personal" | "write" | "export")[];
             /**
              * Created At
              * Format: date-time

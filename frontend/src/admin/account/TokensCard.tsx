@@ -9,7 +9,7 @@ import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
 
 type Scope = Schemas["NewToken"]["scopes"][number];
-const SCOPES: Scope[] = ["read", "write", "export"];
+const SCOPES: Scope[] = ["read", "personal", "write", "export"];
 
 export function TokensCard() {
   const tokens = useQuery({ queryKey: ["tokens"], queryFn: () => unwrap(api.GET("/api/admin/tokens")) });

@@ -1,0 +1,66 @@
+"""How much one run may hold beside its ratings: our page stays far below, a script fills no disk."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from server.errors import ApiError
+
+DEVICE_KEYS, DEVICE_BYTES = 200, 32 * 1024
+EVENT_BYTES, EVENTS_A_RUN = 4 * 1024, 20_000
+"""A heartbeat every few seconds makes some hundred events an hour."""
+CALIBRATIONS_A_RUN = 100
+MAX_DEPTH = 8
+
+
+class RunDataTooLarge(ApiError):
+    """A run holds as much as it may."""
+
+    status = 413
+    code = "run_data_too_large"
+
+
+def checked_device(device: dict[str, Any]) -> dict[str, Any]:
+    """`device` as it is to be stored; RunDataTooLarge where it is more than a browser has to say."""
+    if len(device) > DEVICE_KEYS:
+        raise RunDataTooLarge(f"Expected at most {DEVICE_KEYS} facts of the device, got {len(device)}.")
+    _check_size(device, DEVICE_BYTES, "the facts of the device")
+    return device
+
+
+def checked_data(data: dict[str, Any]) -> dict[str, Any]:
+    """The data of one event; RunDataTooLarge where they are more than an event has to say."""
+    _check_size(data, EVENT_BYTES, "the data of an event")
+    return data
+
+
+def check_events(data: Sequence[dict[str, Any]], stored: int) -> None:
+    """RunDataTooLarge where an event, or the number of a run's events, is too large."""
+    if stored + len(data) > EVENTS_A_RUN:
+        raise RunDataTooLarge(f"This visit has {stored} events; {EVENTS_A_RUN} are the most.")
+    for one in data:
+        checked_data(one)
+
+
+def check_calibrations(stored: int) -> None:
+    """RunDataTooLarge where a run has as many calibrations as it may."""
+    if stored >= CALIBRATIONS_A_RUN:
+        raise RunDataTooLarge(f"This visit has {stored} calibrations; no more are taken.")
+
+
+def _check_size(value: Mapping[str, Any], most: int, what: str) -> None:
+    if _depth(value) > MAX_DEPTH:
+        raise RunDataTooLarge(f"Expected {what} at most {MAX_DEPTH} levels deep.")
+    size = len(json.dumps(value))
+    if size > most:
+        raise RunDataTooLarge(f"Expected {what} within {most >> 10} KiB, got {size >> 10} KiB.")
+
+
+def _depth(value: Any) -> int:
+    """Levels of nesting, counted up to one more than is allowed."""
+    level, depth = [value], 0
+    while level and depth <= MAX_DEPTH:
+        inner = [one for one in level if isinstance(one, dict | list)]
+        level = [part for one in inner for part in (one.values() if isinstance(one, dict) else one)]
+        depth += bool(inner)
+    return depth

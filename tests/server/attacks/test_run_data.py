@@ -1,0 +1,103 @@
+"""What one run may hold, what others on the machine may read, and a store that hangs."""
+
+import socket
+import threading
+import time
+import uuid
+from pathlib import Path
+
+import pytest
+
+from server.clips.s3 import AT_ONCE, open_s3
+from server.clips.store import ClipsAway
+from server.context import Services
+from server.models import StudyRun
+from server.operations.modes import open_to_others
+from server.participants import bounds
+from server.settings import Settings
+from tests.helpers.databases import run_server_command
+from tests.helpers.studies import Participant
+
+
+def test_device_reports_do_not_grow_without_end(participant: Participant, services: Services) -> None:
+    participant.agree()
+    refused = set()
+    for number in range(60):
+        body = {f"{number}-{key}": "x" * 1000 for key in range(40)}
+        answer = participant.request("PUT", "/device", body)
+        if answer.status_code != 200:
+            refused.add((answer.status_code, answer.json()["error"]["code"]))
+    assert refused == {(413, "run_data_too_large")}
+    assert participant.request("PUT", "/device", {"agent": "Firefox"}).status_code == 200
+    deep: list[object] = []
+    for _ in range(400):
+        deep = [deep]
+    assert participant.request("PUT", "/device", {"deep": deep}).status_code == 413
+    with services.database.read() as session:
+        assert len(str(session.query(StudyRun).one().device)) < bounds.DEVICE_BYTES
+
+
+def test_events_and_calibrations_are_bounded(
+    participant: Participant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bounds, "EVENTS_A_RUN", 5)
+    monkeypatch.setattr(bounds, "CALIBRATIONS_A_RUN", 2)
+    participant.agree()
+
+    def event(**data: str) -> dict[str, object]:
+        return {"id": str(uuid.uuid4()), "type": "note", "data": data}
+
+    assert participant.request("POST", "/events", {"events": [event(a="x" * 5000)]}).status_code == 413
+    many = [participant.request("POST", "/events", {"events": [event()]}).status_code for _ in range(6)]
+    assert many == [200] * 5 + [413]
+    size = {
+        "px_per_mm": 4,
+        "method": "card",
+        "device_pixel_ratio": 1,
+        "screen_width_px": 9,
+        "screen_height_px": 9,
+    }
+    size |= {"window_width_px": 9, "window_height_px": 9}
+    assert [participant.request("PUT", "/calibration", size).status_code for _ in range(3)] == [200, 200, 413]
+
+
+def test_nobody_else_on_the_machine_reads_the_data_folder(tmp_path: Path) -> None:
+    settings = Settings(data_folder=tmp_path / "data", frontend_folder=tmp_path)
+    assert run_server_command(settings, "database", "upgrade").returncode == 0
+    assert list(open_to_others(settings.data_folder)) == []
+    (settings.data_folder / "reports").mkdir(mode=0o755)
+    left = settings.data_folder / "reports" / "report.html"
+    left.write_text("x")
+    left.chmod(0o644)
+    assert {path.name for path in open_to_others(settings.data_folder)} >= {"report.html"}
+    said = run_server_command(settings, "doctor").stdout
+    assert "open to other users" in said
+    assert "chmod -R go=" in said
+
+
+def test_a_store_that_hangs_holds_neither_threads_nor_requests(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("boto3")
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "x")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "x")
+    with socket.create_server(("127.0.0.1", 0)) as silent:  # takes connections and never answers
+        endpoint = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        store = open_s3(Settings(s3_bucket="clips", s3_endpoint=endpoint))
+        spent: list[float] = []
+
+        def ask() -> None:
+            began = time.monotonic()
+            with pytest.raises(ClipsAway):
+                store.size("0" * 64)
+            spent.append(time.monotonic() - began)
+
+        threads = [threading.Thread(target=ask) for _ in range(40)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert sum(one > 1 for one in spent) <= AT_ONCE
+        assert max(spent) < 10
+        began = time.monotonic()
+        assert store.problem(None)
+        ask()
+        assert time.monotonic() - began < 1
