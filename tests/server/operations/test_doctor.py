@@ -4,6 +4,7 @@ from pathlib import Path
 from server.context import Services, open_services
 from server.operations.checks import CHECKS, Finding
 from server.operations.doctor import examine
+from server.operations.modes import close_to_others
 from server.settings import Settings
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import StudyInDatabase
@@ -18,6 +19,7 @@ def test_an_installation_in_order(services: Services, study: StudyInDatabase) ->
         page = services.settings.frontend_folder / site / "index.html"
         page.parent.mkdir(parents=True)
         page.write_text("<html>")
+    close_to_others(services.settings)
     found = by_subject(services)
     assert [finding for finding in found.values() if finding.verdict == "failed"] == []
     assert found["clips"].found == "8, all there"
