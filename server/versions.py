@@ -70,5 +70,5 @@ def _load(session: Session, version_id: int) -> LoadedVersion:
         sizes = (clip.frames, clip.fps, clip.bytes, clip.width_px, clip.height_px)
         clips[clip_id] = PlacedClip(clip.sha256, *sizes, width_mm)
         places[cell, exemplar] = clip_id
-    experiment = load_stored(version.definition)
+    experiment = load_stored(version.definition, version.format)
     return LoadedVersion(experiment, version.inter_ocular_px, clips, places)

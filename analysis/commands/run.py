@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from analysis.report.write import Section
 
 
-class Phase(StrEnum):
-    """Which rows of a study count."""
+class Origin(StrEnum):
+    """Whose answers count; said here once more so that `--help` needs no numerics."""
 
-    LIVE = "live"
+    PARTICIPANT = "participant"
     PILOT = "pilot"
+    SIMULATED = "simulated"
     ALL = "all"
 
 
@@ -42,7 +43,20 @@ def run(
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="A CSV export instead of a database.")] = None,
     study: Annotated[str | None, typer.Option(help="Name of the study, where there are several.")] = None,
-    phase: Annotated[Phase, typer.Option(help="Rows of the live study, of its pilot, or all.")] = Phase.LIVE,
+    origin: Annotated[
+        Origin | None,
+        typer.Option(
+            help="Whose answers; without it the first there are of participant, pilot and simulated.",
+            show_default=False,
+        ),
+    ] = None,
+    series: Annotated[
+        int | None,
+        typer.Option(min=1, help="Data series; without it the latest.", show_default=False),
+    ] = None,
+    version: Annotated[
+        int | None, typer.Option(min=1, help="One version of the study alone.", show_default=False)
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the report; default out/analysis/NAME.", show_default=False)
     ] = None,
@@ -61,16 +75,21 @@ def run(
       analysis run exp1 --csv ratings.csv --out results
 
       analysis run exp2 --database postgresql://me@host/palpebra --study spring
+
+      analysis run exp1 --origin pilot --series 2
     """
     from analysis.errors import NoRatingsError
     from analysis.plans.study import analyse_study
     from analysis.read.database import default_url
+    from analysis.read.pool import Origin as PoolOrigin
+    from analysis.read.pool import Pool
     from analysis.read.study_ratings import load_csv, load_database
     from experiments.load import load_experiment
 
     if database is not None and csv is not None:
         raise InputError("--database and --csv exclude each other; give one")
     declared = load_experiment(experiment)
+    pool = Pool(PoolOrigin(origin.value) if origin else None, series, version)
     try:
         with _working("reading ratings"):
             ratings = (
@@ -78,7 +97,7 @@ def run(
                 if csv is not None
                 else load_database(database or default_url(), declared, study, report and sensitivity)
             )
-            analysis = analyse_study(declared, ratings, phase.value)
+            analysis = analyse_study(declared, ratings, pool)
     except NoRatingsError as error:
         typer.echo(f"nothing to analyse: {error}", err=True)
         raise typer.Exit(1) from None

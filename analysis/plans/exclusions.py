@@ -46,13 +46,13 @@ class Exclusions:
     rows: pd.DataFrame = field(repr=False)
 
 
-def apply_exclusions(experiment: Experiment, ratings: StudyRatings, phase: str = "live") -> Exclusions:
-    """Set aside what is no main trial of `phase` ('live', 'pilot' or 'all'), then apply every declared rule.
+def apply_exclusions(experiment: Experiment, ratings: StudyRatings) -> Exclusions:
+    """Set aside what is no main trial, then apply every declared rule.
 
     Rules about participants see all their main trials; rules about trials see those of who remains. A
     participant's second run is left out, the first that no rule excludes counts.
     """
-    rows, aside = _of_phase(_with_run(ratings.rows), phase)
+    rows, aside = _with_run(ratings.rows), list[str]()
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
     main, attention = rows[(kind == "main").to_numpy()], rows[(kind == "attention").to_numpy()]
     practice = len(rows) - len(main) - len(attention)
@@ -81,14 +81,6 @@ def _people(main: pd.DataFrame, rows: pd.DataFrame) -> dict[str, str]:
     """Participant of every run."""
     pairs = rows[["run", "participant"]].drop_duplicates()
     return {str(run): str(who) for run, who in pairs.itertuples(index=False)} if len(main) else {}
-
-
-def _of_phase(rows: pd.DataFrame, phase: str) -> tuple[pd.DataFrame, list[str]]:
-    if phase == "all" or "phase" not in rows.columns:
-        return rows, []
-    mine = rows["phase"].isin([phase, ""]).to_numpy()
-    other = int((~mine).sum())
-    return rows[mine], [f"{other} rows of another phase than '{phase}'"] if other else []
 
 
 def _participant_reasons(

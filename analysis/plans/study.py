@@ -6,6 +6,7 @@ import pandas as pd
 from analysis.errors import NoRatingsError
 from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.plans.result import Analysis, Labels, analyse_cells
+from analysis.read.pool import Pool, pooled
 from analysis.read.study_ratings import StudyRatings
 from analysis.within.cell_means import cell_table
 from experiments.definition import Experiment
@@ -13,21 +14,22 @@ from experiments.errors import InputError, did_you_mean
 from experiments.trials.clip_rating.declaration import clip_rating_of
 
 
-def analyse_study(experiment: Experiment, ratings: StudyRatings, phase: str = "live") -> Analysis:
+def analyse_study(experiment: Experiment, ratings: StudyRatings, pool: Pool = Pool()) -> Analysis:
     """Check, exclude by the declared rules, average, and test.
 
     Raises
     ------
     NoRatingsError
-        No main trial of this phase, or nobody left after exclusion.
+        No main trial of this origin, or nobody left after exclusion.
     InputError
         A rating off the declared scale, an unknown level, a trial stored twice with different data.
     """
-    rows, repeats = _without_repeats(ratings.rows, ratings.source)
+    chosen, pooling = pooled(ratings.rows, pool, ratings.source)
+    rows, repeats = _without_repeats(chosen, ratings.source)
     _check(experiment, rows, ratings.source)
-    checked = StudyRatings(rows, ratings.source, ratings.decisions, ratings.first_seen)
-    exclusions = apply_exclusions(experiment, checked, phase)
-    _refuse_nobody(exclusions, ratings.source, phase)
+    checked = StudyRatings(rows, ratings.source, (*ratings.decisions, *pooling), ratings.first_seen)
+    exclusions = apply_exclusions(experiment, checked)
+    _refuse_nobody(exclusions, ratings.source, pool)
     factors = experiment.analysis.factors or experiment.factor_names
     levels = {f.name: [level.name for level in f.levels] for f in experiment.factors}
     cells = cell_table(exclusions.rows, "participant", "response", factors, levels)
@@ -37,8 +39,8 @@ def analyse_study(experiment: Experiment, ratings: StudyRatings, phase: str = "l
         title=experiment.title,
         source=ratings.source,
         rating="response",
-        synthetic=ratings.synthetic,
-        decisions=(*ratings.decisions, *repeats),
+        synthetic=checked.synthetic,
+        decisions=(*checked.decisions, *repeats),
         labels=labels_of(experiment),
         experiment=experiment,
         exclusions=exclusions,
@@ -106,10 +108,10 @@ def _without_repeats(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, tup
     return rows[~again], (f"{again.sum()} repeated rows of trials already there, counted once",)
 
 
-def _refuse_nobody(exclusions: Exclusions, source: str, phase: str) -> None:
+def _refuse_nobody(exclusions: Exclusions, source: str, pool: Pool) -> None:
     if not exclusions.n_runs:
         aside = f" (set aside: {'; '.join(exclusions.set_aside)})" if exclusions.set_aside else ""
-        wanted = "" if phase == "all" else f" of phase '{phase}'"
+        wanted = f" of origin '{pool.origin}'" if pool.origin else ""
         raise NoRatingsError(f"{source} has no ratings{wanted} yet{aside}")
     if exclusions.rows.empty:
         who = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])

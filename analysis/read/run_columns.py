@@ -13,7 +13,10 @@ _OF_A_RUN = RATINGS.pick(
     "exclusion_reason",
     "synthetic",
     "excluded",
+    "run_origin",
+    "study_version",
+    "data_series",
 )
-RUN_TEXTS = names_of(_OF_A_RUN, "text")
+RUN_TEXTS = names_of(_OF_A_RUN, "text", "integer")
 RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
 """Columns that are the same for all rows of a run."""

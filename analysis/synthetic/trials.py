@@ -90,6 +90,9 @@ def _common(experiment: Experiment) -> Row:
         "verdict": "good",
         "focus_lost": 0,
         "excluded": 0,
+        "run_origin": "simulated",
+        "study_version": 1,
+        "data_series": 1,
     }
 
 

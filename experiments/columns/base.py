@@ -30,7 +30,7 @@ RUN: tuple[Column, ...] = (
         "synthetic",
         "boolean",
         "True where no person gave this rating: simulated or synthesised data.",
-        source="r",
+        source="r.origin = 'simulated'",
     ),
     Column("run", "text", "Public identifier of the participant's visit (study run).", source="r.public_id"),
     Column(
@@ -210,4 +210,32 @@ EXCLUSION: tuple[Column, ...] = (
 
 SAVED: tuple[Column, ...] = (
     Column("saved_at", "time", "When the server stored the row (UTC, ISO 8601).", source="t"),
+)
+
+ORIGINS = ("participant", "pilot", "simulated")
+"""Origins of runs that are exported; a preview's answers are not."""
+
+ORIGIN: tuple[Column, ...] = (
+    Column(
+        "run_origin",
+        "text",
+        "Where the answers come from, fixed at the run's start: the live study, its pilot, or no person.",
+        values=ORIGINS,
+        source="r.origin",
+    ),
+    Column(
+        "study_version",
+        "integer",
+        "Version of the study the run was made with.",
+        minimum=1,
+        source="v.number",
+    ),
+    Column(
+        "data_series",
+        "integer",
+        "Data series of that version: versions that measure the same share one, and their answers may be "
+        "pooled.",
+        minimum=1,
+        source="v.series",
+    ),
 )

@@ -1,5 +1,6 @@
 """The columns of the runs CSV: one row a visit."""
 
+from experiments.columns.base import ORIGINS
 from experiments.columns.column import Column
 
 RUN_COLUMNS: tuple[Column, ...] = (
@@ -25,4 +26,6 @@ RUN_COLUMNS: tuple[Column, ...] = (
     Column("forms", "text", "JSON object of form names and their answers."),
     Column("device", "text", "JSON object of what the browser said of itself."),
     Column("recruiter_parameters", "text", "JSON object of the parameters of the recruiter's address."),
+    Column("run_origin", "text", "Where the run came from, fixed at its start.", values=ORIGINS),
+    Column("data_series", "integer", "Data series of the run's version of the study."),
 )

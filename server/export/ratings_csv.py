@@ -29,7 +29,7 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 def rating_count(session: Session, study: Study) -> int:
     """Rows that `rating_rows` gives."""
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
-    query = query.where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    query = query.where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
     return session.scalar(query) or 0
 
 
@@ -54,6 +54,6 @@ def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
 
 def _runs_after(session: Session, study: Study, latest: int) -> Sequence[Any]:
     query = select(StudyRun.id, StudyRun.public_id).where(
-        StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.preview.is_(False)
+        StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.origin != "preview"
     )
     return session.execute(query.order_by(StudyRun.id).limit(RUNS_AT_ONCE)).all()

@@ -21,7 +21,7 @@ def each_run(session: Session, study: Study) -> Iterator[StudyRun]:
     latest = 0
     while True:
         query = select(StudyRun).where(
-            StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.preview.is_(False)
+            StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.origin != "preview"
         )
         runs = session.scalars(query.order_by(StudyRun.id).limit(AT_ONCE)).all()
         if not runs:
@@ -34,7 +34,7 @@ def each_run(session: Session, study: Study) -> Iterator[StudyRun]:
 def run_count(session: Session, study: Study) -> int:
     """Runs of a study but previews."""
     query = select(func.count()).select_from(StudyRun).where(StudyRun.study_id == study.id)
-    return session.scalar(query.where(StudyRun.preview.is_(False))) or 0
+    return session.scalar(query.where(StudyRun.origin != "preview")) or 0
 
 
 def run_rows(session: Session, study: Study) -> Iterator[list[Any]]:
@@ -53,7 +53,7 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "run": run.public_id,
         "participant": run.participant,
         "phase": run.phase,
-        "synthetic": int(run.synthetic),
+        "synthetic": int(run.origin == "simulated"),
         "status": run.status,
         "stage": run.stage,
         "language": run.language,
@@ -71,6 +71,8 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "forms": _json(dict(answers.all())),
         "device": _json(run.device),
         "recruiter_parameters": _json(run.recruiter_parameters),
+        "run_origin": run.origin,
+        "data_series": run.version.series,
     }
 
 
@@ -84,6 +86,6 @@ def _json(value: Any) -> str:
 
 def raw_lines(session: Session, study: Study) -> Iterator[str]:
     """One JSON object a run with every play, drawn frame, event, form and calibration."""
-    query = select(StudyRun.public_id).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    query = select(StudyRun.public_id).where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
     for public_id in session.scalars(query.order_by(StudyRun.id)).all():
         yield service.timeline(session, study, public_id).model_dump_json() + "\n"

@@ -21,6 +21,7 @@ STAGES = (
     "debrief",
     "done",
 )
+ORIGINS = ("participant", "preview", "pilot", "simulated")
 RUN_STATUSES = ("active", "complete", "screened_out", "withdrawn")
 
 
@@ -28,6 +29,7 @@ class StudyRun(Base):
     """A participant's visit. No internet address is stored, here or anywhere.
 
     slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease.
+    origin: where its answers come from, given at its start; the database refuses to change it.
     seed: of the trial order. trials_answered: trials that need no further play, practice and checks included.
     elapsed_ms: latest `time_elapsed`, from which the clock goes on after a reload.
     px_per_mm, viewing_distance_mm: of the latest calibration, copied to each rating.
@@ -37,6 +39,7 @@ class StudyRun(Base):
     __tablename__ = "study_runs"
     __table_args__ = (
         one_of("phase", "pilot", "live"),
+        one_of("origin", *ORIGINS),
         one_of("status", *RUN_STATUSES),
         one_of("stage", *STAGES),
         UniqueConstraint("link_id", "client_id"),
@@ -53,8 +56,7 @@ class StudyRun(Base):
     token_hash: Mapped[str] = mapped_column(String(64), unique=True)
     participant: Mapped[str] = mapped_column(String(200))
     phase: Mapped[str] = mapped_column(String(10))
-    synthetic: Mapped[bool] = mapped_column(default=False)
-    preview: Mapped[bool] = mapped_column(default=False)
+    origin: Mapped[str] = mapped_column(String(12), default="participant")
     status: Mapped[str] = mapped_column(String(20), default="active")
     stage: Mapped[str] = mapped_column(String(20), default="consent")
     language: Mapped[str] = mapped_column(String(10))

@@ -41,7 +41,11 @@ class Study(Base):
 
 
 class StudyVersion(Base):
-    """One frozen declaration of a study with the manifest of its clips; never changed once a run uses it."""
+    """One frozen declaration of a study with the manifest of its clips; never changed once a run uses it.
+
+    format: of the stored definition. series: versions of a study that measure the same have the same number;
+    only their answers may be pooled.
+    """
 
     __tablename__ = "study_versions"
     __table_args__ = (UniqueConstraint("study_id", "number"), {"sqlite_autoincrement": True})
@@ -56,6 +60,8 @@ class StudyVersion(Base):
     manifest: Mapped[dict[str, Any]]
     inter_ocular_px: Mapped[float | None]
     note: Mapped[str] = mapped_column(Text, default="")
+    format: Mapped[int] = mapped_column(default=1)
+    series: Mapped[int] = mapped_column(default=1)
     created_at: Mapped[datetime] = mapped_column(default=now)
     created_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
 

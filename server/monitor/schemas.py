@@ -12,7 +12,7 @@ class MonitoredRun(BaseModel):
     run: str
     participant: str
     phase: str
-    synthetic: bool
+    origin: str
     status: str
     stage: str
     presence: Literal["here", "away", "dropped", "finished"] = Field(
@@ -42,6 +42,8 @@ class MonitorSnapshot(BaseModel):
     study_status: str
     quota: int | None
     server_time: datetime
+    origin: str = Field(description="Whose runs the counts, funnel and expected finish are of.")
+    others: dict[str, int] = Field(description="Runs of other origins, which are listed and not counted.")
     complete: int
     active: int
     dropped: int

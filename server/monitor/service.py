@@ -1,5 +1,6 @@
 """The live monitor: runs, presence, funnel and expected finish of one study."""
 
+from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any
@@ -20,7 +21,7 @@ SHOWN = (
     StudyRun.public_id,
     StudyRun.participant,
     StudyRun.phase,
-    StudyRun.synthetic,
+    StudyRun.origin,
     StudyRun.status,
     StudyRun.stage,
     StudyRun.started_at,
@@ -33,25 +34,33 @@ SHOWN = (
 
 
 def snapshot(session: Session, study: Study, heat: HeatMap, lease: timedelta) -> MonitorSnapshot:
-    """The monitor of `study` at this moment; previews are not shown."""
+    """The monitor of `study` at this moment; previews are not shown.
+
+    What is counted has one origin: the pilot's runs where the study is a pilot, else participants'.
+    """
     heat.update(session, study.id)
-    query = select(*SHOWN).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+    query = select(*SHOWN).where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
     runs = session.execute(query.order_by(StudyRun.id)).all()
     moment = now()
     shown = [monitored(run, heat, moment, lease) for run in runs]
+    origin = "pilot" if study.status == "pilot" else "participant"
+    counted = [run for run in runs if run.origin == origin]
+    present = [line for line in shown if line.origin == origin]
     return MonitorSnapshot(
         study=study.name,
         study_status=study.status,
         quota=study.quota,
         server_time=moment,
-        complete=sum(run.status == "complete" for run in runs),
-        active=sum(run.presence in ("here", "away") for run in shown),
-        dropped=sum(run.presence == "dropped" for run in shown),
-        screened_out=sum(run.status == "screened_out" for run in runs),
-        withdrawn=sum(run.status == "withdrawn" for run in runs),
+        origin=origin,
+        complete=sum(run.status == "complete" for run in counted),
+        active=sum(line.presence in ("here", "away") for line in present),
+        dropped=sum(line.presence == "dropped" for line in present),
+        screened_out=sum(run.status == "screened_out" for run in counted),
+        withdrawn=sum(run.status == "withdrawn" for run in counted),
+        others=Counter(run.origin for run in runs if run.origin != origin),
         refused_browsers=_refused(session, study),
-        funnel=funnel(runs),
-        expected_finish=expected_finish(runs, study.quota, moment),
+        funnel=funnel(counted),
+        expected_finish=expected_finish(counted, study.quota, moment),
         runs=shown,
     )
 
@@ -72,7 +81,7 @@ def monitored(run: Any, heat: HeatMap, moment: datetime, lease: timedelta) -> Mo
             "run": run.public_id,
             "participant": run.participant,
             "phase": run.phase,
-            "synthetic": run.synthetic,
+            "origin": run.origin,
             "status": run.status,
             "stage": run.stage,
             "presence": presence,

@@ -51,17 +51,17 @@ class StoredCounts(Collector):
     def collect(self) -> Iterable[GaugeMetricFamily]:
         """Runs by study and status; the version of the program."""
         runs = GaugeMetricFamily(
-            "palpebra_runs", "Runs stored, previews left out.", labels=("study", "phase", "status")
+            "palpebra_runs", "Runs stored, previews left out.", labels=("study", "phase", "origin", "status")
         )
         query = (
-            select(Study.name, StudyRun.phase, StudyRun.status, func.count())
+            select(Study.name, StudyRun.phase, StudyRun.origin, StudyRun.status, func.count())
             .join(Study, Study.id == StudyRun.study_id)
-            .where(StudyRun.preview.is_(False))
-            .group_by(Study.name, StudyRun.phase, StudyRun.status)
+            .where(StudyRun.origin != "preview")
+            .group_by(Study.name, StudyRun.phase, StudyRun.origin, StudyRun.status)
         )
         with self.database.read() as session:
-            for name, phase, status, count in session.execute(query):
-                runs.add_metric((name, phase, status), count)
+            for name, phase, origin, status, count in session.execute(query):
+                runs.add_metric((name, phase, origin, status), count)
         yield runs
         build = GaugeMetricFamily("palpebra_build_info", "The program that runs.", labels=("version",))
         build.add_metric((version("palpebra"),), 1)

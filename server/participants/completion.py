@@ -72,8 +72,8 @@ def _screened_out(run: StudyRun) -> Completion:
 
 
 def _close_when_full(session: Session, study: Study | None, run: StudyRun) -> None:
-    if study is None or study.quota is None or study.status not in ("pilot", "live") or run.preview:
+    if study is None or study.quota is None or run.origin not in ("participant", "pilot"):
         return
     session.flush()
-    if repository.complete_runs(session, study, run.phase) >= study.quota:
+    if repository.complete_runs(session, study, run.origin) >= study.quota:
         study.status, study.closed_at = "closed", now()

@@ -28,7 +28,7 @@ from server.participants.refusals import (
     StudyFull,
     StudyPaused,
 )
-from server.participants.schemas import Gates, LinkedStudy, LinkState, RunStart, RunStarted
+from server.participants.schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
 from server.participants.screening import screens_devices
 from server.tokens import derived_token, hash_token, new_public_id, new_token
 from server.versions import LoadedVersion
@@ -132,7 +132,7 @@ def _status(session: Session, link: Link, study: Study, experiment: Experiment) 
     """Whether a new run may begin: open, or the reason why not."""
     if link.expires_at is not None and link.expires_at <= now():
         return "expired"
-    if link.kind == "preview":
+    if link.kind == "preview" or link.synthetic:
         return "open"
     if study.status not in ("pilot", "live"):
         return "closed"
@@ -143,11 +143,20 @@ def _status(session: Session, link: Link, study: Study, experiment: Experiment) 
         (link.quota, StudyRun.link_id, link.id),
         (study.quota, StudyRun.study_id, study.id),
     ):
-        if quota is not None and not link.synthetic:
-            taken = repository.places_taken(session, column, ident, lease)
+        if quota is not None:
+            taken = repository.places_taken(session, column, ident, _origin(link, study), lease)
             if taken >= quota:
                 return "full"
     return "open"
+
+
+def _origin(link: Link, study: Study) -> Origin:
+    """Where the answers of a run come from that begins through this link at this moment."""
+    if link.kind == "preview":
+        return "preview"
+    if link.synthetic:
+        return "simulated"
+    return "participant" if study.status == "live" else "pilot"
 
 
 def _known_run(session: Session, link: Link, start: RunStart) -> StudyRun | None:
@@ -168,7 +177,7 @@ def _restarts(experiment: Experiment, run: StudyRun) -> bool:
 
 def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunTooOld | None:
     """Why this run may not be taken up again; None where it may, or where it is over and only looked at."""
-    if run.status != "active" or run.preview:
+    if run.status != "active" or run.origin == "preview":
         return None
     if now() > _oldest(experiment, run):
         hours = f"{experiment.session.maximum_age_hours:g}"
@@ -180,7 +189,7 @@ def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunToo
 
 def resumable_until(experiment: Experiment, run: StudyRun) -> datetime | None:
     """Until when a reloaded page may go on by itself, without a connection; None where it must ask first."""
-    kept = experiment.session.resume == "resume" and run.status == "active" and not run.preview
+    kept = experiment.session.resume == "resume" and run.status == "active" and run.origin != "preview"
     return _oldest(experiment, run) if kept else None
 
 
@@ -209,12 +218,12 @@ def _new_run(
     start: RunStart,
 ) -> tuple[StudyRun, str]:
     """Draw slot, seed and order, and store them with the run."""
-    preview, phase = link.kind == "preview", "live" if study.status == "live" else "pilot"
-    if preview:
+    origin, phase = _origin(link, study), "live" if study.status == "live" else "pilot"
+    if origin == "preview":
         keep = timedelta(hours=services.settings.preview_keep_hours)
         repository.delete_previews(session, study, now() - keep)
     lease = timedelta(minutes=loaded.experiment.session.lease_minutes)
-    slot = repository.free_slot(session, version_id, phase, link.synthetic, lease)
+    slot = repository.free_slot(session, version_id, origin, lease)
     seed = secrets.randbits(SEED_BITS)
     trials = KINDS[loaded.experiment.trial.kind].assign(loaded.experiment, seed, slot)
     public_id = new_public_id()
@@ -229,8 +238,7 @@ def _new_run(
         token_hash=hash_token(token),
         participant=(own or public_id)[:200],
         phase=phase,
-        synthetic=link.synthetic,
-        preview=preview,
+        origin=origin,
         language=start.language,
         seed=seed,
         slot=slot,

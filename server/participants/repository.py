@@ -78,42 +78,39 @@ def latest_run(session: Session, link: Link, participant: str | None = None) -> 
     return session.scalar(query if participant is None else query.where(StudyRun.participant == participant))
 
 
-def places_taken(session: Session, column: Any, ident: int, lease: timedelta) -> int:
-    """Runs that are complete, or active and seen within the lease, where `column` equals `ident`."""
+def places_taken(session: Session, column: Any, ident: int, origin: str, lease: timedelta) -> int:
+    """Runs of this origin that are complete, or active and seen within the lease; `column` equals `ident`."""
     query = select(func.count()).select_from(StudyRun).where(column == ident, *_holding(now() - lease))
-    return session.scalar(query.where(StudyRun.synthetic.is_(False))) or 0
+    return session.scalar(query.where(StudyRun.origin == origin)) or 0
 
 
-def complete_runs(session: Session, study: Study, phase: str) -> int:
-    """Complete runs of people in this phase, excluded ones not counted."""
+def complete_runs(session: Session, study: Study, origin: str) -> int:
+    """Complete runs of this origin, excluded ones not counted."""
     query = (
         select(func.count())
         .select_from(StudyRun)
         .where(
             StudyRun.study_id == study.id,
             StudyRun.status == "complete",
-            StudyRun.phase == phase,
-            StudyRun.preview.is_(False),
-            StudyRun.synthetic.is_(False),
+            StudyRun.origin == origin,
             StudyRun.excluded.is_(False),
         )
     )
     return session.scalar(query) or 0
 
 
-def free_slot(session: Session, version_id: int, phase: str, synthetic: bool, lease: timedelta) -> int:
+def free_slot(session: Session, version_id: int, origin: str, lease: timedelta) -> int:
     """The smallest slot that no run holds which is complete, or active and seen within the lease.
 
     The database looks for it: with thousands of runs, fetching their slots would take most of a start's time.
     """
-    values = {"version": version_id, "phase": phase, "synthetic": synthetic, "seen_after": now() - lease}
+    values = {"version": version_id, "origin": origin, "seen_after": now() - lease}
     return session.connection().scalar(_FREE_SLOT, values) or 0
 
 
 def _holding(seen_after: Any) -> tuple[Any, ...]:
     alive = (StudyRun.status == "active") & (StudyRun.last_seen_at > seen_after)
     return (
-        StudyRun.preview.is_(False),
         StudyRun.excluded.is_(False),
         (StudyRun.status == "complete") | alive,
     )
@@ -122,8 +119,7 @@ def _holding(seen_after: Any) -> tuple[Any, ...]:
 def _free_slot_statement() -> Any:
     held = select(StudyRun.slot).where(
         StudyRun.version_id == bindparam("version"),
-        StudyRun.phase == bindparam("phase"),
-        StudyRun.synthetic == bindparam("synthetic"),
+        StudyRun.origin == bindparam("origin"),
         *_holding(bindparam("seen_after")),
     )
     taken = held.cte("taken")
@@ -216,7 +212,7 @@ def form_answer(session: Session, run: StudyRun, form: str) -> FormAnswer | None
 def delete_previews(session: Session, study: Study, before: datetime) -> None:
     """Delete previews that began earlier, with everything they hold."""
     query = delete(StudyRun).where(
-        StudyRun.study_id == study.id, StudyRun.preview.is_(True), StudyRun.started_at < before
+        StudyRun.study_id == study.id, StudyRun.origin == "preview", StudyRun.started_at < before
     )
     session.execute(query)
 

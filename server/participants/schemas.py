@@ -26,6 +26,7 @@ Stage = Literal[
 if Stage.__args__ != STAGES:  # type: ignore[attr-defined]
     raise RuntimeError("the stages of the API and of the database differ")
 
+Origin = Literal["participant", "preview", "pilot", "simulated"]
 RunStatus = Literal["active", "complete", "screened_out", "withdrawn"]
 Text = Annotated[str, StringConstraints(max_length=500)]
 Key = Annotated[str, StringConstraints(max_length=100)]
@@ -135,8 +136,7 @@ class RunState(BaseModel):
     run_id: str
     status: RunStatus
     stage: Stage
-    preview: bool
-    synthetic: bool
+    origin: Origin = Field(description="Where the run's answers come from; given at its start.")
     language: str
     languages: list[str]
     texts: Texts = Field(description="Markdown of the run's language, by page.")

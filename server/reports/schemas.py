@@ -3,14 +3,17 @@
 from datetime import datetime
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class NewReport(BaseModel):
     """Which data to analyse."""
 
     model_config = ConfigDict(extra="forbid")
-    phase: Literal["pilot", "live"] = "live"
+    origin: Literal["participant", "pilot", "simulated"] = "participant"
+    series: int | None = Field(
+        default=None, description="Data series; that of the active version where none is given."
+    )
     sensitivity: bool = True
 
 
@@ -21,7 +24,8 @@ class ReportOut(BaseModel):
     status: Literal["queued", "running", "done", "failed", "cancelled"]
     progress: float
     message: str
-    phase: str
+    origin: str
+    series: int | None
     created_at: datetime
     finished_at: datetime | None
     files: list[str]

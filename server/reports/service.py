@@ -19,7 +19,8 @@ from server.errors import Conflict, NotFound
 from server.export.pieces import csv_pieces, rating_table
 from server.models import Job, Study
 from server.reports.schemas import NewReport, ReportOut
-from server.studies.lookup import active_version, find_study
+from server.studies.lookup import find_study
+from server.studies.series import version_of_series
 from server.tokens import new_public_id
 
 KIND = "report"
@@ -76,12 +77,18 @@ def report_out(services: Services, job: Job) -> ReportOut:
             "status": "failed" if stale else job.status,
             "progress": job.progress,
             "message": "the server was stopped while it was built" if stale else job.message,
-            "phase": job.parameters.get("phase", "live"),
+            "origin": job.parameters.get("origin") or _origin_of_older(job.parameters),
+            "series": job.parameters.get("series"),
             "created_at": job.created_at,
             "finished_at": job.finished_at,
             "files": sorted(path.name for path in folder.iterdir() if path.is_file()) if done else [],
         }
     )
+
+
+def _origin_of_older(parameters: dict[str, Any]) -> str:
+    # Reports of before there were origins were of a phase.
+    return "pilot" if parameters.get("phase") == "pilot" else "participant"
 
 
 def report_folder(services: Services, public_id: str) -> Path:
@@ -105,9 +112,9 @@ def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> 
     try:
         with _one_at_a_time:
             _note(services, public_id, status="running", progress=0.05, message="exporting", started_at=now())
-            _export(services, name, inputs)
+            series = _export(services, name, inputs, wanted.series)
             _note(services, public_id, progress=0.2, message="analysing")
-            message = _analyse(inputs, folder, wanted)
+            message = _analyse(inputs, folder, wanted, series)
         status = "failed" if message else "done"
         _note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
     except (OSError, subprocess.SubprocessError, NotFound) as error:
@@ -116,22 +123,24 @@ def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> 
         shutil.rmtree(inputs, ignore_errors=True)
 
 
-def _export(services: Services, name: str, inputs: Path) -> None:
+def _export(services: Services, name: str, inputs: Path, series: int | None) -> int:
+    """Write the ratings and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
     with services.database.read() as session:
         study = find_study(session, name)
-        toml = active_version(session, study).definition_toml
-        (inputs / "definition.toml").write_text(toml, encoding="utf-8")
+        version = version_of_series(session, study, series)
+        (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
         with (inputs / "ratings.csv").open("wb") as stream:
             for piece in csv_pieces(rating_table(session, study)):
                 stream.write(piece)
+        return version.series
 
 
-def _analyse(inputs: Path, folder: Path, wanted: NewReport) -> str:
+def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
     """Run the analysis; return its own error line where it failed, else an empty text."""
     program = Path(sys.executable).with_name("analysis")
     command = [str(program), "run", str(inputs / "definition.toml"), "--csv", str(inputs / "ratings.csv")]
-    command += ["--phase", wanted.phase, "--out", str(folder)]
+    command += ["--origin", wanted.origin, "--series", str(series), "--out", str(folder)]
     command += [] if wanted.sensitivity else ["--no-sensitivity"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603
     if done.returncode == 0:

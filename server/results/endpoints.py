@@ -1,6 +1,6 @@
 """The results page's data."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 from sqlalchemy.orm import Session
@@ -9,18 +9,22 @@ from server.accounts.identity import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.models import Study
+from server.participants.schemas import Origin
 from server.results import repository, service
 from server.results.cache import Revision
+from server.results.repository import Pool
 from server.results.schemas import Results
-from server.studies.lookup import active_definition, find_study
+from server.studies.lookup import find_study
+from server.studies.series import version_of_series
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["results"], responses=ERROR_RESPONSES)
 
 
-def _counted(session: Session, study: Study, phase: str) -> tuple[Revision, Results]:
+def _counted(session: Session, study: Study, origin: Origin, series: int | None) -> tuple[Revision, Results]:
     # The revision is read first: a rating that comes in between is counted again, never left out.
-    revision = repository.revision(session, study, phase)
-    return revision, service.results(session, study, active_definition(session, study), phase)
+    version = version_of_series(session, study, series)
+    revision = repository.revision(session, study, Pool(study.id, origin, version.series))
+    return revision, service.results(session, study, version, origin)
 
 
 @router.get("/results", response_model=Results, responses={304: {"description": "Nothing has changed."}})
@@ -28,22 +32,25 @@ def get_results(
     services: ServicesDep,
     _who: Viewer,
     study: str,
-    phase: Literal["pilot", "live"] = "live",
+    origin: Origin = "participant",
+    series: int | None = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
     """Means with within-participant error bars, distributions, response times and playback so far.
 
-    With the ETag of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting
-    takes long `counted_at` may lie some time back.
+    They are of one origin and one data series, that of the active version where none is given. With the ETag
+    of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting takes long
+    `counted_at` may lie some time back.
     """
 
     def count() -> tuple[Revision, Results]:
         with services.database.read() as session:
-            return _counted(session, find_study(session, study), phase)
+            return _counted(session, find_study(session, study), origin, series)
 
     with services.database.read() as session:
         found = find_study(session, study)
-        key, revision = (found.id, phase), repository.revision(session, found, phase)
+        key = Pool(found.id, origin, version_of_series(session, found, series).series)
+        revision = repository.revision(session, found, key)
     counted = services.results.get(key, revision, count)
     headers = {"etag": counted.etag, "cache-control": "private, no-cache"}
     if if_none_match == counted.etag:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, and_, func, select
 from sqlalchemy.orm import Session
 
-from server.models import AssignedTrial, Rating, Study, StudyRun, VersionClip
+from server.models import AssignedTrial, Rating, Study, StudyRun, StudyVersion, VersionClip
 from server.results.cache import Revision
 
 
@@ -18,12 +18,29 @@ class ClipCount(NamedTuple):
     times: int
 
 
-def usable(study_id: int, phase: str) -> ColumnElement[bool]:
-    """Main trials that count: answered, shown as declared, of a run that is neither preview nor excluded."""
+class Pool(NamedTuple):
+    """Whose answers are shown together: one study, one origin, one data series."""
+
+    study_id: int
+    origin: str
+    series: int
+
+    def runs(self) -> ColumnElement[bool]:
+        """True for the runs of this pool."""
+        versions = select(StudyVersion.id).where(
+            StudyVersion.study_id == self.study_id, StudyVersion.series == self.series
+        )
+        return and_(
+            StudyRun.study_id == self.study_id,
+            StudyRun.origin == self.origin,
+            StudyRun.version_id.in_(versions),
+        )
+
+
+def usable(of: Pool) -> ColumnElement[bool]:
+    """Main trials that count: answered, shown as declared, of a run that is not excluded."""
     return and_(
-        StudyRun.study_id == study_id,
-        StudyRun.phase == phase,
-        StudyRun.preview.is_(False),
+        of.runs(),
         StudyRun.excluded.is_(False),
         AssignedTrial.kind == "main",
         Rating.response.is_not(None),
@@ -31,8 +48,8 @@ def usable(study_id: int, phase: str) -> ColumnElement[bool]:
     )
 
 
-def revision(session: Session, study: Study, phase: str) -> Revision:
-    """What the results of a phase depend on, asked of the runs and the newest rating alone."""
+def revision(session: Session, study: Study, of: Pool) -> Revision:
+    """What the results of a pool depend on, asked of the runs and the newest rating alone."""
     query = select(
         func.count(),
         func.sum(StudyRun.trials_answered),
@@ -40,7 +57,7 @@ def revision(session: Session, study: Study, phase: str) -> Revision:
         func.max(StudyRun.excluded_at),
         func.count(StudyRun.erased_at),
         func.max(StudyRun.erased_at),
-    ).where(StudyRun.study_id == study.id, StudyRun.phase == phase, StudyRun.preview.is_(False))
+    ).where(of.runs())
     runs, answered, *decisions = session.execute(query).one()
     newest = session.execute(select(Rating.id, Rating.rating_id).order_by(Rating.id.desc()).limit(1)).first()
     # A number is given out again where the newest rating was erased (SQLite), hence the rating's own id.
@@ -63,14 +80,12 @@ def _joined(query: Any) -> Any:
     )
 
 
-def cell_means(
-    session: Session, study_id: int, phase: str, factors: list[str]
-) -> dict[str, dict[tuple[str, ...], float]]:
+def cell_means(session: Session, of: Pool, factors: list[str]) -> dict[str, dict[tuple[str, ...], float]]:
     """Participant (run number as text) -> levels in factor order -> mean rating."""
     query = _joined(
         select(Rating.study_run_id, VersionClip.cell, func.avg(Rating.response), func.min(VersionClip.id))
     ).join(VersionClip, VersionClip.id == AssignedTrial.version_clip_id)
-    query = query.where(usable(study_id, phase)).group_by(Rating.study_run_id, VersionClip.cell)
+    query = query.where(usable(of)).group_by(Rating.study_run_id, VersionClip.cell)
     rows = session.execute(query).all()
     levels = _levels(session, {row[3] for row in rows}, factors)
     means: dict[str, dict[tuple[str, ...], float]] = defaultdict(dict)
@@ -84,26 +99,27 @@ def _levels(session: Session, clips: set[int], factors: list[str]) -> dict[int, 
     return {number: tuple(levels[name] for name in factors) for number, levels in session.execute(query)}
 
 
-def clip_counts(session: Session, study_id: int, phase: str) -> list[ClipCount]:
+def clip_counts(session: Session, of: Pool) -> list[ClipCount]:
     """How often each clip got each answer."""
     query = _joined(select(AssignedTrial.version_clip_id, Rating.response, func.count()))
-    query = query.where(usable(study_id, phase)).group_by(AssignedTrial.version_clip_id, Rating.response)
+    query = query.where(usable(of)).group_by(AssignedTrial.version_clip_id, Rating.response)
     return [ClipCount(*row) for row in session.execute(query)]
 
 
-def response_times(session: Session, study_id: int, phase: str) -> list[tuple[int, float]]:
+def response_times(session: Session, of: Pool) -> list[tuple[int, float]]:
     """(bin of 250 ms, count) of the response times from the clip's end."""
     place = func.floor(Rating.rt / 250)
-    query = _joined(select(place, func.count())).where(usable(study_id, phase), Rating.rt.is_not(None))
+    query = _joined(select(place, func.count())).where(usable(of), Rating.rt.is_not(None))
     return [(int(start), count) for start, count in session.execute(query.group_by(place).order_by(place))]
 
 
-def playback(session: Session, study_id: int, phase: str) -> dict[str, list[tuple[str, int]]]:
+def playback(session: Session, of: Pool) -> dict[str, list[tuple[str, int]]]:
     """Counts of plays by verdict, by method and by the rule behind a verdict; failed plays included."""
-    run = and_(StudyRun.study_id == study_id, StudyRun.phase == phase, StudyRun.preview.is_(False))
     columns = (Rating.verdict, Rating.method, Rating.verdict_rule)
     query = (
-        _joined(select(*columns, func.count())).where(run, AssignedTrial.kind == "main").group_by(*columns)
+        _joined(select(*columns, func.count()))
+        .where(of.runs(), AssignedTrial.kind == "main")
+        .group_by(*columns)
     )
     counts: dict[str, Counter[str]] = {name: Counter() for name in ("verdict", "method", "rule")}
     for *words, number in session.execute(query):
@@ -112,9 +128,9 @@ def playback(session: Session, study_id: int, phase: str) -> dict[str, list[tupl
     return {name: sorted((+found).items()) for name, found in counts.items()}
 
 
-def onset_delays(session: Session, study_id: int, phase: str) -> list[float]:
+def onset_delays(session: Session, of: Pool) -> list[float]:
     """Every key-to-first-frame time of at most 20,000 latest plays, in ms."""
     query = _joined(select(Rating.key_to_first_frame_ms)).where(
-        usable(study_id, phase), Rating.key_to_first_frame_ms.is_not(None)
+        usable(of), Rating.key_to_first_frame_ms.is_not(None)
     )
     return list(session.scalars(query.order_by(Rating.id.desc()).limit(20_000)))

@@ -64,7 +64,8 @@ class Results(BaseModel):
     """The results of a study so far; nothing here replaces the analysis."""
 
     study: str
-    phase: str
+    origin: str
+    series: int
     counted_at: datetime
     participants: int
     ratings: int

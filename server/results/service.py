@@ -6,25 +6,28 @@ from itertools import combinations
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from experiments.definition import Experiment
 from experiments.trials.clip_rating.declaration import clip_rating_of
 from server.clock import now
 from server.models import Study, StudyVersion, VersionClip
 from server.results import repository, summary
+from server.results.repository import Pool
 from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results, TimeBin
+from server.studies.lookup import definition_of
 
 _DELAY_EDGES = [10.0 * step for step in range(11)]
 
 
-def results(session: Session, study: Study, definition: Experiment, phase: str) -> Results:
-    """Means, distributions, response times and playback of one phase (pilot or live)."""
+def results(session: Session, study: Study, version: StudyVersion, origin: str) -> Results:
+    """Means, distributions, response times and playback of one origin and of the data series of `version`."""
+    definition, of = definition_of(version), Pool(study.id, origin, version.series)
     scale = clip_rating_of(definition).scale
     factors = list(definition.factor_names)
-    means = repository.cell_means(session, study.id, phase, factors)
-    clips = _clips(session, study, phase, scale.minimum, scale.maximum)
+    means = repository.cell_means(session, of, factors)
+    clips = _clips(session, version, of, scale.minimum, scale.maximum)
     return Results(
         study=study.name,
-        phase=phase,
+        origin=origin,
+        series=version.series,
         counted_at=now(),
         participants=len(means),
         ratings=sum(clip.ratings for clip in clips),
@@ -34,10 +37,9 @@ def results(session: Session, study: Study, definition: Experiment, phase: str) 
         cells=_cells(clips),
         clips=clips,
         response_times=[
-            TimeBin(start_ms=250 * place, answers=n)
-            for place, n in repository.response_times(session, study.id, phase)
+            TimeBin(start_ms=250 * place, answers=n) for place, n in repository.response_times(session, of)
         ],
-        playback=_playback(session, study, phase),
+        playback=_playback(session, of),
     )
 
 
@@ -55,13 +57,12 @@ def margins(means: summary.CellMeans, factors: list[str]) -> list[Margin]:
     ]
 
 
-def _clips(session: Session, study: Study, phase: str, lowest: int, highest: int) -> list[ClipResult]:
+def _clips(session: Session, version: StudyVersion, of: Pool, lowest: int, highest: int) -> list[ClipResult]:
     counts: dict[int, list[int]] = defaultdict(lambda: [0] * (highest - lowest + 1))
-    for clip, response, number in repository.clip_counts(session, study.id, phase):
+    for clip, response, number in repository.clip_counts(session, of):
         if lowest <= response <= highest:
             counts[clip][response - lowest] += number
-    query = select(VersionClip).join(StudyVersion, StudyVersion.id == VersionClip.version_id)
-    query = query.where(StudyVersion.study_id == study.id, StudyVersion.number == study.active_version)
+    query = select(VersionClip).where(VersionClip.version_id == version.id)
     shown = {row.id: row for row in session.scalars(query)}
     older = set(counts) - set(shown)
     for row in session.scalars(select(VersionClip).where(VersionClip.id.in_(older))):
@@ -105,9 +106,9 @@ def _weighted(clips: list[ClipResult]) -> float | None:
     return sum(clip.ratings * clip.mean for clip in clips if clip.mean is not None) / total if total else None
 
 
-def _playback(session: Session, study: Study, phase: str) -> Playback:
-    counts = repository.playback(session, study.id, phase)
-    delays = repository.onset_delays(session, study.id, phase)
+def _playback(session: Session, of: Pool) -> Playback:
+    counts = repository.playback(session, of)
+    delays = repository.onset_delays(session, of)
     return Playback(
         verdicts=dict(counts["verdict"]),
         methods=dict(counts["method"]),

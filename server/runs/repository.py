@@ -23,7 +23,7 @@ from server.runs.schemas import Show
 def find_run(session: Session, study: Study, public_id: str) -> StudyRun:
     """The run of a study by its public identifier; previews are not runs of people."""
     query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.public_id == public_id)
-    run = session.scalar(query.where(StudyRun.preview.is_(False)))
+    run = session.scalar(query.where(StudyRun.origin != "preview"))
     if run is None:
         raise NotFound(f"There is no run '{public_id[:40]}' in the study '{study.name}'.")
     return run
@@ -34,13 +34,14 @@ _SHOWN: dict[Show, tuple[ColumnElement[bool], ...]] = {
     "complete": (StudyRun.status == "complete",),
     "not_complete": (StudyRun.status != "complete",),
     "excluded": (StudyRun.excluded.is_(True),),
-    "synthetic": (StudyRun.synthetic.is_(True),),
+    "pilot": (StudyRun.origin == "pilot",),
+    "simulated": (StudyRun.origin == "simulated",),
 }
 
 
 def _chosen(study: Study, show: Show, search: str) -> Select[StudyRun]:
     """The runs of a study but previews that are to be shown."""
-    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False), *_SHOWN[show])
+    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.origin != "preview", *_SHOWN[show])
     if not search:
         return query
     fits = StudyRun.participant.icontains(search, autoescape=True)

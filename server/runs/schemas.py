@@ -22,7 +22,7 @@ class Erase(BaseModel):
     confirm: Annotated[str, StringConstraints(max_length=40)]
 
 
-Show = Literal["everybody", "complete", "not_complete", "excluded", "synthetic"]
+Show = Literal["everybody", "complete", "not_complete", "excluded", "pilot", "simulated"]
 
 
 class RunSummary(BaseModel):
@@ -31,7 +31,7 @@ class RunSummary(BaseModel):
     run: str
     participant: str
     phase: str
-    synthetic: bool
+    origin: str
     status: str
     stage: str
     language: str

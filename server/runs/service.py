@@ -44,7 +44,7 @@ def summary(run: StudyRun, answered: int, not_good: int) -> RunSummary:
         run=run.public_id,
         participant=run.participant,
         phase=run.phase,
-        synthetic=run.synthetic,
+        origin=run.origin,
         status=run.status,
         stage=run.stage,
         language=run.language,

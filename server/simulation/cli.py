@@ -1,4 +1,4 @@
-"""`server simulate`: simulated participants through the real API, marked synthetic in the data."""
+"""`server simulate`: simulated participants through the real API; their runs have the origin `simulated`."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -30,7 +30,7 @@ def register(parent: typer.Typer) -> None:
 
 
 def simulate(
-    study: Annotated[str, typer.Argument(help="Name of a pilot or live study.")],
+    study: Annotated[str, typer.Argument(help="Name of a study, a draft or a closed one too.")],
     participants: Annotated[int, typer.Option(min=1, max=100_000, help="How many.")] = 3,
     seed: Annotated[int, typer.Option(help="Seed of the people and of the effects in their answers.")] = 1,
     at_once: Annotated[int, typer.Option(min=1, max=200, help="How many take part at the same time.")] = 2,
@@ -38,7 +38,9 @@ def simulate(
         str, typer.Option(help="Address of a running server; one is started where not given.")
     ] = "",
 ) -> None:
-    """Let simulated participants take part through the HTTP API; their runs are marked synthetic.
+    """Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.
+
+    No count, quota, result or report of people's answers holds them: a study is rehearsed as a draft.
 
     Each goes through consent, forms, calibration and every trial. Answers follow a rater model with effects
     drawn by the seed, so that an analysis has something to find; they say nothing about people.
@@ -66,13 +68,9 @@ def simulate(
 
 
 def _prepare(services: Services, name: str) -> tuple[str, dict[str, dict[str, str]]]:
-    """A link whose runs are synthetic, and the levels of each clip."""
+    """A link whose runs are simulated, and the levels of each clip."""
     with services.database.write() as session:
         study = find_study(session, name)
-        if study.status not in ("pilot", "live"):
-            raise InputError(
-                f"study '{name}' is {study.status}; open it by `server study status {name} pilot`"
-            )
         query = select(VersionClip.clip_sha256, VersionClip.levels)
         version = active_version(session, study)
         rows = session.execute(query.where(VersionClip.version_id == version.id))

@@ -148,7 +148,7 @@ def list_studies() -> None:
 def _run_counts(session: Session) -> dict[tuple[int, str], int]:
     query = (
         select(StudyRun.study_id, StudyRun.status, func.count())
-        .where(StudyRun.preview.is_(False))
+        .where(StudyRun.origin != "preview")
         .group_by(StudyRun.study_id, StudyRun.status)
     )
     return {(study_id, status): number for study_id, status, number in session.execute(query)}

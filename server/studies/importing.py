@@ -9,11 +9,13 @@ from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.manifest import Manifest, check_files
 from experiments.schema.canonical import definition_sha256
+from experiments.schema.upgrades import FORMAT
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clips.store import ClipStore
 from server.errors import Conflict
 from server.models import Clip, Study, StudyVersion, VersionClip
+from server.studies.series import series_for
 
 
 def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
@@ -79,6 +81,8 @@ def add_version(
         definition_sha256=definition_sha256(experiment),
         manifest=manifest.model_dump(mode="json"),
         inter_ocular_px=manifest.inter_ocular_px,
+        format=FORMAT,
+        series=series_for(study, experiment, manifest),
         note=note,
         created_by=who.account_id if who else None,
     )

@@ -32,19 +32,20 @@ def active_version(session: Session, study: Study) -> StudyVersion:
 
 def active_definition(session: Session, study: Study) -> Experiment:
     """The declaration new runs of a study use."""
-    return _definition(active_version(session, study))
+    return definition_of(active_version(session, study))
 
 
 def all_definitions(session: Session, study: Study) -> list[Experiment]:
     """The declarations of all versions of a study, oldest first."""
     query = select(StudyVersion).where(StudyVersion.study_id == study.id).order_by(StudyVersion.number)
-    return [_definition(version) for version in session.scalars(query)]
+    return [definition_of(version) for version in session.scalars(query)]
 
 
-def _definition(version: StudyVersion) -> Experiment:
+def definition_of(version: StudyVersion) -> Experiment:
+    """What a version declares."""
     # A definition with this hash never changes, so it is parsed once.
     if version.definition_sha256 not in _parsed:
-        _parsed[version.definition_sha256] = load_stored(version.definition)
+        _parsed[version.definition_sha256] = load_stored(version.definition, version.format)
     return _parsed[version.definition_sha256]
 
 

@@ -183,6 +183,15 @@ class LinkPage(BaseModel):
     next: str | None = Field(description="Ask again with `after` = this; null at the end.")
 
 
+class SeriesOut(BaseModel):
+    """Versions of a study that measure the same; only their answers may be pooled."""
+
+    number: int
+    name: str
+    versions: list[int]
+    runs: dict[str, int] = Field(description="Runs by origin, previews left out.")
+
+
 class VersionOut(BaseModel):
     """A version of a study."""
 
@@ -190,6 +199,7 @@ class VersionOut(BaseModel):
     number: int
     experiment: str
     definition_sha256: str
+    series: int
     note: str
     created_at: datetime
     runs: int = 0
@@ -219,6 +229,7 @@ class StudyDetail(BaseModel):
     toml: str
     definition_sha256: str
     versions: list[VersionOut]
+    series: list[SeriesOut]
     recruiter: dict[str, Any] | None
 
 

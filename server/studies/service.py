@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from sqlalchemy import func, select
+from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 from tomlkit.exceptions import ParseError
 
@@ -41,6 +41,7 @@ from server.studies.schemas import (
     StudySummary,
     VersionOut,
 )
+from server.studies.series import series_of
 from server.studies.uploads import FILMS, upload_folder
 
 ALLOWED = {
@@ -219,7 +220,7 @@ def delete(session: Session, name: str, who: Identity) -> None:
     """Delete a draft that nobody has taken part in."""
     study = find_study(session, name)
     runs = session.scalar(
-        select(func.count()).where(StudyRun.study_id == study.id, StudyRun.preview.is_(False))
+        select(func.count()).where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
     )
     if study.status != "draft" or runs:
         raise Conflict("Only a draft without runs can be deleted; close this study instead.")
@@ -238,9 +239,10 @@ def summaries(session: Session) -> list[StudySummary]:
 
 
 def _counts(session: Session) -> Counter[tuple[int, str]]:
-    query = select(StudyRun.study_id, StudyRun.status, func.count()).where(
-        StudyRun.preview.is_(False), StudyRun.synthetic.is_(False)
-    )
+    # A study that is a pilot shows its pilot's runs, any other those of its participants.
+    shown = case((Study.status == "pilot", "pilot"), else_="participant")
+    query = select(StudyRun.study_id, StudyRun.status, func.count())
+    query = query.join(Study, Study.id == StudyRun.study_id).where(StudyRun.origin == shown)
     rows = session.execute(query.group_by(StudyRun.study_id, StudyRun.status))
     return Counter({(study, status): number for study, status, number in rows})
 
@@ -275,6 +277,7 @@ def detail(session: Session, name: str) -> StudyDetail:
         toml=version.definition_toml,
         definition_sha256=version.definition_sha256,
         versions=[_version_out(row, number) for row, number in _versions(session, study)],
+        series=series_of(session, study),
         recruiter=study.recruiter,
     )
 
@@ -282,7 +285,7 @@ def detail(session: Session, name: str) -> StudyDetail:
 def _versions(session: Session, study: Study) -> list[tuple[StudyVersion, int]]:
     query = (
         select(StudyVersion, func.count(StudyRun.id))
-        .outerjoin(StudyRun, (StudyRun.version_id == StudyVersion.id) & StudyRun.preview.is_(False))
+        .outerjoin(StudyRun, (StudyRun.version_id == StudyVersion.id) & (StudyRun.origin != "preview"))
         .where(StudyVersion.study_id == study.id)
         .group_by(StudyVersion.id)
         .order_by(StudyVersion.number.desc())

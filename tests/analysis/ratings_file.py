@@ -35,6 +35,7 @@ def rows_of(experiment: Experiment, ratings: np.ndarray) -> list[Row]:
         for trial, (cell, exemplar) in enumerate(product(range(len(cells)), range(answers.shape[1]))):
             row: Row = dict.fromkeys([*RATINGS.names, *names], "")
             row |= {"study": "s", "experiment": experiment.name, "phase": "live", "synthetic": 1}
+            row |= {"run_origin": "simulated", "study_version": 1, "data_series": 1}
             row |= {
                 "run": f"run{who}",
                 "participant": f"P{who:02d}",

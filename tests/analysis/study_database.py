@@ -65,7 +65,7 @@ def _study(connection: sqlite3.Connection, experiment: Experiment, exemplars: in
 
 def _run(number: int, participant: str, phase: str, trials: int) -> dict:
     texts = {"public_id": f"run{number:06d}", "client_id": f"c{number}", "token_hash": f"t{number}"}
-    state = {"phase": phase, "synthetic": 1, "preview": 0, "status": "complete", "stage": "done"}
+    state = {"phase": phase, "origin": "simulated", "status": "complete", "stage": "done"}
     numbers = {
         "study_id": 1,
         "version_id": 1,

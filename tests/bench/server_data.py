@@ -50,7 +50,7 @@ def _run(number: int, trials: int) -> dict[str, Any]:
         "token_hash": f"{number:064d}",
         "participant": f"p{number}",
         "phase": "live",
-        "synthetic": True,
+        "origin": "simulated",
         "status": "complete",
         "stage": "done",
         "language": "en",

@@ -12,6 +12,7 @@ from experiments.load import parse_experiment
 from experiments.trials.clip_rating.columns import RATINGS
 from server.context import Services
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
+from server.results.repository import Pool, clip_counts
 from server.settings import Settings
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
@@ -50,7 +51,7 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     assert {row["synthetic"] for row in rows} == {"1"}
     assert {row["run_status"] for row in rows} == {"complete"}
     with services.database.read() as session:
-        assert [run.synthetic for run in session.query(StudyRun)] == [True, True]
+        assert [run.origin for run in session.query(StudyRun)] == ["simulated"] * 2
 
 
 def test_adding_again_changes_nothing_and_a_change_makes_a_version(
@@ -143,7 +144,6 @@ def test_what_cannot_be_taken_in_is_refused_in_one_line(
         (("study", "status", "short", "lvie"), "did you mean 'live'?"),
         (("link", "create", "short", "--kind", "persnal"), "did you mean 'personal'?"),
         (("link", "create", "short", "--count", "3"), "--kind personal"),
-        (("simulate", "short"), "is draft"),
         (("run", "--host", "192.0.2.1"), "cannot listen on 192.0.2.1:8000"),
     ],
 )
@@ -202,3 +202,19 @@ def test_every_form_of_the_data_page_is_there_on_the_command_line(
     unknown = run_server_command(settings, "export", "short", "--format", "jsn", "--out", str(out))
     assert unknown.returncode == 2
     assert "jsn" in unknown.stderr  # and the forms there are, in lines as wide as the terminal
+
+
+def test_a_draft_is_rehearsed_and_no_count_of_people_knows(
+    settings: Settings, study, services: Services
+) -> None:
+    study.change(status="draft", quota=1)
+    assert run_server_command(settings, "simulate", "short", "--participants", "2").returncode == 0
+    with services.database.read() as session:
+        assert [run.origin for run in session.query(StudyRun)] == ["simulated"] * 2
+        assert session.query(Study).one().status == "draft"
+        pools = (
+            Pool(study_id=1, origin=origin, series=1) for origin in ("participant", "pilot", "simulated")
+        )
+        counts = [sum(count.times for count in clip_counts(session, pool)) for pool in pools]
+    assert counts[:2] == [0, 0]
+    assert counts[2] >= 15

@@ -23,6 +23,7 @@ RATINGS = View(
         *base.SCREEN,
         *base.EXCLUSION,
         *base.SAVED,
+        *base.ORIGIN,
     ),
     rows="""FROM trial_ratings t
 JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
@@ -30,6 +31,6 @@ JOIN study_runs r ON r.id = t.study_run_id
 JOIN study_versions v ON v.id = r.version_id
 JOIN studies s ON s.id = r.study_id
 LEFT JOIN version_clips c ON c.id = a.version_clip_id
-WHERE NOT r.preview AND r.erased_at IS NULL
+WHERE r.origin <> 'preview' AND r.erased_at IS NULL
 """,
 )

@@ -1010,8 +1010,9 @@ export interface paths {
          * Get Results
          * @description Means with within-participant error bars, distributions, response times and playback so far.
          *
-         *     With the ETag of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting
-         *     takes long `counted_at` may lie some time back.
+         *     They are of one origin and one data series, that of the active version where none is given. With the ETag
+         *     of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting takes long
+         *     `counted_at` may lie some time back.
          */
         get: operations["get_results"];
         put?: never;
@@ -2588,6 +2589,18 @@ export interface components {
              * Format: date-time
              */
             server_time: string;
+            /**
+             * Origin
+             * @description Whose runs the counts, funnel and expected finish are of.
+             */
+            origin: string;
+            /**
+             * Others
+             * @description Runs of other origins, which are listed and not counted.
+             */
+            others: {
+                [key: string]: number;
+            };
             /** Complete */
             complete: number;
             /** Active */
@@ -2621,8 +2634,8 @@ export interface components {
             participant: string;
             /** Phase */
             phase: string;
-            /** Synthetic */
-            synthetic: boolean;
+            /** Origin */
+            origin: string;
             /** Status */
             status: string;
             /** Stage */
@@ -2777,11 +2790,16 @@ export interface components {
          */
         NewReport: {
             /**
-             * Phase
-             * @default live
+             * Origin
+             * @default participant
              * @enum {string}
              */
-            phase?: "pilot" | "live";
+            origin?: "participant" | "pilot" | "simulated";
+            /**
+             * Series
+             * @description Data series; that of the active version where none is given.
+             */
+            series?: number | null;
             /**
              * Sensitivity
              * @default true
@@ -3354,8 +3372,10 @@ export interface components {
             progress: number;
             /** Message */
             message: string;
-            /** Phase */
-            phase: string;
+            /** Origin */
+            origin: string;
+            /** Series */
+            series: number | null;
             /**
              * Created At
              * Format: date-time
@@ -3373,8 +3393,10 @@ export interface components {
         Results: {
             /** Study */
             study: string;
-            /** Phase */
-            phase: string;
+            /** Origin */
+            origin: string;
+            /** Series */
+            series: number;
             /**
              * Counted At
              * Format: date-time
@@ -3469,10 +3491,12 @@ export interface components {
              * @enum {string}
              */
             stage: "consent" | "forms_before" | "calibration" | "instructions" | "practice" | "trials" | "forms_after" | "debrief" | "done";
-            /** Preview */
-            preview: boolean;
-            /** Synthetic */
-            synthetic: boolean;
+            /**
+             * Origin
+             * @description Where the run's answers come from; given at its start.
+             * @enum {string}
+             */
+            origin: "participant" | "preview" | "pilot" | "simulated";
             /** Language */
             language: string;
             /** Languages */
@@ -3522,8 +3546,8 @@ export interface components {
             participant: string;
             /** Phase */
             phase: string;
-            /** Synthetic */
-            synthetic: boolean;
+            /** Origin */
+            origin: string;
             /** Status */
             status: string;
             /** Stage */
@@ -3696,6 +3720,25 @@ export interface components {
             qr_svg: string;
         };
         /**
+         * SeriesOut
+         * @description Versions of a study that measure the same; only their answers may be pooled.
+         */
+        SeriesOut: {
+            /** Number */
+            number: number;
+            /** Name */
+            name: string;
+            /** Versions */
+            versions: number[];
+            /**
+             * Runs
+             * @description Runs by origin, previews left out.
+             */
+            runs: {
+                [key: string]: number;
+            };
+        };
+        /**
          * Session
          * @description What happens when a participant comes back.
          */
@@ -3845,6 +3888,8 @@ export interface components {
             definition_sha256: string;
             /** Versions */
             versions: components["schemas"]["VersionOut"][];
+            /** Series */
+            series: components["schemas"]["SeriesOut"][];
             /** Recruiter */
             recruiter: {
                 [key: string]: unknown;
@@ -4227,6 +4272,8 @@ export interface components {
             experiment: string;
             /** Definition Sha256 */
             definition_sha256: string;
+            /** Series */
+            series: number;
             /** Note */
             note: string;
             /**
@@ -4357,6 +4404,7 @@ export type ScreenDevice = components['schemas']['ScreenDevice'];
 export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
 export type ScreenOut = components['schemas']['ScreenOut'];
 export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
+export type SeriesOut = components['schemas']['SeriesOut'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
@@ -6752,7 +6800,8 @@ export interface operations {
     get_results: {
         parameters: {
             query?: {
-                phase?: "pilot" | "live";
+                origin?: "participant" | "preview" | "pilot" | "simulated";
+                series?: number | null;
             };
             header?: {
                 "if-none-match"?: string | null;
@@ -6803,7 +6852,7 @@ export interface operations {
     list_runs: {
         parameters: {
             query?: {
-                show?: "everybody" | "complete" | "not_complete" | "excluded" | "synthetic";
+                show?: "everybody" | "complete" | "not_complete" | "excluded" | "pilot" | "simulated";
                 /** @description Part of participant or run. */
                 search?: string;
                 before?: string | null;

@@ -197,7 +197,7 @@ async function play(session: Session, started: RunStarted, durable: boolean): Pr
 /** Only previews and synthetic runs may answer themselves. */
 function simulation(run: RunState): SimulationMode | null {
   const wanted = new URLSearchParams(location.search).get("simulate");
-  return (run.preview || run.synthetic) && (wanted === "visual" || wanted === "data-only") ? wanted : null;
+  return (run.origin === "preview" || run.origin === "simulated") && (wanted === "visual" || wanted === "data-only") ? wanted : null;
 }
 
 function showProblem(root: HTMLElement, t: Translate, error: unknown): void {

@@ -5,6 +5,7 @@ import pytest
 
 from analysis.errors import NoRatingsError
 from analysis.plans.study import analyse_study
+from analysis.read.pool import Origin, Pool
 from analysis.read.study_ratings import load_csv, load_database
 from analysis.report.json_output import as_data
 from analysis.report.left_out import left_out
@@ -22,8 +23,8 @@ def rows() -> list[dict]:
     return rows_of(EXP3, simulate(EXP3, 8, trials=5))
 
 
-def analyse(path, rows, experiment=EXP3, phase="live"):
-    return analyse_study(experiment, load_csv(write_export(path / "r.csv", EXP3, rows), experiment), phase)
+def analyse(path, rows, experiment=EXP3, pool=Pool()):
+    return analyse_study(experiment, load_csv(write_export(path / "r.csv", EXP3, rows), experiment), pool)
 
 
 def with_rules(*chosen):
@@ -107,13 +108,13 @@ def test_a_trial_rule_drops_trials_and_counts_them(tmp_path, rows, rule, values)
 def test_practice_pilot_and_unrated_rows_are_set_aside_and_said(tmp_path, rows) -> None:
     extra = [
         rows[0] | {"kind": "practice", "trial_index": 90},
-        rows[1] | {"phase": "pilot", "trial_index": 91},
+        rows[1] | {"run_origin": "pilot", "trial_index": 91},
     ]
     extra += [rows[2] | {"response": "", "trial_index": 92}]
-    analysis = analyse(tmp_path, rows + extra)
+    analysis = analyse(tmp_path, rows + extra, pool=Pool(Origin.SIMULATED))
+    assert "origin simulated: 1 rows of other origins left aside" in analysis.decisions
     assert set(analysis.exclusions.set_aside) == {
         "1 practice trials",
-        "1 rows of another phase than 'live'",
         "1 plays without a rating",
     }
 
@@ -168,8 +169,8 @@ def test_other_studies_and_experiments_are_told_apart(tmp_path, rows) -> None:
 def test_nothing_to_analyse_is_told_from_bad_input(tmp_path, rows) -> None:
     with pytest.raises(NoRatingsError, match="no ratings yet"):
         load_csv(write_export(tmp_path / "e.csv", EXP3, []), EXP3)
-    with pytest.raises(NoRatingsError, match="no ratings of phase 'live'"):
-        analyse(tmp_path, change(rows, lambda row: True, phase="pilot"))
+    with pytest.raises(NoRatingsError, match="no ratings of origin 'participant'"):
+        analyse(tmp_path, rows, pool=Pool(Origin.PARTICIPANT))
     with pytest.raises(NoRatingsError, match="no participant remains"):
         analyse(tmp_path, change(rows, lambda row: True, run_status="withdrawn"))
     with pytest.raises(NoRatingsError, match="there is no database"):

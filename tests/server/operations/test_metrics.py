@@ -35,7 +35,13 @@ def test_answers_and_runs_are_counted_by_route_without_any_token(
     participant.agree()
     after = scrape(client)
     assert after[key] == before + 1
-    assert after["palpebra_runs", (("phase", "live"), ("status", "active"), ("study", "short"))] == 1
+    assert (
+        after[
+            "palpebra_runs",
+            (("origin", "participant"), ("phase", "live"), ("status", "active"), ("study", "short")),
+        ]
+        == 1
+    )
     text = client.get("/metrics", headers={"authorization": f"Bearer {TOKEN}"}).text
     assert participant.token not in text
     assert participant.link not in text

@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
+from sqlalchemy.exc import DBAPIError
 
 from server.app import create_app
 from server.context import Services, open_services
 from server.export.formats import FORMATS
-from server.migrate import current_revision, newest_revision, upgrade
+from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.settings import Settings
 from server.studies.lookup import find_study
 from tests.helpers.databases import BACKENDS
@@ -96,3 +97,42 @@ def test_a_page_left_open_over_the_upgrade_loses_nothing(migrated: Services) -> 
             assert send(client, item, body).status_code in (200, 201)
     with migrated.database.read() as session:
         assert session.scalar(count) == 2 + 2 + 1
+
+
+@both
+def test_old_runs_get_their_origin_and_old_versions_their_series(migrated: Services) -> None:
+    with migrated.database.read() as session:
+        query = text("SELECT id, origin FROM study_runs WHERE study_id = 1 ORDER BY id")
+        origins = dict(tuple(row) for row in session.execute(query))
+        versions = text("SELECT number, series FROM study_versions WHERE study_id = 1 ORDER BY number")
+        assert [tuple(row) for row in session.execute(versions)] == [(1, 1), (2, 1), (3, 2)]
+    people = {3, 4, 8, 9, 10, 12, 13}
+    assert origins == dict.fromkeys(people, "participant") | {
+        1: "pilot",
+        2: "simulated",
+        5: "simulated",
+        6: "simulated",
+        7: "preview",
+        11: "simulated",
+    }
+
+
+@both
+def test_the_origin_of_a_run_cannot_be_changed(migrated: Services) -> None:
+    change = text("UPDATE study_runs SET origin = 'participant' WHERE id = 5")
+    refused = pytest.raises(DBAPIError, match="the origin of a run does not change")
+    with refused, migrated.database.write() as session:
+        session.execute(change)
+    with migrated.database.write() as session:
+        session.execute(text("UPDATE study_runs SET origin = 'simulated', slot = 3 WHERE id = 5"))
+
+
+@both
+def test_down_to_the_older_revision_and_up_again_keeps_every_row(migrated: Services) -> None:
+    before = exported(migrated, "short")
+    downgrade(migrated.database, "0001")
+    with migrated.database.read() as session:
+        query = text("SELECT count(*) FROM study_runs WHERE synthetic OR preview")
+        assert session.scalar(query) == 5
+    upgrade(migrated.database)
+    assert exported(migrated, "short") == before

@@ -26,7 +26,7 @@ def error_code(answer: Any) -> tuple[int, str]:
 
 def test_the_page_gets_everything_but_the_cells(participant: Participant) -> None:
     state = participant.agree().state()
-    assert (state["status"], state["stage"], state["preview"]) == ("active", "forms_before", False)
+    assert (state["status"], state["stage"], state["origin"]) == ("active", "forms_before", "participant")
     assert state["texts"]["consent"] == "Do you agree?"
     assert state["blocks"] == [
         {"block": 0, "trials": 2},

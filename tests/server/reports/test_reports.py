@@ -26,7 +26,7 @@ def test_a_report_is_built_by_a_process_of_its_own(
             person.rate(trial, expected[0] if expected else 1 + (trial["trial_index"] * 7 + number * 3) % 7)
         person.answer_forms()
         person.request("POST", "/complete")
-    body = {"phase": "live", "sensitivity": False}
+    body = {"origin": "participant", "sensitivity": False}
     assert experimenter.send("POST", "/studies/short/reports", body).status_code == 202
     report = finished(experimenter)
     assert report["status"] == "done", report["message"]

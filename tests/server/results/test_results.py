@@ -1,13 +1,14 @@
 import math
 
 import pytest
+from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from server.results.summary import histogram, margin
 from tests.helpers.admins import Admin
-from tests.helpers.studies import Participant, StudyInDatabase
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 
 
 def test_margins_and_distributions_of_a_complete_run(viewer: Admin, participant: Participant) -> None:
@@ -30,6 +31,33 @@ def test_excluded_runs_do_not_count(experimenter: Admin, participant: Participan
     participant.agree().rate_all()
     experimenter.send("PUT", f"/studies/short/runs/{participant.run_id}/exclusion", {"reason": "test"})
     assert experimenter.get("/studies/short/results").json()["participants"] == 0
+
+
+def test_answers_before_and_after_another_scale_are_apart(
+    experimenter: Admin, client: TestClient, participant: Participant, study: StudyInDatabase
+) -> None:
+    participant.agree().rate_all()
+    changed = SHORT.replace("[trial.scale]\n", "[trial.scale]\nmaximum = 5\n")
+    for toml in (SHORT.replace("Thanks.", "Thank you."), changed):
+        revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+        body = {"revision": revision, "toml": toml, "note": ""}
+        assert experimenter.send("POST", "/studies/short/versions", body).status_code == 201
+    Participant(client, study.link_token).agree().rate_all()
+    series = experimenter.get("/studies/short").json()["series"]
+    assert [(one["number"], one["versions"], one["runs"]) for one in series] == [
+        (1, [1, 2], {"participant": 1}),
+        (2, [3], {"participant": 1}),
+    ]
+    latest = experimenter.get("/studies/short/results").json()
+    first = experimenter.get("/studies/short/results?series=1").json()
+    assert [
+        (shown["series"], shown["scale_maximum"], shown["participants"]) for shown in (latest, first)
+    ] == [
+        (2, 5, 1),
+        (1, 7, 1),
+    ]
+    assert experimenter.get("/studies/short/results?origin=pilot").json()["participants"] == 0
+    assert experimenter.get("/studies/short/results?series=3").status_code == 404
 
 
 def test_an_empty_study_has_empty_results(viewer: Admin, study: StudyInDatabase) -> None:

@@ -61,7 +61,7 @@ const Row = memo(function Row({ study, run, seen }: { study: string; run: Run; s
         <a href={`/admin/studies/${study}/participants/${run.run}`} data-run={run.run}>
           {run.participant}
         </a>
-        {run.synthetic && <span className="mark"> synthetic</span>}
+        {run.origin !== "participant" && <span className="mark"> {run.origin}</span>}
       </td>
       <td>
         <span className={`mark presence-${run.presence}`}>{run.presence === "finished" ? words(run.status) : run.presence}</span>

@@ -18,7 +18,8 @@ const SHOW: { value: Show; label: string }[] = [
   { value: "complete", label: "complete" },
   { value: "not_complete", label: "not complete" },
   { value: "excluded", label: "excluded" },
-  { value: "synthetic", label: "synthetic" },
+  { value: "pilot", label: "pilot" },
+  { value: "simulated", label: "simulated" },
 ];
 /** So long after the last key the server is asked. */
 const TYPING_MS = 250;
@@ -94,9 +95,9 @@ function Who({ study, run }: { study: string; run: Run }) {
           excluded
         </Badge>
       )}
-      {run.synthetic && (
+      {run.origin !== "participant" && (
         <Badge variant="default" size="sm">
-          synthetic
+          {run.origin}
         </Badge>
       )}
     </Group>

@@ -6,8 +6,9 @@ import { useMay } from "../queries";
 import { Answer } from "../ui/Answer";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
+import type { DataOrigin } from "./origins";
 
-export function Reports({ study, phase }: { study: string; phase: "pilot" | "live" }) {
+export function Reports({ study, origin, series }: { study: string; origin: DataOrigin; series: number | null }) {
   const path = { params: { path: { study } } };
   const [sensitivity, setSensitivity] = useState(true);
   const mayBuild = useMay("experimenter");
@@ -16,9 +17,10 @@ export function Reports({ study, phase }: { study: string; phase: "pilot" | "liv
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/reports", path)),
     refetchInterval: (query) => (query.state.data?.some(isUnderWay) ? 1_000 : false),
   });
-  const build = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/reports", { ...path, body: { phase, sensitivity } })), {
-    touches: [["reports", study]],
-  });
+  const build = useChange(
+    () => unwrap(api.POST("/api/admin/studies/{study}/reports", { ...path, body: { origin, series, sensitivity } })),
+    { touches: [["reports", study]] },
+  );
   return (
     <Card withBorder>
       <Group justify="space-between" mb="sm" gap="sm">
@@ -65,7 +67,8 @@ function Report({ study, report }: { study: string; report: Schemas["ReportOut"]
     <Group gap="sm">
       <Badge color={report.status === "failed" ? "red.9" : report.status === "done" ? "teal.9" : "gray.7"}>{report.status}</Badge>
       <Text size="sm">
-        {when(report.created_at)}, {report.phase}
+        {when(report.created_at)}, {report.origin}
+        {report.series != null && `, series ${report.series}`}
       </Text>
       {isUnderWay(report) && <Progress w={160} value={100 * report.progress} animated aria-label={report.message} />}
       {report.status === "failed" && <Text size="sm">{report.message}</Text>}

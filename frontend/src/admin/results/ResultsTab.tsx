@@ -1,4 +1,4 @@
-import { Alert, Card, Group, SegmentedControl, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Alert, Card, Group, SegmentedControl, Select, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useMemo, useState } from "react";
@@ -8,44 +8,47 @@ import { Answer } from "../ui/Answer";
 import { when, words } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
+import { type DataOrigin, ORIGINS, originOf } from "./origins";
 import { cellPlot, delayPlot, type Factors, labelsOf, marginPlot, timePlot } from "./plots";
 import { Reports } from "./Reports";
-
-type Phase = "pilot" | "live";
 
 export function ResultsTab() {
   const { study = "" } = useParams({ strict: false });
   const detail = useQuery(studyQuery(study)).data;
-  const [chosen, setPhase] = useState<Phase | null>(null);
-  const phase = chosen ?? (detail?.summary.status === "pilot" ? "pilot" : "live");
+  const [chosen, setOrigin] = useState<DataOrigin | null>(null);
+  const [series, setSeries] = useState<number | null>(null);
+  const origin = chosen ?? (detail?.summary.status === "pilot" ? "pilot" : "participant");
   const results = useQuery({
-    queryKey: ["results", study, phase],
-    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { phase } } })),
+    queryKey: ["results", study, origin, series],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { origin, series } } })),
     refetchInterval: 15_000,
   });
   return (
     <Stack>
       <Group justify="space-between">
-        <SegmentedControl
-          aria-label="Data of"
-          value={phase}
-          onChange={(word) => setPhase(word === "pilot" ? "pilot" : "live")}
-          data={[
-            { value: "live", label: "Live" },
-            { value: "pilot", label: "Pilot" },
-          ]}
-        />
+        <SegmentedControl aria-label="Data of" value={origin} onChange={(word) => setOrigin(originOf(word))} data={ORIGINS} />
+        {detail !== undefined && detail.series.length > 1 && (
+          <Select
+            aria-label="Data series"
+            w={280}
+            clearable
+            placeholder="series of the active version"
+            value={series === null ? null : String(series)}
+            onChange={(word) => setSeries(word === null ? null : Number(word))}
+            data={detail.series.map((one) => ({ value: String(one.number), label: one.name }))}
+          />
+        )}
       </Group>
       <Answer of={results}>
         {(data) =>
           data.ratings === 0 ? (
-            <Text c="dimmed">No ratings yet{phase === "live" ? " while the study was live" : " while the study was a pilot"}.</Text>
+            <Text c="dimmed">No ratings of origin {origin} in this data series yet.</Text>
           ) : (
             <Shown study={study} data={data} factors={detail?.design.factors ?? []} />
           )
         }
       </Answer>
-      <Reports study={study} phase={phase} />
+      <Reports study={study} origin={origin} series={series} />
     </Stack>
   );
 }
@@ -58,8 +61,8 @@ function Shown({ study, data, factors }: { study: string; data: Schemas["Results
   return (
     <Stack>
       <Alert>
-        {data.participants} participants, {data.ratings.toLocaleString()} ratings, counted {when(data.counted_at)}. These are means as data
-        arrive, for a look at whether all is well; the analysis is the report below.
+        Data series {data.series}, {data.origin}: {data.participants} runs, {data.ratings.toLocaleString()} ratings, counted{" "}
+        {when(data.counted_at)}. These are means as data arrive, for a look at whether all is well; the analysis is the report below.
       </Alert>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {singles.map((margin) => (

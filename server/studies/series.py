@@ -1,0 +1,67 @@
+"""The data series of a study: versions that measure the same, and whose answers may be pooled."""
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from experiments.manifest import Manifest
+from experiments.schema.difference import changes_what_is_measured, difference
+from server.errors import NotFound
+from server.models import Study, StudyRun, StudyVersion
+from server.studies.lookup import active_version, definition_of
+from server.studies.schemas import SeriesOut
+
+
+def series_of(session: Session, study: Study) -> list[SeriesOut]:
+    """Every series of a study, oldest first, with its versions and its runs by origin."""
+    versions: dict[int, list[int]] = {}
+    query = select(StudyVersion.series, StudyVersion.number).where(StudyVersion.study_id == study.id)
+    for series, number in session.execute(query.order_by(StudyVersion.number)):
+        versions.setdefault(series, []).append(number)
+    runs: dict[int, dict[str, int]] = {}
+    counts = (
+        select(StudyVersion.series, StudyRun.origin, func.count(StudyRun.id))
+        .join(StudyRun, StudyRun.version_id == StudyVersion.id)
+        .where(StudyVersion.study_id == study.id, StudyRun.origin != "preview")
+        .group_by(StudyVersion.series, StudyRun.origin)
+    )
+    for series, origin, count in session.execute(counts):
+        runs.setdefault(series, {})[origin] = count
+    return [
+        SeriesOut(number=series, versions=numbers, name=name_of(series, numbers), runs=runs.get(series, {}))
+        for series, numbers in sorted(versions.items())
+    ]
+
+
+def name_of(series: int, versions: list[int]) -> str:
+    """A series in words: `series 2 (versions 3, 4)`."""
+    word = "version" if len(versions) == 1 else "versions"
+    return f"series {series} ({word} {', '.join(map(str, versions))})"
+
+
+def version_of_series(session: Session, study: Study, series: int | None) -> StudyVersion:
+    """The newest version of a series, whose scale and factors are those of all its answers.
+
+    Where no series is given it is that of the active version.
+    """
+    if series is None:
+        return active_version(session, study)
+    query = select(StudyVersion).where(StudyVersion.study_id == study.id, StudyVersion.series == series)
+    version = session.scalar(query.order_by(StudyVersion.number.desc()).limit(1))
+    if version is None:
+        raise NotFound(f"Study '{study.name}' has no data series {series}.")
+    return version
+
+
+def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
+    """The series of a further version: that of the latest version which measures the same by the same clips.
+
+    Where there is none, a new series begins.
+    """
+    clips = {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
+    for version in reversed(study.versions):
+        known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips}
+        changes = difference(definition_of(version), experiment)
+        if known == clips and not changes_what_is_measured(changes):
+            return version.series
+    return max((version.series for version in study.versions), default=0) + 1
