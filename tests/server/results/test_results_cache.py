@@ -36,7 +36,7 @@ def test_a_page_that_asks_again_costs_no_count(
     again = viewer.get(RESULTS, headers={"if-none-match": first.headers["etag"]})
     assert (again.status_code, again.content) == (304, b"")
     assert viewer.get(RESULTS).json() == first.json()
-    assert counts == ["live"]
+    assert counts == ["participant"]
 
 
 def test_every_change_is_counted(experimenter: Admin, participant: Participant, counts: list[str]) -> None:
