@@ -1,12 +1,21 @@
 /** The message catalogue: every sentence the page itself says. Study texts come from the declaration. */
-import { de } from "./de";
-import { en, type Messages } from "./en";
+import { messages as en, type Messages } from "./languages/en";
 
 export type MessageKey = keyof Messages;
 export type Translate = (key: MessageKey, values?: Record<string, string | number>) => string;
 
-const catalogues: Record<string, Messages> = { en, de };
+/** A file a language, named by its tag: nothing else needs to know of it. */
+const files = import.meta.glob<Messages>("./languages/*.ts", { eager: true, import: "messages" });
+const catalogues: Record<string, Messages> = Object.fromEntries(Object.entries(files).map(([path, messages]) => [tagIn(path), messages]));
+
+/** Languages that the page speaks itself. English first: it stands in for all others. */
+export const SHIPPED = ["en", ...Object.keys(catalogues).filter((tag) => tag !== "en")];
+
 const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ku", "ps", "sd", "ug", "ur", "yi"]);
+
+function tagIn(path: string): string {
+  return path.replace(/^.*\/|\.ts$/g, "");
+}
 
 /** Messages in `language`, in English where no catalogue of that language is shipped. */
 export function translator(language: string): Translate {

@@ -2,7 +2,7 @@
 import "./style/index.css";
 import type { LinkState, RunStarted, RunState } from "../api/schema";
 import { Refused } from "./request";
-import { preferred, translator, type Translate } from "../i18n";
+import { preferred, SHIPPED, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround } from "./flow/appearance";
 import { ended } from "./flow/ended";
 import { abilities, type Abilities, findings, type GateFinding } from "./flow/gates";
@@ -23,6 +23,7 @@ import { AnswersMissing, showCompletion } from "./screens/finish";
 import { emptied, showNotice } from "./screens/notice";
 import { openStopDialog } from "./screens/stop-dialog";
 import type { Session } from "./session";
+import { loadKind } from "./trials";
 
 /** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
@@ -40,7 +41,7 @@ interface Entry {
 }
 
 export async function main(root: HTMLElement): Promise<void> {
-  let t = translator(preferred(["en", "de"], navigator.languages));
+  let t = translator(preferred(SHIPPED, navigator.languages));
   const fail = (error: unknown): void => showProblem(root, t, error);
   window.addEventListener("unhandledrejection", (event) => fail(event.reason));
   const link_token = location.pathname.split("/").filter(Boolean).at(-1) ?? "";
@@ -111,10 +112,13 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
 async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: RunStarted, found: GateFinding[]): Promise<void> {
   const { root, t, link, keeping, kept } = entry;
   const outbox = outboxOf(root, store, keeping);
+  // Loaded before anything is sent where the kind is known: an answer that ends the run must find its listener.
+  const known = kept && (await loadKind(kept.run.trial.kind));
   const unsent = await flush(outbox, started, kept ? 0 : undefined);
   const run = kept?.run ?? (await persistently(root, t, () => fetchRun(started.run_token)));
   if (!kept) keeping.begin({ link, started, run });
-  const session = openSession(root, link, run, outbox, unsent);
+  const kind = known ?? (await loadKind(run.trial.kind));
+  const session = openSession({ root, link, run, kind, outbox, unsent });
   setLanguage(run.language);
   const over = (): Promise<void> => {
     keeping.forget();

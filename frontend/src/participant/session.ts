@@ -8,6 +8,7 @@ import type { ClipCache } from "./preload/clip-cache";
 import type { RunClock } from "./screen/run-clock";
 import type { ScreenState } from "./screen/screen-state";
 import type { Replays } from "./flow/replays";
+import type { TrialKind } from "./trials/kind";
 
 export type Stage = StageChange["stage"];
 
@@ -24,6 +25,8 @@ export interface Session {
   screen: ScreenState;
   clock: RunClock;
   replays: Replays;
+  /** The screens of the declared kind of trial. */
+  kind: TrialKind;
   /** Aborted when this page must do nothing more: another tab took over, or the participant stopped. */
   over: AbortController;
   api: RunApi;

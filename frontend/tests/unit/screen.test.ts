@@ -6,7 +6,7 @@ import { owed, Replays } from "../../src/participant/flow/replays";
 import { refreshRate } from "../../src/participant/screen/refresh-rate";
 import { clipHeight, clipWidth, screenChange, zoomed, type ScreenShape } from "../../src/participant/screen/size";
 import { distanceFrom } from "../../src/participant/screens/distance";
-import { keyFor, valueOf } from "../../src/participant/trials/clip-rating/scale-keys";
+import { keyFor, valueOf } from "../../src/participant/trials/clip_rating/scale-keys";
 
 const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
   trial_index: 0,

@@ -1,14 +1,21 @@
 import { describe, expect, it } from "vitest";
-import { direction, pick, preferred, translator } from "../../src/i18n";
-import { de } from "../../src/i18n/de";
-import { en } from "../../src/i18n/en";
+import { direction, pick, preferred, SHIPPED, translator } from "../../src/i18n";
+import { messages as en, type Messages } from "../../src/i18n/languages/en";
 import { recruiterQuery } from "../../src/participant/flow/identity";
 import { parseBlocks } from "../../src/ui/markdown";
 
 describe("messages", () => {
   const holes = (text: string): string[] => [...text.matchAll(/\{(\w+)\}/g)].map(([, name]) => name ?? "").sort();
-  it.each(Object.keys(en) as (keyof typeof en)[])("%s has the same holes in both languages", (key) => {
-    expect(holes(de[key])).toEqual(holes(en[key]));
+  const files = import.meta.glob<Messages>("../../src/i18n/languages/*.ts", { eager: true, import: "messages" });
+  const translations = Object.entries(files).filter(([path]) => !path.endsWith("/en.ts"));
+  it.each(translations)("of %s are complete, with the holes of the English ones", (_path, messages) => {
+    expect(Object.keys(messages).sort()).toEqual(Object.keys(en).sort());
+    const wrong = (Object.keys(en) as (keyof Messages)[]).filter((key) => holes(messages[key]).join() !== holes(en[key]).join());
+    expect(wrong).toEqual([]);
+  });
+  it("come from every file in the folder", () => {
+    expect(SHIPPED).toHaveLength(Object.keys(files).length);
+    expect(SHIPPED).toContain("de");
   });
   it("are filled in, and fall back to English", () => {
     expect(translator("de")("step", { step: 1, steps: 4 })).toBe("Schritt 1 von 4");

@@ -10,6 +10,7 @@ import { measureRefreshRate } from "../screen/refresh-rate";
 import { RunClock } from "../screen/run-clock";
 import { ScreenState } from "../screen/screen-state";
 import { counted, RunApi, type Session } from "../session";
+import type { TrialKind } from "../trials/kind";
 import { applyWrite } from "./kept-visit";
 import { owed, Replays } from "./replays";
 
@@ -25,7 +26,16 @@ export async function flush(outbox: Outbox, started: RunStarted, wait_ms = SEND_
   return outbox.unsent();
 }
 
-export function openSession(root: HTMLElement, link: LinkState, run: RunState, outbox: Outbox, unsent: OutboxItem[]): Session {
+export interface Opening {
+  root: HTMLElement;
+  link: LinkState;
+  run: RunState;
+  kind: TrialKind;
+  outbox: Outbox;
+  unsent: OutboxItem[];
+}
+
+export function openSession({ root, link, run, kind, outbox, unsent }: Opening): Session {
   const screen = new ScreenState();
   unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);
@@ -42,6 +52,7 @@ export function openSession(root: HTMLElement, link: LinkState, run: RunState, o
     player: choosePlayer(run.display.background),
     clock: new RunClock(run.elapsed_ms_before),
     replays: new Replays(),
+    kind,
     over: new AbortController(),
     api: new RunApi(outbox),
     completion: null,

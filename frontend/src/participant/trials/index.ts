@@ -1,30 +1,21 @@
-/** One folder for each kind of trial. A paired comparison would join here. */
-import type { ShownClipRating, TrialInfo } from "../../api/schema";
-import { trial, type Node } from "../jspsych";
+/** The registry of trial kinds: every folder here with an index.ts, found by its name and loaded when a run needs it. */
+import type { TrialInfo } from "../../api/schema";
+import type { Node } from "../jspsych";
 import type { Session } from "../session";
-import { attentionCheck } from "./attention-check";
-import { clipRating, placeIn } from "./clip-rating/plugin";
+import type { Showable, TrialKind } from "./kind";
 
-export interface Showable {
-  trial: TrialInfo;
-  play: number;
-  next: TrialInfo | null;
+const folders = import.meta.glob<TrialKind>("./*/index.ts", { import: "kind" });
+
+/** The code of the kind that a study declares. Throws where this page has none of that name. */
+export function loadKind(name: string): Promise<TrialKind> {
+  const load = folders[`./${name}/index.ts`];
+  const names = Object.keys(folders).map((path) => path.split("/")[1]);
+  return load
+    ? load()
+    : Promise.reject(new Error(`expected one of the kinds of trial ${names.join(", ")}, got ${name}; load the page again`));
 }
-type Maker = (session: Session, what: () => Showable) => Node;
-
-const kinds: Record<ShownClipRating["kind"], Maker> = {
-  clip_rating: (session, what) =>
-    trial(clipRating(session), {
-      trial: () => what().trial,
-      play: () => what().play,
-      next: () => what().next,
-      number: () => placeIn(session, what().trial).number,
-      total: () => placeIn(session, what().trial).total,
-    }),
-};
 
 /** The timeline node that shows what `what` names when its turn comes. */
 export function trialNode(session: Session, kind: TrialInfo["kind"], what: () => Showable): Node {
-  if (kind === "attention") return trial(attentionCheck(session), { trial: () => what().trial });
-  return kinds[session.run.trial.kind](session, what);
+  return kind === "attention" ? session.kind.attention(session, what) : session.kind.node(session, what);
 }

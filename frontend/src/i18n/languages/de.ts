@@ -1,6 +1,6 @@
 import type { Messages } from "./en";
 
-export const de: Messages = {
+export const messages: Messages = {
   loading: "Einen Augenblick …",
   continue: "Weiter",
   back: "Zurück",

@@ -15,7 +15,7 @@ import { procedureFeedback } from "./feedback";
 import { prepareClip } from "./prepare";
 import { askScale, type Rated } from "./scale";
 import { showOnce, type Shown, waitForStart } from "./showing";
-import { simulatedRating } from "./simulated";
+import { simulatedRating } from "./simulate";
 import { stage, type Stage } from "./stage";
 
 export interface ClipRatingParameters {

@@ -3,7 +3,7 @@ import type { RatingBody } from "../rating";
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
-import type { ClipRatingData, ClipRatingParameters } from "./plugin";
+import type { ClipRatingData, ClipRatingParameters } from "./screen";
 
 export async function simulatedRating(session: Session, { trial, play }: ClipRatingParameters): Promise<ClipRatingData> {
   const { minimum, maximum } = session.run.trial.scale;

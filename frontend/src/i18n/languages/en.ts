@@ -1,4 +1,5 @@
-export const en = {
+/** The page's own sentences. Every other language file has the same keys, or does not compile. */
+export const messages = {
   loading: "One moment …",
   continue: "Continue",
   back: "Back",
@@ -184,4 +185,4 @@ export const en = {
   gate_continue: "Go on all the same",
 };
 
-export type Messages = Record<keyof typeof en, string>;
+export type Messages = Record<keyof typeof messages, string>;

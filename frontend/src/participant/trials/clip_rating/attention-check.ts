@@ -1,15 +1,15 @@
 /** An instructed rating between trials: the same scale without a clip. Whether it was followed, the server knows. */
-import type { TrialInfo } from "../../api/schema";
-import { h } from "../../ui/element";
-import { markdown } from "../../ui/markdown";
-import { focusHeading } from "../../ui/page";
-import { INT, OBJECT, plugin, type PluginClass } from "../jspsych";
-import { playbackRecord } from "../playback/record";
-import { absoluteNow } from "../playback/protocol";
-import { screenSignal } from "../screens/support";
-import type { Session } from "../session";
-import { askScale, type Rated } from "./clip-rating/scale";
-import { saveRating } from "./save-rating";
+import type { TrialInfo } from "../../../api/schema";
+import { h } from "../../../ui/element";
+import { markdown } from "../../../ui/markdown";
+import { focusHeading } from "../../../ui/page";
+import { INT, OBJECT, plugin, type PluginClass } from "../../jspsych";
+import { playbackRecord } from "../../playback/record";
+import { absoluteNow } from "../../playback/protocol";
+import { screenSignal } from "../../screens/support";
+import type { Session } from "../../session";
+import { askScale, type Rated } from "./scale";
+import { saveRating } from "../save-rating";
 
 interface Parameters {
   trial: TrialInfo;
