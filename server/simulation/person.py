@@ -6,6 +6,9 @@ import uuid
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from pydantic import TypeAdapter
+
+from experiments.forms import FormField
 from server.simulation.http import JsonClient
 
 LEVEL_SD, PERSON_SD, CLIP_SD, TRIAL_SD = 0.5, 0.6, 0.2, 1.0
@@ -97,25 +100,12 @@ class Person:
     def _forms(self, state: dict[str, Any], when: str) -> bool:
         for form in state["forms"]:
             if form["when"] == when:
-                answers = {item["name"]: self._field(item) for item in form["fields"]}
+                fields = map(_FIELD.validate_python, form["fields"])
+                answers = {field.name: field.simulated(self.rater.rng) for field in fields}
                 saved = self.client.put(f"/api/run/forms/{form['name']}", {"answers": answers})
                 if saved["status"] != "active":
                     return False
         return True
-
-    def _field(self, item: dict[str, Any]) -> Any:
-        rng = self.rater.rng
-        match item["type"]:
-            case "number":
-                return rng.randint(item["minimum"], min(item["maximum"], item["minimum"] + 60))
-            case "likert":
-                return rng.randint(1, item["points"])
-            case "choice":
-                return rng.choice(item["options"])["value"]
-            case "multiple_choice":
-                return [rng.choice(item["options"])["value"]]
-            case _:
-                return "simulated"
 
     def rate(self, trial: dict[str, Any], scale: dict[str, Any]) -> bool:
         """Play and rate one trial; True where the receipt asks for the clip again."""
@@ -173,6 +163,7 @@ class Person:
         due.insert(place, {**trial, "plays_done": trial["plays_done"] + 1})
 
 
+_FIELD: TypeAdapter[FormField] = TypeAdapter(FormField)
 _CALIBRATION = {
     "px_per_mm": 3.78,
     "method": "card",

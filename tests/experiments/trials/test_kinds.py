@@ -112,6 +112,12 @@ def test_its_trials_show_clips_of_the_design_in_its_roles(kind: Kind, slot: int)
             assert {shown.clip for shown in trial.shown} <= clips
 
 
+def test_the_page_is_told_a_part_of_it(kind: Kind) -> None:
+    told = kind.shown(declared(kind))
+    assert isinstance(told, kind.page)
+    assert told.model_dump()["kind"] == kind.name
+
+
 def test_its_columns_are_a_view_with_the_base_columns(kind: Kind) -> None:
     names = names_of(kind.view.columns)
     assert len(set(names)) == len(names)

@@ -27,6 +27,16 @@ class SameOrNot(TrialDeclaration):
     gap_ms: Annotated[int, Field(ge=0, le=5000)] = 500
 
 
+class ShownSameOrNot(Declaration):
+    kind: Literal["same_or_not"] = "same_or_not"
+    question: Translated
+
+
+def shown(experiment: "Experiment") -> ShownSameOrNot:
+    assert isinstance(experiment.trial, SameOrNot)
+    return ShownSameOrNot(question=experiment.trial.question)
+
+
 class SameAnswer(Declaration):
     same: bool
 
@@ -59,6 +69,8 @@ TOY = Kind(
     ),
     roles=("first", "second"),
     effects={"question": "measured", "gap_ms": "measured", "expected_seconds": "wording"},
+    page=ShownSameOrNot,
+    shown=shown,
     assign=assign,
     example='[trial]\nkind = "same_or_not"\nquestion = { en = "The same?", de = "Gleich?" }\n',
 )
