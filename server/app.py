@@ -29,6 +29,7 @@ from server.settings import Settings
 from server.studies import endpoints as studies
 from server.studies import link_endpoints as links
 from server.trials import endpoints as trials
+from server.views import endpoints as views
 
 
 def _routers() -> tuple[APIRouter, ...]:
@@ -39,6 +40,7 @@ def _routers() -> tuple[APIRouter, ...]:
         clips.router,
         participants.router,
         trials.router,
+        views.router,
         accounts.router,
         people.router,
         studies.router,

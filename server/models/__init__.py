@@ -19,6 +19,8 @@ from server.models.runs import (
     Rating,
     RunEvent,
     StudyRun,
+    View,
+    ViewClip,
 )
 from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
 
@@ -45,4 +47,6 @@ __all__ = [
     "StudyVersion",
     "UtcDateTime",
     "VersionClip",
+    "View",
+    "ViewClip",
 ]

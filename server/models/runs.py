@@ -22,6 +22,7 @@ STAGES = (
     "done",
 )
 ORIGINS = ("participant", "preview", "pilot", "simulated")
+CLIP_ROLES = ("shown", "left", "right", "first", "second", "reference")
 RUN_STATUSES = ("active", "complete", "screened_out", "withdrawn")
 
 
@@ -153,6 +154,49 @@ class Rating(Base):
     verdict_rule: Mapped[str] = mapped_column(String(40), default="")
     drawn: Mapped[list[list[float]] | None]
     saved_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class View(Base):
+    """One view of a trial's clips, stored when it begins; it stays open where the page dies before its end.
+
+    view_id: made by the client. number: of the trial's views, from 1. screen: its state at the start.
+    """
+
+    __tablename__ = "views"
+    __table_args__ = (
+        UniqueConstraint("study_run_id", "view_id"),
+        UniqueConstraint("study_run_id", "trial_index", "number"),
+        ForeignKeyConstraint(
+            ["study_run_id", "trial_index"],
+            ["assigned_trials.study_run_id", "assigned_trials.trial_index"],
+            ondelete="CASCADE",
+        ),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    view_id: Mapped[str] = mapped_column(String(40))
+    study_run_id: Mapped[int]
+    trial_index: Mapped[int]
+    number: Mapped[int]
+    started_at_client: Mapped[datetime]
+    received_at: Mapped[datetime] = mapped_column(default=now)
+    ended_at_client: Mapped[datetime | None]
+    completed: Mapped[bool] = mapped_column(default=False)
+    screen: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class ViewClip(Base):
+    """One clip in one view. frame_log: what was drawn when, as `server.views.frame_log` packs it."""
+
+    __tablename__ = "view_clips"
+    __table_args__ = (one_of("role", *CLIP_ROLES),)
+
+    view: Mapped[int] = mapped_column(
+        ForeignKey("views.id", ondelete="CASCADE"), primary_key=True, autoincrement=False
+    )
+    role: Mapped[str] = mapped_column(String(10), primary_key=True)
+    clip_sha256: Mapped[str] = mapped_column(String(64))
+    frame_log: Mapped[str] = mapped_column(Text)
 
 
 class RunEvent(Base):

@@ -360,6 +360,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/run/views": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Post Views
+         * @description Begin views durably and complete them; sending the same again changes nothing.
+         */
+        post: operations["post_views"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/session": {
         parameters: {
             query?: never;
@@ -3720,6 +3740,27 @@ export interface components {
             qr_svg: string;
         };
         /**
+         * SeenClip
+         * @description One clip of a view with its drawn frames.
+         */
+        SeenClip: {
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "shown" | "left" | "right" | "first" | "second" | "reference";
+            /** Clip Sha256 */
+            clip_sha256: string;
+            /**
+             * Drawn
+             * @description Index and time in ms since the view's start of every drawn frame.
+             */
+            drawn: [
+                number,
+                number
+            ][];
+        };
+        /**
          * SeriesOut
          * @description Versions of a study that measure the same; only their answers may be pooled.
          */
@@ -4287,6 +4328,63 @@ export interface components {
              */
             runs?: number;
         };
+        /**
+         * ViewIn
+         * @description One view; sent without an end when it begins, with one when it has ended.
+         */
+        ViewIn: {
+            /**
+             * Id
+             * Format: uuid
+             */
+            id: string;
+            /** Trial Index */
+            trial_index: number;
+            /**
+             * Number
+             * @description Of the trial's views, from 1.
+             */
+            number: number;
+            /**
+             * Started At Client
+             * Format: date-time
+             */
+            started_at_client: string;
+            /** Ended At Client */
+            ended_at_client?: string | null;
+            /** Screen */
+            screen?: {
+                [key: string]: unknown;
+            };
+            /**
+             * Clips
+             * @default []
+             */
+            clips?: components["schemas"]["SeenClip"][];
+        };
+        /**
+         * ViewsIn
+         * @description Up to 100 views; what the server already has is left as it is.
+         */
+        ViewsIn: {
+            /** Views */
+            views: components["schemas"]["ViewIn"][];
+        };
+        /**
+         * ViewsSaved
+         * @description How many were new, how many were completed.
+         */
+        ViewsSaved: {
+            /** Begun */
+            begun: number;
+            /** Completed */
+            completed: number;
+            /**
+             * Saved At
+             * Format: date-time
+             */
+            saved_at: string;
+        };
     };
     responses: never;
     parameters: never;
@@ -4404,6 +4502,7 @@ export type ScreenDevice = components['schemas']['ScreenDevice'];
 export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
 export type ScreenOut = components['schemas']['ScreenOut'];
 export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
+export type SeenClip = components['schemas']['SeenClip'];
 export type SeriesOut = components['schemas']['SeriesOut'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
@@ -4429,6 +4528,9 @@ export type Unsupported = components['schemas']['Unsupported'];
 export type UploadOut = components['schemas']['UploadOut'];
 export type UploadedFile = components['schemas']['UploadedFile'];
 export type VersionOut = components['schemas']['VersionOut'];
+export type ViewIn = components['schemas']['ViewIn'];
+export type ViewsIn = components['schemas']['ViewsIn'];
+export type ViewsSaved = components['schemas']['ViewsSaved'];
 export type $defs = Record<string, never>;
 export interface operations {
     healthz: {
@@ -5201,6 +5303,48 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RatingSaved"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    post_views: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ViewsIn"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ViewsSaved"];
                 };
             };
             /** @description The request's content is not acceptable */
