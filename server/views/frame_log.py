@@ -33,7 +33,7 @@ def unpacked(text: str) -> list[Entry]:
 
 
 def _add(out: bytearray, number: int) -> None:
-    """Append a number: its sign in the lowest bit, then seven bits a byte; the highest says that more come."""
+    """Append a number: its sign in the lowest bit, then seven bits a byte with a bit for `more`."""
     rest = 2 * number if number >= 0 else -2 * number - 1
     while rest > 0x7F:
         out.append(rest & 0x7F | 0x80)
