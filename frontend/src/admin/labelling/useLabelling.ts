@@ -1,59 +1,29 @@
 /** The work of the labelling page: a video, its labels with undo, and the start shape of each new frame. */
 
 import { useCallback, useEffect, useEffectEvent, useRef, useState } from "react";
-import { candidateFrames, farthestPictures, FRAMES_WANTED } from "../../labelling/choose-frames";
+import { candidateFrames } from "../../labelling/choose-frames";
 import type { Grey } from "../../labelling/grey";
 import { begun, changed, type History, redone, undone } from "../../labelling/history";
-import { checkShape, defaultMarkers, type LabelFile, LabelProblem, labelsText, parseLabels } from "../../labelling/label-file";
-import { type Point, type Shape, templateShape, withEyeMoved, withEyeStretched, withPoint } from "../../labelling/points";
-import { FRAMES_BEFORE_PROPOSALS, proposeShape } from "../../labelling/propose";
-import { greyOfCanvas, type OpenedVideo, openVideo } from "../../labelling/video";
+import { defaultMarkers, type LabelFile, labelsText, parseLabels } from "../../labelling/label-file";
+import {
+  acceptedOf,
+  chooseFrames,
+  type Frames,
+  type LabelledFrame,
+  type Looked,
+  problemOf,
+  requireSameVideo,
+} from "../../labelling/labelled-frames";
+import { type Point, withEyeMoved, withEyeStretched, withPoint } from "../../labelling/points";
+import { type Start, startShape } from "../../labelling/start-shape";
+import { type OpenedVideo, openVideo } from "../../labelling/video";
 import { downloadText } from "../ui/download";
 import type { MoveKind } from "./Stage";
+import { message, type Picture, usePicture } from "./usePicture";
 
-export interface LabelledFrame {
-  readonly shape: Shape;
-  readonly accepted: boolean;
-}
-
-type Frames = ReadonlyMap<number, LabelledFrame>;
 type Markers = Pick<LabelFile, "midUpper" | "midLower" | "rest">;
 
-export interface Start {
-  readonly number: number;
-  readonly shape: Shape;
-  readonly from: "template" | "nearest" | "proposal";
-}
-
-interface Looked {
-  readonly candidates: readonly number[];
-  readonly pictures: readonly Grey[];
-}
-
 const NOTHING: Frames = new Map();
-const MOST_SOURCES = 24;
-
-function acceptedOf(frames: Frames): [number, Shape][] {
-  return [...frames].filter(([, { accepted }]) => accepted).map(([number, { shape }]) => [number, shape]);
-}
-
-function message(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
-}
-
-/** About 20 frames: those labelled, and ones as unlike them as there are. */
-function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
-  const taken = labelled.map((number) =>
-    candidates.reduce(
-      (best, candidate, place) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best),
-      0,
-    ),
-  );
-  const places = farthestPictures(pictures, FRAMES_WANTED, taken).filter((place) => !taken.includes(place));
-  const added = places.map((place) => candidates[place] ?? 0);
-  return [...new Set([...labelled, ...added])].sort((a, b) => a - b);
-}
-
 export function useLabelling() {
   const [video, setVideo] = useState<OpenedVideo | null>(null);
   const [busy, setBusy] = useState<string | null>(null);
@@ -65,7 +35,7 @@ export function useLabelling() {
   const [looked, setLooked] = useState<Looked | null>(null);
   const [chosen, setChosen] = useState<readonly number[]>([]);
   const [current, setCurrent] = useState(0);
-  const [picture, setPicture] = useState<{ number: number; canvas: HTMLCanvasElement } | null>(null);
+  const picture = usePicture(video, current, setProblem);
   const [start, setStart] = useState<Start | null>(null);
   const [selected, setSelected] = useState<number | null>(null);
   const greys = useRef(new Map<number, Grey>());
@@ -93,7 +63,6 @@ export function useLabelling() {
       const numbers = chooseFrames(found, []);
       video?.close();
       greys.current.clear();
-      setPicture(null);
       setVideo(next);
       setLooked(found);
       setChosen(numbers);
@@ -126,25 +95,13 @@ export function useLabelling() {
     }
   };
 
-  useEffect(() => {
-    if (video === null) return;
-    let wanted = true;
-    video
-      .frame(current)
-      .then((canvas) => wanted && setPicture({ number: current, canvas }))
-      .catch((error: unknown) => wanted && setProblem(message(error)));
-    return () => {
-      wanted = false;
-    };
-  }, [video, current]);
-
   const labelled = frames.has(current);
   // The frames count as they are when a new frame is opened: a start shape does not change under the hand.
-  const propose = useEffectEvent((opened: OpenedVideo, shownPicture: { number: number; canvas: HTMLCanvasElement }) =>
+  const propose = useEffectEvent((opened: OpenedVideo, shownPicture: Picture) =>
     startShape(opened, shownPicture, acceptedOf(frames), eyes, greys.current),
   );
   useEffect(() => {
-    if (video === null || picture === null || picture.number !== current || labelled) return;
+    if (video === null || picture === null || labelled) return;
     let wanted = true;
     propose(video, picture)
       .then((found) => wanted && setStart(found))
@@ -203,7 +160,7 @@ export function useLabelling() {
     frames,
     chosen,
     current,
-    picture: picture?.number === current ? picture.canvas : null,
+    picture: picture?.canvas ?? null,
     shape: shown,
     startedFrom: labelled || start?.number !== current ? null : start.from,
     selected,
@@ -233,46 +190,4 @@ export function useLabelling() {
     },
     setEyes: (count: 1 | 2) => begin(NOTHING, count, { ...defaultMarkers(count), rest: {} }),
   };
-}
-
-function requireSameVideo(name: string, labels: LabelFile, video: OpenedVideo): void {
-  const [[width, height], [wide, high]] = [labels.size, video.size];
-  if (width !== wide || height !== high) {
-    throw new LabelProblem(
-      `${name}: labels were made on ${width} x ${height} pixels, the video has ${wide} x ${high}; ` + "use the video they were made on",
-    );
-  }
-  const beyond = [...labels.frames.keys()].find((number) => number >= video.frameCount);
-  if (beyond === undefined) return;
-  throw new LabelProblem(`${name}: frame ${beyond} is labelled, the video ends at frame ${video.frameCount - 1}`);
-}
-
-function problemOf(number: number, shape: Shape, video: OpenedVideo): string | null {
-  try {
-    checkShape(`frame ${number}`, shape, video.size);
-    return null;
-  } catch (error) {
-    if (error instanceof LabelProblem) return error.message;
-    throw error;
-  }
-}
-
-async function startShape(
-  video: OpenedVideo,
-  { number, canvas }: { number: number; canvas: HTMLCanvasElement },
-  accepted: readonly [number, Shape][],
-  eyes: 1 | 2,
-  greys: Map<number, Grey>,
-): Promise<Start> {
-  const nearest = [...accepted].sort(([a], [b]) => Math.abs(a - number) - Math.abs(b - number));
-  const first = nearest[0];
-  if (first === undefined) return { number, shape: templateShape(eyes, video.size), from: "template" };
-  if (nearest.length < FRAMES_BEFORE_PROPOSALS) return { number, shape: first[1], from: "nearest" };
-  const sources = [];
-  for (const [source, shape] of nearest.slice(0, MOST_SOURCES)) {
-    const picture = greys.get(source) ?? greyOfCanvas(await video.frame(source));
-    greys.set(source, picture);
-    sources.push({ picture, shape });
-  }
-  return { number, shape: proposeShape(greyOfCanvas(canvas), sources), from: "proposal" };
 }

@@ -1,0 +1,58 @@
+/** Labelled frames of one video: which to label, and whether labels fit the video. */
+
+import { farthestPictures, FRAMES_WANTED } from "./choose-frames";
+import type { Grey } from "./grey";
+import { checkShape, type LabelFile, LabelProblem } from "./label-file";
+import type { Shape } from "./points";
+import type { OpenedVideo } from "./video";
+
+export interface LabelledFrame {
+  readonly shape: Shape;
+  readonly accepted: boolean;
+}
+
+export type Frames = ReadonlyMap<number, LabelledFrame>;
+/** The frames looked at to find unlike ones. */
+export interface Looked {
+  readonly candidates: readonly number[];
+  readonly pictures: readonly Grey[];
+}
+
+export function acceptedOf(frames: Frames): [number, Shape][] {
+  return [...frames].filter(([, { accepted }]) => accepted).map(([number, { shape }]) => [number, shape]);
+}
+
+/** About 20 frames: those labelled, and ones as unlike them as there are. */
+export function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
+  const taken = labelled.map((number) =>
+    candidates.reduce(
+      (best, candidate, place) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best),
+      0,
+    ),
+  );
+  const places = farthestPictures(pictures, FRAMES_WANTED, taken).filter((place) => !taken.includes(place));
+  const added = places.map((place) => candidates[place] ?? 0);
+  return [...new Set([...labelled, ...added])].sort((a, b) => a - b);
+}
+
+export function requireSameVideo(name: string, labels: LabelFile, video: OpenedVideo): void {
+  const [[width, height], [wide, high]] = [labels.size, video.size];
+  if (width !== wide || height !== high) {
+    throw new LabelProblem(
+      `${name}: labels were made on ${width} x ${height} pixels, the video has ${wide} x ${high}; ` + "use the video they were made on",
+    );
+  }
+  const beyond = [...labels.frames.keys()].find((number) => number >= video.frameCount);
+  if (beyond === undefined) return;
+  throw new LabelProblem(`${name}: frame ${beyond} is labelled, the video ends at frame ${video.frameCount - 1}`);
+}
+
+export function problemOf(number: number, shape: Shape, video: OpenedVideo): string | null {
+  try {
+    checkShape(`frame ${number}`, shape, video.size);
+    return null;
+  } catch (error) {
+    if (error instanceof LabelProblem) return error.message;
+    throw error;
+  }
+}
