@@ -52,15 +52,8 @@ def test_a_rule_without_its_finder_fails_type_checking(tmp_path: Path, union: st
 
 def unhandled(folder: Path, user: str) -> list[str]:
     """What mypy says of the new rule, in the copied files alone."""
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        "--no-incremental",
-        "--cache-dir=/dev/null",
-        "pydantic.pyi",
-        user,
-    ]
-    command += [user, *(str(path.relative_to(folder)) for path in (folder / "experiments").rglob("*.py"))]
+    copied = [str(path.relative_to(folder)) for path in (folder / "experiments").rglob("*.py")]
+    options = ["--no-incremental", "--cache-dir=/dev/null"]
+    command = [sys.executable, "-m", "mypy", *options, "pydantic.pyi", user, *copied]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
     return [line for line in done.stdout.splitlines() if "NewRule" in line]
