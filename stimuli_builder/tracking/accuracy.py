@@ -29,6 +29,7 @@ class HeldOut:
     rms_px : root mean square distance of the landmarks from the labels; None if the frame was not found.
     distance_errors_px : (eyes,) inter-eyelid distance minus the label's.
     residuals : (eyes,) root mean square grey levels.
+    point_errors_px : (9 * eyes,) distance of each landmark from its label.
     """
 
     frame: int
@@ -36,6 +37,7 @@ class HeldOut:
     rms_px: float | None
     distance_errors_px: Values | None
     residuals: Values | None
+    point_errors_px: Values | None = None
 
 
 def cross_validate(
@@ -82,7 +84,8 @@ def _held_out(
     fit: Fit = min(fits, key=lambda found: float(found.residuals.max()))
     found = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
     errors = inter_eyelid_distances(found, model.markers) - inter_eyelid_distances(label, model.markers)
-    return HeldOut(frame, fold, _rms(found - label), errors, fit.residuals)
+    away = np.hypot(*(found - label).T)
+    return HeldOut(frame, fold, _rms(found - label), errors, fit.residuals, away)
 
 
 def _rms(differences: Points) -> float:

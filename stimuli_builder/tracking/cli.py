@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from stimuli_builder.tracking.labels import Labels
     from stimuli_builder.tracking.learn import Lesson
     from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
+    from stimuli_builder.tracking.shapes import Points
     from stimuli_builder.video import VideoInfo
 
 Video = Annotated[
@@ -75,14 +77,31 @@ def track(
     refine: Refine = None,
     folds: Folds = 5,
     accept_variable_rate: VariableRate = False,
+    relabel: Annotated[
+        Path | None,
+        typer.Option(
+            help="Label file for the worst frames, to be corrected by hand; where it is there, its frames "
+            "train the model and win over the detector."
+        ),
+    ] = None,
 ) -> None:
     """Track the eyelids of a recording with the coupled active appearance model.
 
+    Without labels a face detector finds the eyes and trains the model (its environment, 270 MB, is made at
+    first use); labels placed by hand (--labels) are more exact.
+
     Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (with
-    --one-eye 9 points and distance_px), residual, iterations, status, reason. A frame that cannot be fitted
-    has empty points, the status 'lost' and its reason.
+    --one-eye 9 points and distance_px), residual, iterations, error_px, e01 ... e18, status, reason. A frame
+    that cannot be fitted has empty points, the status 'lost' and its reason; one that may be wrong is
+    'doubtful'.
 
     Examples:
+
+      stimuli track face.mp4 --out track.csv
+
+      stimuli track eye.mp4 --one-eye --out track.csv --preview seen.mp4
+
+      stimuli track face.mp4 --out track.csv --relabel worst.json    # correct worst.json, run it again
 
       stimuli track face.mp4 --labels face.labels.json --out track.csv
 
@@ -95,23 +114,36 @@ def track(
     from stimuli_builder.tracking.learn import open_video
     from stimuli_builder.tracking.track import track_video
 
-    if (labels is None) == (model is None):
-        raise InputError("expected either --labels or --model; give one of them")
-    _check_outputs([video, labels, model], out, preview, plot)
+    if labels is not None and model is not None:
+        raise InputError("expected --labels or --model, or neither; give one of them")
+    if relabel is not None and (labels is not None or model is not None):
+        raise InputError("--relabel belongs to tracking without --labels and --model; leave them out")
+    _check_outputs([video, labels, model, relabel], out, preview, plot)
     info = open_video(video, accept_variable_rate)
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
-    trained = _model(info, labels, model, options, one_eye, refine, folds)
+    hints: Mapping[int, Points] = {}
+    if labels is None and model is None:
+        trained, hints = _label_free(info, options, one_eye, relabel)
+    else:
+        trained = _model(info, labels, model, options, one_eye, refine, folds)
     with frame_progress() as progress:
         task = progress.add_task("tracking", total=info.frame_count)
         summary = track_video(
-            trained, info, out, lambda now: progress.update(task, completed=now.frames, refresh=False)
+            trained,
+            info,
+            out,
+            lambda now: progress.update(task, completed=now.frames, refresh=False),
+            hints,
         )
     print(
-        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked, "
-        f"{summary.reinitialised:,} re-initialised, {summary.lost:,} lost\n"
+        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
+        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
+        f"{summary.lost:,} lost\n"
         f"{summary.fit_fps:,.0f} frames/s fit only, "
         f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
     )
+    if relabel is not None:
+        _relabel(relabel, info, trained, out, hints)
     _pictures(trained, info, out, preview, plot)
 
 
@@ -192,6 +224,42 @@ def _model(
     if one_eye and trained.eyes == 2:
         raise InputError(f"{model}: a model of two eyes, --one-eye expects one; leave --one-eye out")
     return trained
+
+
+def _by_hand(path: Path | None, info: "VideoInfo") -> "Labels | None":
+    from stimuli_builder.tracking.labels import load_labels
+
+    return load_labels(path, info.size_px, info.frame_count) if path is not None and path.exists() else None
+
+
+def _relabel(
+    path: Path, info: "VideoInfo", model: "CoupledModel", out: Path, hints: "Mapping[int, Points]"
+) -> None:
+    from stimuli_builder.tracking.relabel import worst_frames, write_relabel
+
+    before = _by_hand(path, info)
+    worst = worst_frames(out, model.eyes, info.fps, hints)
+    new = write_relabel(path, info, model.markers, worst, {} if before is None else before.frames)
+    print(f"{path}: {new} frames to correct on the labelling page; run the same command again then")
+
+
+def _label_free(
+    info: "VideoInfo", options: "TrainingOptions", one_eye: bool, relabel: Path | None
+) -> "tuple[CoupledModel, Mapping[int, Points]]":
+    """Find the eyes by the detector and train on what it saw."""
+    from stimuli_builder.progress import frame_progress
+    from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+
+    with frame_progress() as progress:
+        task = progress.add_task("finding eyes", total=info.frame_count)
+        seen = survey(info, one_eye=one_eye, advance=lambda now: progress.update(task, completed=now))
+    found = f"eyes found on {len(seen.points):,} of {seen.looked_at:,} frames looked at"
+    more = f"; {seen.several_faces:,} show several faces, the largest is taken" if seen.several_faces else ""
+    print(found + more)
+    by_hand = _by_hand(relabel, info)
+    lesson = label_free_lesson(info, seen, options, one_eye=one_eye, by_hand=by_hand)
+    _report_modes(lesson)
+    return lesson.model, seen.points
 
 
 def _check_outputs(

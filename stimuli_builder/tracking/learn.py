@@ -7,8 +7,9 @@ import numpy as np
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.accuracy import HeldOut, cross_validate, refined_labels, residual_limits
+from stimuli_builder.tracking.certainty import with_errors
 from stimuli_builder.tracking.labels import Labels, load_labels
-from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, believing, train
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
 from stimuli_builder.video import VideoInfo, read_frames, scan_video
 
 WORTH_REFINING = 0.96
@@ -54,6 +55,13 @@ def learn(
     """
     labels = load_labels(labels_path, info.size_px, info.frame_count)
     _check_eyes(labels, one_eye)
+    return lesson_from(info, labels, options, folds=folds, refine=refine)
+
+
+def lesson_from(
+    info: VideoInfo, labels: Labels, options: TrainingOptions, *, folds: int = 5, refine: bool | None = None
+) -> Lesson:
+    """Train on labels that are at hand, a person's or a detector's; see `learn`."""
     pictures = read_frames(info, list(labels.frames))
     given = (pictures, labels.frames, labels.markers, options)
     held_out = cross_validate(*given, folds, refine=bool(refine))
@@ -67,7 +75,8 @@ def learn(
     model = train(
         [pictures[f] for f in frames], np.array([points[f] for f in frames]), labels.markers, options
     )
-    return Lesson(believing(model, residual_limits(held_out, labels.eyes)), labels, held_out, refined)
+    believed = with_errors(model, held_out, residual_limits(held_out, labels.eyes))
+    return Lesson(believed, labels, held_out, refined)
 
 
 def _check_eyes(labels: Labels, one_eye: bool) -> None:

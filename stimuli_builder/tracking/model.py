@@ -14,6 +14,7 @@ from stimuli_builder.tracking.kernels import sample
 from stimuli_builder.tracking.mesh import BaseMesh, build_mesh, mesh_from
 from stimuli_builder.tracking.picture import reduced, reduced_points
 from stimuli_builder.tracking.shapes import (
+    EYE_POINTS,
     LidMarkers,
     Points,
     mean_shape,
@@ -23,7 +24,7 @@ from stimuli_builder.tracking.shapes import (
 )
 from stimuli_builder.video import Picture
 
-FORMAT = 1
+FORMAT = 2
 WEIGHT_FLOOR = 0.3
 Values = NDArray[np.float64]
 
@@ -61,6 +62,9 @@ class CoupledModel:
     patch_frames : (P,), the labelled frame each patch shows, and patch_corners (P, 2), its top left corner.
     reduction : whole factor by which pictures are reduced before fitting.
     residual_limits : (eyes,) root mean square grey levels above which a fit is not believed.
+    usual_residuals : (eyes,) of frames left out of training; a fit's error is stated against them.
+    point_errors : (9 * eyes,) root mean square distance in px of the video of each point on those frames.
+    error_slope : (1,) by which power of its residual over the usual one a frame's error grows.
     variance_kept : share of the variance in shape, appearance and coupled parameters.
     """
 
@@ -78,6 +82,9 @@ class CoupledModel:
     size_px: tuple[int, int]
     markers: LidMarkers
     residual_limits: Values
+    usual_residuals: Values
+    point_errors: Values
+    error_slope: Values
     mode_counts: tuple[int, int, int]
     variance_kept: tuple[float, float, float]
 
@@ -135,6 +142,9 @@ def train(
         size_px=(width, height),
         markers=markers,
         residual_limits=np.full(markers.eyes, np.inf),
+        usual_residuals=np.full(markers.eyes, np.nan),
+        point_errors=np.full(EYE_POINTS * markers.eyes, np.nan),
+        error_slope=np.zeros(1),
         mode_counts=(split, len(look_basis), len(joint)),
         variance_kept=(kept_shape, kept_look, kept),
     )
@@ -224,9 +234,21 @@ def _patches(
     return np.array(patches), chosen.astype(np.int64), np.array(corners, np.float64)
 
 
-def believing(model: CoupledModel, limits: Values) -> CoupledModel:
-    """The same model with residual limits (eyes,), in root mean square grey levels."""
-    return replace(model, residual_limits=np.asarray(limits, np.float64))
+def believing(
+    model: CoupledModel,
+    limits: Values,
+    usual: Values | None = None,
+    point_errors: Values | None = None,
+    slope: float = 0.0,
+) -> CoupledModel:
+    """The same model with residual limits (eyes,) and, where given, what its errors are stated from."""
+    return replace(
+        model,
+        residual_limits=np.asarray(limits, np.float64),
+        usual_residuals=model.usual_residuals if usual is None else usual,
+        point_errors=model.point_errors if point_errors is None else point_errors,
+        error_slope=np.array([slope]),
+    )
 
 
 def save_model(model: CoupledModel, path: Path) -> None:
@@ -262,6 +284,9 @@ ARRAYS = (
     "patch_frames",
     "patch_corners",
     "residual_limits",
+    "usual_residuals",
+    "point_errors",
+    "error_slope",
 )
 
 

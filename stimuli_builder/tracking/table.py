@@ -27,8 +27,10 @@ COLUMN_MEANINGS = {
     "distance_px": "the same in one-eye tracks, instead of the two columns before",
     "residual": "root mean square difference of model and picture over the eyes, grey levels of 0 to 255",
     "iterations": "Gauss-Newton iterations used",
-    "status": "tracked, reinitialised (found again by search) or lost (points and distances are empty)",
-    "reason": "why a frame is lost, or after what it was found again; empty for tracked frames",
+    "error_px": "stated error of the frame, root mean square over its points; empty where none is known",
+    "e01": "stated error of the first landmark in pixels; so on to e18 (one eye: e09)",
+    "status": "tracked, reinitialised (found again), doubtful, or lost (points and distances are empty)",
+    "reason": "why a frame is lost or doubtful, or after what it was found again; empty for tracked frames",
 }
 
 
@@ -42,6 +44,11 @@ def distance_columns(eyes: int) -> list[str]:
     return ["left_distance_px", "right_distance_px"] if eyes == 2 else ["distance_px"]
 
 
+def error_columns(eyes: int) -> list[str]:
+    """e01, e02, ... of all landmarks."""
+    return [f"e{number:02d}" for number in range(1, EYE_POINTS * eyes + 1)]
+
+
 def track_columns(eyes: int) -> list[str]:
     """All columns of a track in order."""
     return [
@@ -51,6 +58,8 @@ def track_columns(eyes: int) -> list[str]:
         *distance_columns(eyes),
         "residual",
         "iterations",
+        "error_px",
+        *error_columns(eyes),
         "status",
         "reason",
     ]
@@ -78,8 +87,23 @@ class TrackWriter:
             cells = [f"{value:.3f}" for value in (*frame.points.ravel().tolist(), *frame.distances.tolist())]
         residual = "" if frame.residual is None else f"{frame.residual:.3f}"
         self._writer.writerow(
-            [number, f"{time_s:.6f}", *cells, residual, frame.iterations, frame.status, frame.reason]
+            [
+                number,
+                f"{time_s:.6f}",
+                *cells,
+                residual,
+                frame.iterations,
+                *self._errors(frame),
+                frame.status,
+                frame.reason,
+            ]
         )
+
+    def _errors(self, frame: "TrackedFrame") -> list[str]:
+        if frame.errors is None or not np.isfinite(frame.errors).all():
+            return [""] * (1 + EYE_POINTS * self._eyes)
+        each = frame.errors.tolist()
+        return [f"{value:.3f}" for value in (float(np.sqrt((frame.errors**2).mean())), *each)]
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

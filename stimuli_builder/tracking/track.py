@@ -1,26 +1,40 @@
 """Tracking a video: every frame ends fitted, or with a status and a reason, never with a wrong number."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors, widths
 from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.model import CoupledModel
-from stimuli_builder.tracking.picture import reduced, restored_points
+from stimuli_builder.tracking.picture import reduced, reduced_points, restored_points
 from stimuli_builder.tracking.search import Finder, inside
-from stimuli_builder.tracking.shapes import EYE_POINTS, Points, inter_eyelid_distances
+from stimuli_builder.tracking.shapes import (
+    EYE_POINTS,
+    Points,
+    inter_eyelid_distances,
+    similarity_between,
+    unmoved,
+    with_border,
+)
 from stimuli_builder.tracking.table import TrackWriter
 from stimuli_builder.video import Picture, VideoInfo, frames
 
-Status = Literal["tracked", "reinitialised", "lost"]
+Status = Literal["tracked", "reinitialised", "doubtful", "lost"]
 
 SCALE_RANGE = (0.5, 2.0)
+FROZEN = "the same picture as the frame before"
+BLANK_RANGE = 12
+"""Grey levels between the darkest and the brightest pixel below which a picture shows nothing."""
+WORSE = 1.1
+"""A fit from the detector may have so much more residual than the one it replaces."""
 NEAR_EVERY_FRAME = 30
 NEAR_LATER_EVERY = 5
 WHOLE_EVERY = 30
@@ -35,6 +49,7 @@ class TrackedFrame:
     points : (9 * eyes, 2) in pixels of the video.
     distances : (eyes,) in pixels, image-left eye first.
     residual : root mean square grey levels over all base pixels; None if no fit came to an end.
+    errors : (9 * eyes,) stated error of each point in pixels.
     """
 
     status: Status
@@ -43,6 +58,7 @@ class TrackedFrame:
     distances: NDArray[np.float64] | None
     residual: float | None
     iterations: int
+    errors: NDArray[np.float64] | None = None
 
 
 @dataclass
@@ -52,6 +68,7 @@ class TrackSummary:
     frames: int = 0
     tracked: int = 0
     reinitialised: int = 0
+    doubtful: int = 0
     lost: int = 0
     fit_s: float = 0.0
     total_s: float = 0.0
@@ -77,20 +94,77 @@ class Tracker:
         self._last: Fit | None = None
         self._lost_frames = 0
         self._started = False
+        self._picture: Picture | None = None
+        self._before: Points | None = None
         self._loss = ""
         low, high = SCALE_RANGE
         sizes = np.hypot(model.poses[:, 0], model.poses[:, 1])
         self._sizes = (low * sizes.min(), high * sizes.max())
 
-    def step(self, picture: Picture) -> TrackedFrame:
-        """Fit the next frame, searching for the eyes where they are not where they were."""
+    def step(self, picture: Picture, hint: Points | None = None) -> TrackedFrame:
+        """Fit the next frame, searching for the eyes where they are not where they were.
+
+        Parameters
+        ----------
+        hint : (9 * eyes, 2) points of a detector in pixels of the video: a second start where the fit from
+            the frame before fails or lies elsewhere, and a witness.
+        """
+        blank = self._blank(picture)
+        if blank:
+            self._lost_frames += 1
+            self._loss = blank
+            return TrackedFrame("lost", blank, None, None, None, 0)
+        frozen = self._picture is not None and np.array_equal(picture, self._picture)
+        self._picture = picture
         if self._last is not None and not self._lost_frames:
             fit = self._fitter.fit(picture, self._last.c, self._last.pose)
             fault = self._fault(fit, picture)
+            fit, fault = self._with_hint(picture, fit, fault, hint)
             if not fault:
-                return self._found(fit, "tracked", "")
+                return self._found(fit, "tracked", FROZEN if frozen else "", hint)
             self._loss = fault
+        elif hint is not None:
+            fit = self._from(picture, hint)
+            if not self._fault(fit, picture):
+                started, loss = self._started, self._loss
+                again = f"found again after {loss}" if started else ""
+                return self._found(fit, "reinitialised" if started else "tracked", again, hint)
         return self._search(picture)
+
+    def _blank(self, picture: Picture) -> str:
+        """Why a picture cannot show an eye, or an empty string."""
+        if int(picture[::4, ::4].max()) - int(picture[::4, ::4].min()) < BLANK_RANGE:
+            return "a black or empty frame"
+        return ""
+
+    def _from(self, picture: Picture, hint: Points) -> Fit:
+        """Fit from a detector's points."""
+        shape = reduced_points(with_border(hint), self.model.reduction)
+        mean = self.model.mesh.vertices
+        pose = similarity_between(mean, shape)
+        away = (unmoved(shape, pose) - mean).ravel()
+        modes = self.model.shape_modes.reshape(len(self.model.sd), -1)
+        ridge = 1e-3 * np.diag(
+            (modes**2).sum(1).mean() / np.maximum(self.model.sd, 1e-9) ** 2 * self.model.sd.max() ** 2
+        )
+        c = np.linalg.solve(modes @ modes.T + ridge, modes @ away)
+        return self._fitter.fit(picture, np.clip(c, -3 * self.model.sd, 3 * self.model.sd), pose)
+
+    def _with_hint(self, picture: Picture, fit: Fit, fault: str, hint: Points | None) -> tuple[Fit, str]:
+        """The fit, or one started from the detector where that is nearer to it and no worse a picture."""
+        if hint is None:
+            return fit, fault
+        if not fault and lid_difference(self._points(fit), hint) < DIFFERING_SHARE / 2:
+            return fit, fault
+        other = self._from(picture, hint)
+        wrong = self._fault(other, picture)
+        if not wrong and (fault or _overall(other) < WORSE * _overall(fit)):
+            return other, ""
+        return fit, fault
+
+    def _points(self, fit: Fit) -> Points:
+        count = EYE_POINTS * self.model.eyes
+        return restored_points(fit.vertices[:count].astype(np.float64), self.model.reduction)
 
     def _search(self, picture: Picture) -> TrackedFrame:
         best: Fit | None = None
@@ -119,12 +193,18 @@ class Tracker:
             if anywhere is not None:
                 yield anywhere
 
-    def _found(self, fit: Fit, status: Status, reason: str) -> TrackedFrame:
+    def _found(self, fit: Fit, status: Status, reason: str, hint: Points | None = None) -> TrackedFrame:
+        before = self._before if status == "tracked" else None
         self._last, self._lost_frames, self._started, self._loss = fit, 0, True, ""
-        count = EYE_POINTS * self.model.eyes
-        points = restored_points(fit.vertices[:count].astype(np.float64), self.model.reduction)
+        points = self._points(fit)
+        difference = None if hint is None else lid_difference(points, hint)
+        errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
+        why = doubt(self.model, fit, points, errors, difference, before)
+        self._before = points
+        if why or reason == FROZEN:
+            status, reason = "doubtful", why or reason
         distances = inter_eyelid_distances(points, self.model.markers)
-        return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations)
+        return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations, errors)
 
     def _fault(self, fit: Fit, picture: Picture) -> str:
         """Why a fit is not believed, or an empty string."""
@@ -149,13 +229,18 @@ def _overall(fit: Fit) -> float:
 
 
 def track_video(
-    model: CoupledModel, info: VideoInfo, out: Path, advance: Callable[[TrackSummary], None] | None = None
+    model: CoupledModel,
+    info: VideoInfo,
+    out: Path,
+    advance: Callable[[TrackSummary], None] | None = None,
+    hints: Mapping[int, Points] = MappingProxyType({}),
 ) -> TrackSummary:
     """Track every frame of a video into a CSV; memory does not grow with its length.
 
     Parameters
     ----------
     advance : called after each frame with the counts so far, for a progress bar.
+    hints : frame -> points of a detector, see `Tracker.step`.
 
     Raises
     ------
@@ -175,7 +260,7 @@ def track_video(
             if summary.frames >= info.frame_count:
                 break
             before = time.thread_time()
-            frame = tracker.step(picture)
+            frame = tracker.step(picture, hints.get(summary.frames))
             summary.fit_s += time.thread_time() - before
             writer.write(summary.frames, float(info.times_s[summary.frames]), frame)
             _count(summary, frame)
@@ -189,6 +274,7 @@ def track_video(
 def _count(summary: TrackSummary, frame: TrackedFrame) -> None:
     summary.frames += 1
     summary.tracked += frame.status != "lost"
+    summary.doubtful += frame.status == "doubtful"
     summary.reinitialised += frame.status == "reinitialised"
     summary.lost += frame.status == "lost"
 

@@ -143,10 +143,18 @@ def test_a_model_for_another_size_or_no_model(refused, recording, tmp_path, less
     assert "found none" in refused(None, None, "--model", tmp_path / "none.npz")
 
 
-def test_labels_or_model_not_both_nor_neither(stimuli, recording, tmp_path):
-    out = tmp_path / "track.csv"
-    assert stimuli("track", recording.video, "--out", out)[0] == 2
-    assert "give one of them" in stimuli("track", recording.video, "--out", out)[2]
+def test_labels_and_model_are_not_given_together(stimuli, recording, tmp_path):
+    both = ("--labels", recording.labels, "--model", tmp_path / "m.npz")
+    code, _, error = stimuli("track", recording.video, "--out", tmp_path / "track.csv", *both)
+    assert code == 2
+    assert "give one of them" in error
+
+
+def test_relabelling_belongs_to_tracking_without_labels(stimuli, recording, tmp_path):
+    given = ("--labels", recording.labels, "--relabel", tmp_path / "worst.json")
+    code, _, error = stimuli("track", recording.video, "--out", tmp_path / "track.csv", *given)
+    assert code == 2
+    assert "--relabel belongs to" in error
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_track_has_the_promised_columns(track):
 def test_every_column_is_explained():
     for eyes in (1, 2):
         for name in track_columns(eyes):
-            assert name in COLUMN_MEANINGS or name[0] in "xy"
+            assert name in COLUMN_MEANINGS or name[0] in "xye"
 
 
 def test_accuracy_by_fold_is_of_frames_left_out(lesson, recording):
@@ -158,7 +158,7 @@ def test_command_writes_track_preview_and_plot(recording, stimuli, tmp_path):
         "track", recording.video, "--model", model, "--out", out, "--preview", preview, "--plot", plot
     )
     assert (code, error) == (0, "")
-    assert "200 tracked, 0 re-initialised, 0 lost" in said
+    assert "200 tracked (0 of them doubtful), 0 re-initialised, 0 lost" in said
     assert "frames/s fit only" in said
     assert "with decoding" in said
     assert sum(1 for _ in frames(preview)) == 200

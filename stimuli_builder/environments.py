@@ -1,0 +1,66 @@
+"""Python environments of their own for libraries that cannot live beside ours, made at first use by uv."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from experiments.errors import InputError
+
+
+def cache_folder() -> Path:
+    """Folder for environments shared by all projects of a user (XDG_CACHE_HOME, else ~/.cache)."""
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "palpebra"
+
+
+def ensure_environment(folder: Path, python: str, requirements: Path, what: str, probe: str) -> Path:
+    """Return the interpreter of an environment with the given packages, made where it lacks.
+
+    Parameters
+    ----------
+    python : version, or path of an interpreter, that uv makes the environment with.
+    requirements : file of pinned packages, hashes included; nothing else is installed.
+    what : what it is for, in words of the error.
+    probe : statement that must run in it.
+
+    Raises
+    ------
+    InputError
+        The environment cannot be made, or the probe fails in it; an unfinished one is removed.
+    """
+    interpreter = folder / "bin" / "python"
+    ready = folder / "ready"
+    if ready.exists():
+        return interpreter
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        _run([*uv(), "venv", "-q", str(folder), "--python", python], f"make the environment of {what}")
+        install = ["pip", "install", "-q", "--no-deps", "--require-hashes", "-r", str(requirements)]
+        _run([*uv(), *install, "--python", str(interpreter)], f"install {what}")
+        _run([str(interpreter), "-c", probe], f"start {what}")
+    except InputError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    ready.touch()
+    return interpreter
+
+
+def uv() -> list[str]:
+    """The command uv, on the PATH or beside the running Python."""
+    beside = Path(sys.executable).with_name("uv")
+    found = shutil.which("uv") or (str(beside) if beside.exists() else None)
+    if found is None:
+        raise InputError(
+            "uv is not on the PATH: install it (pip install uv); it makes the environment needed"
+        )
+    return [found]
+
+
+def _run(command: list[str], what: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - fixed program
+    if done.returncode != 0:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1].strip()
+        raise InputError(f"cannot {what}: {last}")

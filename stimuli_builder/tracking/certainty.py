@@ -1,0 +1,121 @@
+"""How far off a fitted frame may be: stated from frames left out of training, the picture and a detector."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.tracking.accuracy import HeldOut
+from stimuli_builder.tracking.fit import Fit
+from stimuli_builder.tracking.model import CoupledModel, believing
+from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, eye_axis
+
+Values = NDArray[np.float64]
+
+DOUBTFUL_SHARE = 0.05
+"""A frame whose stated error is above this part of the eye's width is doubtful."""
+DIFFERING_SHARE = 0.06
+"""Mean distance of the lids from a detector's, as part of the eye's width, that makes a frame doubtful."""
+UNUSUAL_SD = 2.5
+"""Root mean square of the coupled parameters in standard deviations that no labelled frame reaches."""
+JUMP_SHARE = 0.35
+"""A canthus does not move by more of the eye's width from one frame to the next."""
+STEEPEST = 2.0
+
+
+def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values) -> CoupledModel:
+    """Give a model what its errors are stated from: labelled frames left out of training.
+
+    log(frame error) is regressed on log(residual / usual residual); the slope is kept between 0 and 2 and
+    shrunk as by ten more frames without a slope. A stated error is the root mean square on such frames.
+    """
+    seen = [one for one in held_out if one.residuals is not None and one.point_errors_px is not None]
+    if not seen:
+        return believing(model, limits)
+    residuals = np.array([one.residuals for one in seen])
+    usual = np.median(residuals, axis=0)
+    excess = np.log(np.maximum((residuals / usual).max(1), 1e-3))
+    error = np.log([max(one.rms_px or 0.0, 1e-3) for one in seen])
+    spread = float(((excess - excess.mean()) ** 2).sum())
+    slope = float(((excess - excess.mean()) * (error - error.mean())).sum()) / max(spread, 1e-9)
+    slope = float(np.clip(slope, 0, STEEPEST)) * len(seen) / (len(seen) + 10)
+    scale = np.maximum((residuals / usual).max(1), 1.0) ** slope
+    errors = np.array([one.point_errors_px for one in seen]) / scale[:, None]
+    return believing(model, limits, usual, np.sqrt((errors**2).mean(0)), slope)
+
+
+def stated_errors(model: CoupledModel, fit: Fit, difference_px: float | None) -> Values:
+    """Stated error of each landmark (points,) in pixels of the video; NaN for a model that knows none.
+
+    e_p = e0_p max(1, r / r0)^s, r / r0 the worse eye's residual over the usual one; a detector that differs
+    by d px in the mean raises it to sqrt(e_p^2 + (d - e)^2) where d is above the mean e of the e_p.
+    """
+    excess = float(np.max(fit.residuals / model.usual_residuals))
+    errors = model.point_errors * max(excess, 1.0) ** float(model.error_slope[0])
+    if difference_px is None:
+        return np.asarray(errors)
+    more = max(0.0, difference_px - float(np.sqrt((errors**2).mean())))
+    return np.asarray(np.sqrt(errors**2 + more**2))
+
+
+def doubt(
+    model: CoupledModel,
+    fit: Fit,
+    points: Points,
+    errors: Values,
+    difference: float | None,
+    before: Points | None,
+) -> str:
+    """Why a fit that passed may still be wrong, in words; empty if nothing speaks against it.
+
+    Parameters
+    ----------
+    difference : mean distance of the lids from a detector's, as part of the eye's width; None if not asked.
+    before : points of the frame before, where that was tracked.
+    """
+    width = widths(points)
+    if difference is not None and difference > DIFFERING_SHARE:
+        return f"model and detector differ by {difference:.0%} of the eye's width"
+    unusual = float(np.sqrt(np.mean((fit.c / np.maximum(model.sd, 1e-9)) ** 2)))
+    if unusual > UNUSUAL_SD:
+        return f"a shape unlike the labelled ones ({unusual:.1f} sd)"
+    if before is not None and jump(points, before) > JUMP_SHARE:
+        return "the eyes jump from one frame to the next"
+    rms = float(np.sqrt((errors**2).mean()))
+    if rms > DOUBTFUL_SHARE * width:
+        return f"the picture fits badly: stated error {rms:.1f} px is {rms / width:.0%} of the eye's width"
+    return ""
+
+
+def widths(points: Points) -> float:
+    """Mean width of the eyes, canthus to canthus, in pixels."""
+    eyes = points.reshape(-1, EYE_POINTS, 2)
+    return float(np.mean([eye_axis(eye)[2] for eye in eyes]))
+
+
+def jump(points: Points, before: Points) -> float:
+    """Greatest move of a canthus since the frame before, as part of the eye's width."""
+    canthi = [EYE_POINTS * eye + corner for eye in range(len(points) // EYE_POINTS) for corner in CANTHI]
+    return float(np.hypot(*(points[canthi] - before[canthi]).T).max() / max(widths(points), 1e-6))
+
+
+def lid_difference(points: Points, other: Points) -> float:
+    """Mean distance of the lid points from another's lid curves, the worse eye's, as part of its width.
+
+    Detectors place points differently along a lid, so only the distance from the curve counts.
+    """
+    worst = 0.0
+    for start in range(0, len(points), EYE_POINTS):
+        one, two = points[start : start + EYE_POINTS], other[start : start + EYE_POINTS]
+        away = np.concatenate([from_curve(one[1:5], two[:6]), from_curve(one[6:9], two[[5, 6, 7, 8, 0]])])
+        worst = max(worst, float(away.mean()) / max(eye_axis(two)[2], 1e-6))
+    return worst
+
+
+def from_curve(points: Points, curve: Points) -> Values:
+    """Distance of each point (n, 2) from a polyline (k, 2)."""
+    start, step = curve[:-1], np.diff(curve, axis=0)
+    length = np.maximum((step**2).sum(1), 1e-12)
+    share = np.clip(((points[:, None] - start) * step).sum(-1) / length, 0, 1)
+    nearest = start + share[..., None] * step
+    return np.asarray(np.sqrt(((points[:, None] - nearest) ** 2).sum(-1)).min(1))

@@ -1,0 +1,58 @@
+"""What a detector of eyes gives, whichever it is: lid contours as the tracker's points."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from stimuli_builder.tracking.shapes import Points
+from stimuli_builder.video import Picture
+
+UPPER_SHARES = (0.2, 0.4, 0.6, 0.8)
+LOWER_SHARES = (0.25, 0.5, 0.75)
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """The eyes of one face in one picture.
+
+    Attributes
+    ----------
+    points : (18, 2) or, for one eye, (9, 2) in pixels, in the order of label files.
+    iris : (eyes, 5, 2); centre and four points of each iris's edge.
+    faces : faces seen in the picture; the largest is the one given.
+    """
+
+    points: Points
+    iris: Points
+    faces: int
+
+
+class LidDetector(Protocol):
+    """Finds the eyes of a face in one picture, without a memory of the one before."""
+
+    eyes: int
+
+    def detect(self, picture: Picture) -> Detection | None:
+        """Return the eyes in an RGB picture (h, w, 3), or None where there are none."""
+
+
+def eye_points(upper: Points, lower: Points) -> Points:
+    """Nine points of an eye from its contours.
+
+    Parameters
+    ----------
+    upper, lower : (k, 2) contours from the outer canthus to the inner, and from the inner to the outer.
+    """
+    return np.concatenate(
+        [upper[:1], along(upper, UPPER_SHARES), upper[-1:], along(lower, LOWER_SHARES)], axis=0
+    )
+
+
+def along(curve: Points, shares: Sequence[float]) -> Points:
+    """Points of a polyline (k, 2) at shares of its length."""
+    steps = np.hypot(*np.diff(curve, axis=0).T)
+    place = np.concatenate([[0.0], np.cumsum(steps)])
+    wanted = np.array(shares) * place[-1]
+    return np.stack([np.interp(wanted, place, curve[:, axis]) for axis in (0, 1)], axis=1)

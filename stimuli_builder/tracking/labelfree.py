@@ -1,0 +1,154 @@
+"""A model without labels: a detector looks at frames across the video, the most varied ones train the AAM."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.tracking.bootstrap import most_varied
+from stimuli_builder.tracking.certainty import widths
+from stimuli_builder.tracking.detector.detection import LidDetector
+from stimuli_builder.tracking.detector.mesh import open_detector
+from stimuli_builder.tracking.labels import Labels
+from stimuli_builder.tracking.learn import Lesson, lesson_from
+from stimuli_builder.tracking.model import TrainingOptions
+from stimuli_builder.tracking.shapes import Points, default_markers, mean_shape, moved, similarity_between
+from stimuli_builder.video import Picture, VideoInfo, frames, rgb
+
+Values = NDArray[np.float64]
+
+LOOKED_AT = 400
+TRAINED_ON = 26
+ENOUGH_BY_HAND = 12
+FEWEST = 6
+LEAST_SEEN = 0.3
+"""Share of the frames looked at that must show a face: below it, what was found is hardly one."""
+MODES = 6
+SPREADS = 8.0
+UNLIKE_SHARE = 0.02
+"""A detection is left out where the others leave more of it than 8 spreads and 2% of the eye's width."""
+STEADY = 3.0
+"""Eyes' widths over the frames looked at stay within this factor, or they belong to no one face."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the detector saw.
+
+    Attributes
+    ----------
+    points : frame -> (9 * eyes, 2) points in pixels.
+    looked_at : frames looked at.
+    several_faces : frames among them with more than one face; the largest was taken.
+    """
+
+    points: dict[int, Points]
+    looked_at: int
+    several_faces: int
+
+
+def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | None = None) -> Survey:
+    """Detect eyes on up to 400 frames spread over a video.
+
+    Raises
+    ------
+    InputError
+        Too few frames show a face, or what was found is no face.
+    """
+    step = max(1, -(-info.frame_count // LOOKED_AT))
+    found: dict[int, Points] = {}
+    several = looked = 0
+    first = _first(info, step) if one_eye else ()
+    with open_detector(one_eye=one_eye, first=first) as detector:
+        for number, picture in enumerate(islice(frames(info.path, read=rgb), info.frame_count)):
+            if number % step:
+                continue
+            looked += 1
+            several += _look(detector, number, picture, info, found)
+            if advance is not None:
+                advance(number)
+    _require_face(info, found, looked, one_eye)
+    return Survey(found, looked, several)
+
+
+def _first(info: VideoInfo, step: int) -> list[Picture]:
+    """Pictures across the first minute or so, to find a close-up's eye in."""
+    every = max(step, 8)
+    return list(islice(frames(info.path, read=rgb), 0, min(info.frame_count, 40 * every), every))
+
+
+def _look(
+    detector: LidDetector, number: int, picture: Picture, info: VideoInfo, found: dict[int, Points]
+) -> bool:
+    """Add what one frame shows; return whether it shows several faces."""
+    seen = detector.detect(picture)
+    if seen is None:
+        return False
+    if (seen.points >= 0).all() and (seen.points <= np.array(info.size_px) - 1).all():
+        found[number] = seen.points
+    return seen.faces > 1
+
+
+def _require_face(info: VideoInfo, found: dict[int, Points], looked: int, one_eye: bool) -> None:
+    more = "" if one_eye else "; for a close-up of one eye add --one-eye"
+    if len(found) < max(FEWEST, LEAST_SEEN * looked):
+        raise InputError(
+            f"{info.path}: a face was found on {len(found)} of {looked} frames looked at, too few to track "
+            f"without labels{more}; or label frames by hand (--labels)"
+        )
+    wide = np.array([np.hypot(*(points[5] - points[0])) for points in found.values()])
+    low, high = np.percentile(wide, [5, 95])
+    if not one_eye and high > STEADY * max(low, 1e-6):
+        raise InputError(
+            f"{info.path}: what looks like eyes is {low:.0f} to {high:.0f} px wide over the frames looked "
+            f"at: no one face{more}; or label frames by hand (--labels)"
+        )
+
+
+def plausible(found: dict[int, Points]) -> dict[int, Points]:
+    """Leave out detections that the shapes of all the others (six components) explain badly."""
+    numbers = sorted(found)
+    shapes = np.array([found[n] for n in numbers])
+    mean = mean_shape(shapes)
+    rows = np.array([moved(shape, similarity_between(shape, mean)) for shape in shapes])
+    rows = rows.reshape(len(rows), -1)
+    rest = np.array([_unexplained(np.delete(rows, k, axis=0), rows[k]) for k in range(len(rows))])
+    limit = max(
+        float(np.median(rest) + SPREADS * 1.4826 * np.median(np.abs(rest - np.median(rest)))),
+        UNLIKE_SHARE * widths(mean),
+    )
+    return {n: found[n] for n, far in zip(numbers, rest, strict=True) if far <= limit}
+
+
+def _unexplained(others: Values, row: Values) -> float:
+    """Root mean square of what the first components of `others` (n, d) leave of `row` (d,)."""
+    mean = others.mean(0)
+    basis = np.linalg.svd(others - mean, full_matrices=False)[2][:MODES]
+    rest = (row - mean) - (row - mean) @ basis.T @ basis
+    return float(np.sqrt((rest**2).mean()))
+
+
+def label_free_lesson(
+    info: VideoInfo,
+    seen: Survey,
+    options: TrainingOptions,
+    *,
+    one_eye: bool,
+    by_hand: Labels | None = None,
+    refine: bool | None = None,
+) -> Lesson:
+    """Train the model on the most varied of the detections; frames labelled by hand win.
+
+    Twelve frames by hand or more train alone: a person and a detector mean slightly different points.
+    """
+    good = plausible(seen.points)
+    hand = {} if by_hand is None else by_hand.frames
+    room = max(0, TRAINED_ON - len(hand)) if len(hand) < ENOUGH_BY_HAND else 0
+    chosen = {n: good[n] for n in most_varied(good, min(room, len(good)))} if room else {}
+    markers = default_markers(1 if one_eye else 2) if by_hand is None else by_hand.markers
+    labels = Labels(Path("detections"), info.size_px, markers, dict(sorted((chosen | hand).items())))
+    return lesson_from(info, labels, options, refine=refine)
