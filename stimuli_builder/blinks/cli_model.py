@@ -24,6 +24,14 @@ ModelOption = Annotated[
 ]
 
 
+PcaOption = Annotated[
+    bool,
+    typer.Option(
+        "--pca", help="Draw from the components of the PCA model, as the paper does and Exp 1-3 are built."
+    ),
+]
+
+
 def register(app: typer.Typer) -> None:
     """Add `stimuli model` to `app`."""
     model = typer.Typer(help=MODEL_HELP, no_args_is_help=True)
@@ -68,12 +76,13 @@ def sample(
     seed: Annotated[int, typer.Option(help="Seed: the same seed gives the same blinks.", min=0)] = 1,
     full_closure: Annotated[bool, typer.Option("--full-closure", help="Stretch each to closure 1.")] = False,
     model: ModelOption = None,
+    pca: PcaOption = False,
     plot: Annotated[Path | None, typer.Option(help="The new blinks as a figure.")] = None,
 ) -> None:
-    """Make new blinks: coefficients drawn within one standard deviation, negative distances drawn again."""
+    """Make new blinks that close as recorded ones do, or by the PCA model (--pca, --model)."""
     from stimuli_builder.blinks.model_run import sample_blinks
 
-    sample_blinks(out, count, duration, seed, model, plot, full_closure=full_closure)
+    sample_blinks(out, count, duration, seed, model, plot, full_closure=full_closure, pca=pca)
 
 
 def textbook(
@@ -111,6 +120,7 @@ def export(
         Path | None, typer.Option(help="All profiles of a table instead of the model's.")
     ] = None,
     model: ModelOption = None,
+    pca: PcaOption = False,
     full_closure: Annotated[bool, typer.Option("--full-closure", help="Stretch each to closure 1.")] = False,
     lead_s: Annotated[float, typer.Option(help="Seconds open before the first and after the last.")] = 0.0,
     target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) that has the shapes.")] = "",
@@ -131,6 +141,7 @@ def export(
             profile_names=tuple(profile or ()),
             profiles=profiles,
             model=model,
+            pca=pca,
             full_closure=full_closure,
             lead_s=lead_s,
             target=target,

@@ -14,6 +14,7 @@ from stimuli_builder.blinks.blink_model import BlinkModel, default_model
 from stimuli_builder.blinks.export.curve import make_curve
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
 from stimuli_builder.blinks.library import load_library
+from stimuli_builder.blinks.phase_model import PhaseModel
 from stimuli_builder.blinks.plots import check_figure_name, model_figure, profiles_figure, save_figure
 from stimuli_builder.blinks.profile import BlinkProfile, resample, to_full_closure
 from stimuli_builder.blinks.profile_table import read_profile_table, write_profile_table
@@ -85,10 +86,11 @@ def sample_blinks(
     plot: Path | None,
     *,
     full_closure: bool,
+    pca: bool = False,
 ) -> None:
     """Draw blinks and write their table; see `stimuli model sample --help`."""
     _check_outputs(out, plot)
-    made = draw(_model(model_path), count, duration, seed, full_closure=full_closure)
+    made = draw(_model(model_path, pca), count, duration, seed, full_closure=full_closure)
     if plot is not None:
         shown = [replace(p, source=p.profile_id) for p in made[:8]]
         save_figure(profiles_figure(shown, f"{len(shown)} blinks made by the model, seed {seed}"), plot)
@@ -102,7 +104,12 @@ def sample_blinks(
 
 
 def draw(
-    model: BlinkModel, count: int, duration: float | None, seed: int, *, full_closure: bool = False
+    model: BlinkModel | PhaseModel,
+    count: int,
+    duration: float | None,
+    seed: int,
+    *,
+    full_closure: bool = False,
 ) -> list[BlinkProfile]:
     """Draw `count` blinks, the n-th from a generator of its own: a greater count keeps the first ones."""
     made = []
@@ -138,6 +145,7 @@ class ExportJob:
     profile_names: tuple[str, ...] = ()
     profiles: Path | None = None
     model: Path | None = None
+    pca: bool = False
     full_closure: bool = False
     lead_s: float = 0.0
     target: str = ""
@@ -178,14 +186,19 @@ def _export_profiles(job: ExportJob) -> list[BlinkProfile]:
     elif job.profiles is not None:
         chosen = read_profile_table(job.profiles)
     else:
-        return draw(_model(job.model), job.count, job.duration, job.seed, full_closure=job.full_closure)
+        return draw(
+            _model(job.model, job.pca), job.count, job.duration, job.seed, full_closure=job.full_closure
+        )
     if job.duration is not None:
         chosen = [resample(profile, job.duration) for profile in chosen]
     return [to_full_closure(profile) for profile in chosen] if job.full_closure else chosen
 
 
-def _model(path: Path | None) -> BlinkModel:
-    return default_model() if path is None else BlinkModel.load(path)
+def _model(path: Path | None, pca: bool) -> BlinkModel | PhaseModel:
+    """The PCA model asked for, or the phases of the shipped profiles of one eye."""
+    if path is not None:
+        return BlinkModel.load(path)
+    return default_model() if pca else PhaseModel.fit(training_profiles([], "each"))
 
 
 def _check_outputs(out: Path | None, plot: Path | None) -> None:
