@@ -114,7 +114,7 @@ def synthesise_command(
     with working("searching"):
         made = synthesise(plan, seed)
     rows = write_ratings(made, out)
-    _say_synthetic(made)
+    _say_synthetic(made, len(plan.published.invented_means))
     typer.echo(f"written: {out} ({rows} synthetic ratings of {len(made.sums)} synthetic participants)")
     if made.missed:
         raise typer.Exit(1)
@@ -135,13 +135,16 @@ def _say_power(result: "PowerResult", wanted: float) -> None:
     show_tables(Table("power", title, header, rows, 1))
 
 
-def _say_synthetic(made: "Synthetic") -> None:
+def _say_synthetic(made: "Synthetic", invented: int) -> None:
     from analysis.report.formats import wrap
 
     hit = sum(r.hit for r in made.reached)
     typer.echo(
         f"SYNTHETIC {made.experiment.name}, seed {made.seed}: {hit} of {len(made.reached)} figures reached"
     )
+    if invented:
+        said = f"- invented: {invented} means that the paper does not print; they only make whole data"
+        typer.echo("\n".join(wrap(said)))
     for given in made.given_way:
         typer.echo("\n".join(wrap(f"- {given}")))
     for missed in made.missed:

@@ -64,15 +64,20 @@ class ModelData:
 
 
 def model_data(
-    rows: pd.DataFrame, participant: str, item: str | Sequence[str], rating: str, within: Sequence[str]
+    rows: pd.DataFrame,
+    participant: str,
+    item: str | Sequence[str] | None,
+    rating: str,
+    within: Sequence[str],
 ) -> ModelData:
     """Code long rows, one a trial.
 
     `item` is the column that names what was rated (a clip, a blink); several columns together name it
-    where one is not unique (exemplars numbered afresh within a profile). Raises InputError for unknown
+    where one is not unique (exemplars numbered afresh within a profile); without it there is one code and
+    no item. Raises InputError for unknown
     columns, missing values, fewer than two participants, items or levels, and for cells that nobody rated.
     """
-    item_columns = [item] if isinstance(item, str) else list(item)
+    item_columns = [item] if isinstance(item, str) else list(item or ())
     for name in (participant, rating, *within, *item_columns):
         if name not in rows.columns:
             raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
@@ -85,10 +90,7 @@ def model_data(
     if np.ptp(values) == 0:
         raise InputError(f"every rating is {values[0]:g}; a model needs ratings that vary")
     who, people = _coded(rows[participant], "participants")
-    label = rows[item_columns[0]].astype(str)
-    for extra in item_columns[1:]:
-        label = label + "/" + rows[extra].astype(str)
-    what, items = _coded(label, "items")
+    what, items = _coded_items(rows, item_columns)
     coded = [_coded(rows[name], f"levels of '{name}'") for name in within]
     levels = tuple(names for _, names in coded)
     shape = tuple(len(names) for names in levels)
@@ -107,6 +109,15 @@ def _coded(column: "pd.Series[str]", what: str) -> tuple[Integers, tuple[str, ..
         raise InputError(f"expected at least two {what}, got {len(names)}")
     position = {name: i for i, name in enumerate(names)}
     return np.asarray(texts.map(position), dtype=np.int64), tuple(names)
+
+
+def _coded_items(rows: pd.DataFrame, columns: list[str]) -> tuple[Integers, tuple[str, ...]]:
+    if not columns:
+        return np.zeros(len(rows), np.int64), ()
+    label = rows[columns[0]].astype(str)
+    for extra in columns[1:]:
+        label = label + "/" + rows[extra].astype(str)
+    return _coded(label, "items")
 
 
 def _refuse_empty_cells(cell: Integers, within: Sequence[str], levels: Sequence[Sequence[str]]) -> None:

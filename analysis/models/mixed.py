@@ -20,6 +20,9 @@ Slopes = Literal["none", "main", "all", "correlated"]
 ZERO_THETA = 1e-4
 """A relative SD below this is tried at zero, its bound."""
 
+SINGULAR_THETA = 1e-4
+"""A standard deviation below this share of the residual's counts as zero."""
+
 START = 0.4
 """Relative standard deviation to start from."""
 
@@ -89,7 +92,7 @@ def fit_mixed(
     participant: str,
     rating: str,
     within: Sequence[str],
-    item: str | Sequence[str],
+    item: str | Sequence[str] | None = None,
     slopes: Slopes = "all",
 ) -> MixedResult:
     """Fit rating ~ full factorial of `within` with crossed random participants and items by REML.
@@ -97,7 +100,8 @@ def fit_mixed(
     Parameters
     ----------
     rows : one row a trial.
-    item : the column (or columns, together) that names what was rated.
+    item : the column (or columns, together) that names what was rated; None for a model of participants
+        alone, which generalises to no other clips.
     slopes : by-participant slopes. `all`: one variance for every effect, so that each test has its own error
         term; `main`: main effects only; `correlated`: intercept and main-effect slopes with all correlations
         (lme4's `(1 + A + B | participant)`); `none`: intercepts only, anti-conservative if people differ.
@@ -120,7 +124,7 @@ def fit_mixed(
             f"expected more than {x.shape[1] + len(patterns) + 2} ratings, got {len(data.rating)}"
         )
     c = cross_products(x, z, data.rating, data.participant, data.item, patterns)
-    theta = _fit_theta(c, _bounded(patterns))
+    theta = _fit_theta(c, _bounded(patterns, bool(data.items)))
     return _result(data, c, theta, labels, slopes, tuple(notes), participant, item, rating)
 
 
@@ -151,9 +155,12 @@ def _patterns(data: ModelData, groups: list[str], slopes: Slopes) -> tuple[Float
     return patterns, of_column
 
 
-def _bounded(patterns: Floats) -> list[bool]:
-    """Which theta cannot be negative: those on the diagonal, and the items' own."""
-    return [bool(np.trace(pattern) > 0) for pattern in patterns] + [True]
+def _bounded(patterns: Floats, with_items: bool) -> list[bool]:
+    """Which theta cannot be negative: those on the diagonal, and the items' own.
+
+    Without items their theta starts at zero, where its gradient is zero, and so never leaves it.
+    """
+    return [bool(np.trace(pattern) > 0) for pattern in patterns] + [with_items]
 
 
 def _fit_theta(c: CrossProducts, bounded: list[bool]) -> Floats:
@@ -246,19 +253,20 @@ def _result(
     slopes: Slopes,
     notes: tuple[str, ...],
     participant: str,
-    item: str | Sequence[str],
+    item: str | Sequence[str] | None,
     rating: str,
 ) -> MixedResult:
     at, spread = criterion(c, theta), uncertainty(c, theta)
     effects = tuple(
         MixedEffect(effect, *f_test(at.beta, spread, data.differences(effect))) for effect in data.effects
     )
-    item_name = item if isinstance(item, str) else "/".join(item)
+    item_name = item if isinstance(item, str) else "/".join(item or ())
     factor = np.tensordot(theta[:-1], c.patterns, 1)
     components = (*_components(participant, labels, factor, at.sigma, slopes, data),)
-    components += (Component(item_name, "intercept", at.sigma * float(theta[-1])),)
+    if data.items:
+        components += (Component(item_name, "intercept", at.sigma * float(theta[-1])),)
+    degenerate = _degenerate(components, factor, at.sigma)
     components += (Component("residual", "", at.sigma),)
-    singular = bool(np.linalg.svd(factor, compute_uv=False).min() < 1e-4 or theta[-1] < 1e-4)
     return MixedResult(
         formula=_formula(data, rating, participant, item_name, labels, slopes),
         slopes=slopes,
@@ -271,10 +279,23 @@ def _result(
         n_ratings=c.n,
         n_participants=len(data.participants),
         n_items=len(data.items),
-        singular=singular,
-        notes=notes,
+        singular=bool(degenerate),
+        notes=(*notes, *degenerate),
         factors=data.factors,
     )
+
+
+def _degenerate(components: tuple[Component, ...], factor: Floats, sigma: float) -> tuple[str, ...]:
+    """What a singular fit says: which variances are zero, or that random terms depend on one another."""
+    zero = [f"{c.group} {c.term}" for c in components if c.sd < SINGULAR_THETA * sigma]
+    if zero:
+        return (
+            f"singular fit: the variance of {', '.join(zero)} is estimated as zero; these terms are kept at "
+            "zero, which leaves the tests of other effects as they are",
+        )
+    if np.linalg.svd(factor, compute_uv=False).min() < SINGULAR_THETA:
+        return ("singular fit: the random terms of participants depend on one another (a correlation of 1)",)
+    return ()
 
 
 def _formula(
@@ -282,7 +303,8 @@ def _formula(
 ) -> str:
     terms = list(dict.fromkeys("1" if label == "intercept" else label for label in labels))
     bar = "|" if slopes == "correlated" else "||"
-    return f"{rating} ~ {' * '.join(data.factors)} + ({' + '.join(terms)} {bar} {participant}) + (1 | {item})"
+    items = f" + (1 | {item})" if data.items else ""
+    return f"{rating} ~ {' * '.join(data.factors)} + ({' + '.join(terms)} {bar} {participant}){items}"
 
 
 def _components(
@@ -296,9 +318,19 @@ def _components(
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(sds, sds)
     return [
-        Component(participant, label, float(sds[i]), tuple(float(r) for r in correlation[i, :i]))
-        for i, label in enumerate(labels)
+        Component(participant, name, float(sds[i]), tuple(float(r) for r in correlation[i, :i]))
+        for i, name in enumerate(_told_apart(labels))
     ]
+
+
+def _told_apart(labels: Sequence[str]) -> list[str]:
+    """Labels of a factor's several contrasts numbered from 1; others as they are."""
+    seen: dict[str, int] = {}
+    names = []
+    for label in labels:
+        seen[label] = seen.get(label, 0) + 1
+        names.append(f"{label} contrast {seen[label]}" if labels.count(label) > 1 else label)
+    return names
 
 
 def _coefficients(data: ModelData, beta: Floats, spread: Uncertainty) -> list[Coefficient]:

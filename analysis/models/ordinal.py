@@ -66,7 +66,7 @@ def fit_ordinal(
     participant: str,
     rating: str,
     within: Sequence[str],
-    item: str | Sequence[str],
+    item: str | Sequence[str] | None = None,
 ) -> OrdinalResult:
     """Fit ordered ratings ~ full factorial of `within` with crossed random intercepts (Laplace).
 
@@ -89,10 +89,10 @@ def fit_ordinal(
         data.item,
         len(categories),
         len(data.participants),
-        len(data.items),
+        max(1, len(data.items)),
     )
     likelihood = LaplaceLikelihood(ordinal)
-    packed, notes = _maximise(likelihood, _start(ordinal))
+    packed, notes = _maximise(likelihood, _start(ordinal), bool(data.items))
     value, _ = likelihood.evaluate(_unpack(packed, ordinal))
     covariance = _covariance(likelihood, packed)
     return _result(data, ordinal, packed, value, covariance, categories, notes, (participant, item, rating))
@@ -121,15 +121,20 @@ def _packed_gradient(gradient: Parameters, packed: Floats, d: OrdinalData) -> Fl
     return np.concatenate([later[:1], later[1:] * np.exp(packed[1:k]), gradient.beta, gradient.log_sd])
 
 
-def _maximise(likelihood: LaplaceLikelihood, start: Floats) -> tuple[Floats, tuple[str, ...]]:
+def _maximise(
+    likelihood: LaplaceLikelihood, start: Floats, with_items: bool
+) -> tuple[Floats, tuple[str, ...]]:
+    """Maximise the likelihood; without items their SD is held at its lower bound, which counts as zero."""
     d = likelihood.data
+    start = start if with_items else np.append(start[:-1], LOG_SD_BOUNDS[0])
 
     def objective(packed: Floats) -> tuple[float, Floats]:
         value, gradient = likelihood.evaluate(_unpack(packed, d))
         return -value, -_packed_gradient(gradient, packed, d)
 
     bounds: list[tuple[float | None, float | None]] = [(None, None)] + [(-12.0, 5.0)] * (d.n_categories - 2)
-    bounds += [(None, None)] * d.x.shape[1] + [LOG_SD_BOUNDS] * 2
+    bounds += [(None, None)] * d.x.shape[1] + [LOG_SD_BOUNDS]
+    bounds.append(LOG_SD_BOUNDS if with_items else (LOG_SD_BOUNDS[0], LOG_SD_BOUNDS[0]))
     found = optimize.minimize(
         objective,
         start,
@@ -139,7 +144,7 @@ def _maximise(likelihood: LaplaceLikelihood, start: Floats) -> tuple[Floats, tup
         options={"maxiter": 2000, "maxfun": 4000, "ftol": 1e-13, "gtol": 1e-5, "maxcor": 30},
     )
     notes = [] if found.success else [f"the optimiser stopped early: {found.message}"]
-    for name, value in zip(("participants", "items"), found.x[-2:], strict=True):
+    for name, value in zip(("participants", "items")[: 1 + with_items], found.x[-2:], strict=False):
         if value < LOG_SD_BOUNDS[0] / 2:
             notes.append(f"the SD of {name} is estimated as zero")
     return np.asarray(found.x, dtype=np.float64), tuple(notes)
@@ -174,7 +179,7 @@ def _result(
     covariance: Floats,
     categories: Floats,
     notes: tuple[str, ...],
-    names: tuple[str, str | Sequence[str], str],
+    names: tuple[str, str | Sequence[str] | None, str],
 ) -> OrdinalResult:
     p, first = _unpack(packed, d), d.n_categories - 1
     block = covariance[first:-2, first:-2]
@@ -189,17 +194,17 @@ def _result(
         chi2 = float(p.beta[columns] @ np.linalg.solve(block[np.ix_(columns, columns)], p.beta[columns]))
         effects.append(OrdinalEffect(effect, chi2, len(columns), float(stats.chi2.sf(chi2, len(columns)))))
     participant, item, rating = names
-    item_name = item if isinstance(item, str) else "/".join(item)
+    items = f" + (1 | {item if isinstance(item, str) else '/'.join(item or ())})" if data.items else ""
     return OrdinalResult(
-        formula=f"{rating} ~ {' * '.join(data.factors)} + (1 | {participant}) + (1 | {item_name}), logit",
+        formula=f"{rating} ~ {' * '.join(data.factors)} + (1 | {participant}){items}, logit",
         log_likelihood=value,
-        aic=2 * len(packed) - 2 * value,
+        aic=2 * (len(packed) - (not data.items)) - 2 * value,
         categories=tuple(float(c) for c in categories),
         thresholds=tuple(float(t) for t in p.thresholds),
         coefficients=coefficients,
         effects=tuple(effects),
         sd_participant=float(np.exp(p.log_sd[0])),
-        sd_item=float(np.exp(p.log_sd[1])),
+        sd_item=float(np.exp(p.log_sd[1])) if data.items else 0.0,
         n_ratings=len(data.rating),
         n_participants=len(data.participants),
         n_items=len(data.items),

@@ -8,7 +8,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.text_table import TextTable, name_lines, numbers, read_text_table, texts_required
+from analysis.read.text_table import (
+    TextTable,
+    name_lines,
+    numbers,
+    read_text_table,
+    texts_required,
+    unusual_numbers,
+)
 from experiments.errors import InputError
 
 
@@ -62,6 +69,7 @@ def read_long_table(
         texts_required(table, name)
     values = numbers(table, rating)
     refuse_out_of_scale(table, rating, values, scale)
+    unusual_numbers(table, rating, values)
     keep = ~np.isnan(values)
     if not keep.all():
         table.decisions.append(f"{(~keep).sum()} rows without a rating left out ({name_lines(table, ~keep)})")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.read.text_table import numbers, read_text_table, texts_required
+from analysis.read.text_table import TextTable, numbers, read_text_table, texts_required, unusual_numbers
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
 
@@ -32,7 +32,13 @@ def read_model_input(
 
     Of an export (it has the column `kind`) only main trials count, without failed plays and runs excluded by
     hand; its factor columns are the default of `within`, its `profile_id` (the blink shown) that of `item`.
-    Raises InputError for unknown columns, ratings that are no numbers, or where defaults are lacking.
+    Other tables may have no item.
+
+    Raises
+    ------
+    InputError
+        Unknown columns, a column in two roles, items that are the participants under another name, ratings
+        that are no numbers, or no factor.
     """
     header = read_text_table(path, [participant, rating]).header
     exported = "kind" in header and "profile_id" in header
@@ -42,12 +48,13 @@ def read_model_input(
         item = ["profile_id"]
     if not within:
         raise InputError("--within names no column; expected e.g. --within face,blur")
-    if not item:
-        raise InputError("--item names no column; expected the column of clips, e.g. --item clip")
+    _refuse_shared_roles(participant, rating, within, item)
     table = read_text_table(path, [participant, rating, *within, *item], EXPORT_COLUMNS)
     for name in (participant, *within, *item):
         texts_required(table, name)
     values = numbers(table, rating)
+    unusual_numbers(table, rating, values)
+    _refuse_participants_as_items(table, participant, item)
     rows = table.columns.assign(**{rating: values})
     keep = ~np.isnan(values)
     decisions = list(table.decisions)
@@ -69,3 +76,29 @@ def read_model_input(
     return ModelInput(
         rows[keep].reset_index(drop=True), tuple(within), tuple(item), tuple(decisions), synthetic
     )
+
+
+def _refuse_shared_roles(participant: str, rating: str, within: Sequence[str], item: Sequence[str]) -> None:
+    if list(item) == [participant]:
+        raise InputError(
+            f"'{participant}' is named as participant and as item; name the column of clips, or leave "
+            "--item out"
+        )
+    names = [participant, rating, *within]
+    for name in names:
+        if names.count(name) > 1 or (name in item and name != participant and name == rating):
+            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+
+
+def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequence[str]) -> None:
+    """Items that each belong to one participant, one each, are the participants themselves."""
+    if not item:
+        return
+    pairs = table.columns[[participant, *item]].drop_duplicates()
+    what = pairs[list(item)].astype(str).agg("/".join, axis=1)
+    who = pairs[participant].astype(str)
+    if len(pairs) > 1 and len(pairs) == who.nunique() == what.nunique():
+        raise InputError(
+            f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one: "
+            "these are the participants again; name the column of clips, or leave --item out"
+        )

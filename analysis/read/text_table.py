@@ -19,6 +19,8 @@ MISSING_MARKS = frozenset({"", "NA", "NaN", "nan", "N/A", "n/a", "."})
 """What counts as 'no rating here' in a rating column; never applied to names of people or levels."""
 
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_DECIMAL_POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+")
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 NAMED_ROWS = 5
 
 
@@ -147,11 +149,49 @@ def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
     """Parse a column of numbers; decimal commas are read (and reported), missing marks become NaN."""
     categories = list(table.columns[name].cat.categories)
     commas = [text for text in categories if _DECIMAL_COMMA.fullmatch(text)]
+    _refuse_two_readings(table, name, categories, commas)
     values = np.array([_number(table, name, text) for text in [*categories, ""]])
     if commas:
         table.decisions.append(f"decimal commas in '{name}' (e.g. '{commas[0]}') read as decimal points")
     parsed: NDArray[np.float64] = values[table.columns[name].cat.codes.to_numpy().astype(np.int64)]
     return parsed
+
+
+def _refuse_two_readings(table: TextTable, name: str, categories: list[str], commas: list[str]) -> None:
+    """Refuse a column in which a comma may part thousands as well as decimals, with both readings."""
+    thousands = [text for text in commas if _THOUSANDS.fullmatch(text)]
+    points = [text for text in categories if _DECIMAL_POINT.fullmatch(text)]
+    if not thousands or (len(thousands) < len(commas) and not points):
+        return
+    text, beside = thousands[0], next((t for t in points or categories if t and t not in commas), "")
+    decimal, whole = text.replace(",", "."), text.replace(",", "")
+    row = int(np.argmax((table.columns[name] == text).to_numpy()))
+    raise InputError(
+        f"{table.source}: '{text}' of '{name}' in line {table.line(row)} can be read as {decimal} or as "
+        f"{whole}{f' (beside it stands {beside})' if beside else ''}; write decimals with a point and "
+        "thousands without a mark"
+    )
+
+
+def unusual_numbers(table: TextTable, name: str, values: NDArray[np.float64]) -> None:
+    """Say it where a few whole-number ratings lie far outside all others: typing errors, codes for missing.
+
+    Far: beyond the others by more than their whole range, where the others span at most 11 points and the
+    few are no more than one in twenty.
+    """
+    given = values[~np.isnan(values)]
+    if len(given) < 20 or (given != np.round(given)).any():
+        return
+    low, high = np.quantile(given, [0.05, 0.95], method="nearest")
+    width = high - low
+    far = ~np.isnan(values) & ((values > high + width + 1) | (values < low - width - 1))
+    if 0 < width <= 10 and far.any() and far.sum() <= len(given) / 20:
+        named = ", ".join(f"{value:g}" for value in sorted(set(values[far])))
+        inside = given[(given <= high + width + 1) & (given >= low - width - 1)]
+        table.decisions.append(
+            f"'{name}' holds {named} ({name_lines(table, far)}), far from the others ({inside.min():g} to "
+            f"{inside.max():g}); they count: correct them, leave them empty, or refuse them with --scale"
+        )
 
 
 def _number(table: TextTable, name: str, text: str) -> float:

@@ -44,13 +44,12 @@ def ordinal_coefficients_table(result: OrdinalResult, name: str, synthetic: bool
 
 def mixed_text(result: MixedResult) -> str:
     """What was fitted, in words."""
+    of_items = f"of {result.n_items} items " if result.n_items else ""
     said = [
         f"{result.formula}, fitted by REML (criterion {result.reml_criterion:.2f}) to {result.n_ratings} "
-        f"ratings of {result.n_items} items by {result.n_participants} participants. Type III tests with "
+        f"ratings {of_items}by {result.n_participants} participants. Type III tests with "
         "Satterthwaite's degrees of freedom."
     ]
-    if result.singular:
-        said.append("Some variances are estimated as zero.")
     return " ".join([*said, *(f"{note}." for note in result.notes)])
 
 

@@ -27,6 +27,9 @@ from experiments.trials.clip_rating.declaration import clip_rating_of
 ATTEMPTS = 40
 """Fresh draws of participants before the best is kept and what it misses is reported."""
 
+WISHED_ATTEMPTS = 6
+"""The same for another number of participants or other figures than published: they may have no solution."""
+
 
 @dataclass(frozen=True)
 class Reached:
@@ -72,6 +75,7 @@ class Plan:
     published: Published
     targets: Targets
     given_way: tuple[GivenWay, ...]
+    as_published: bool = True
 
 
 def make_plan(
@@ -88,7 +92,9 @@ def make_plan(
     if people != experiment.participants:
         published = _without_p(published)
     published, given_way = make_feasible(with_wishes(published, space, means, effects), space)
-    return Plan(experiment, space, published, make_targets(published, space, people), given_way)
+    as_published = people == experiment.participants and not means and not effects
+    targets = make_targets(published, space, people)
+    return Plan(experiment, space, published, targets, given_way, as_published)
 
 
 def _without_p(published: Published) -> Published:
@@ -103,7 +109,7 @@ def population_of(plan: Plan, rng: np.random.Generator) -> Population:
 
 
 def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | None = None) -> Synthetic:
-    """Draw participants and mend them until every figure holds; the best of ATTEMPTS draws where none does.
+    """Draw participants and mend them until every figure holds; the best of some draws where none does.
 
     `progress` gets (figures missed, rounds done).
     """
@@ -113,7 +119,8 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     scale = (declared.minimum, declared.maximum)
     found: list[Repaired] = []
     rounds = 0
-    while len(found) < ATTEMPTS and not any(not f.missed for f in found):
+    attempts = ATTEMPTS if plan.as_published else WISHED_ATTEMPTS
+    while len(found) < attempts and not any(not f.missed for f in found):
         start = draw(population_of(plan, rng), plan.targets.n, rng, exact=True)
         found.append(repair(start, trials, scale, plan.targets, rng, _onward(progress, rounds)))
         rounds += found[-1].steps

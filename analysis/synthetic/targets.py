@@ -92,7 +92,7 @@ def make_targets(published: Published, space: DesignSpace, n: int) -> Targets:
         factor = np.sqrt(n) if s.kind == "se" else 1.0
         low, high, half = (float(v * factor) for v in narrowed(s.printed))
         spreads.append(
-            SpreadTarget(f"{s.kind.upper()} {place_name(s.at)}", space.weights(s.at), low, high, half)
+            SpreadTarget(f"participants' SD at {place_name(s.at)}", space.weights(s.at), low, high, half)
         )
     tests = tuple(test_target(t, space, n) for t in published.tests)
     pairs = tuple(target for p in published.pairs for target in _pair_targets(p, space, n))

@@ -57,7 +57,7 @@ def test_mixed_of_anyones_table(call):
     [
         (("mixed", "absent.csv"), "absent.csv"),
         (("mixed", "table.csv", "--rating", "rating"), "--within names no column"),
-        (("mixed", "table.csv", "--rating", "rating", "--within", "A"), "--item names no column"),
+        (("mixed", "table.csv", "--rating", "rating", "--within", "A", "--item", "participant"), "as item"),
         (("mixed", "table.csv", "--rating", "ratings", "--within", "A"), "did you mean 'rating'"),
         (("ordinal", "table.csv", "--rating", "rating", "--within", "A,Q", "--item", "clip"), "'Q'"),
         (("synthesise", "exp3", "--out", "no/such/folder.csv"), "does not exist"),

@@ -1,0 +1,73 @@
+"""Numbers that can be read two ways are refused with both readings; far-off ratings are named."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis.read.long_csv import read_long_table
+from analysis.read.model_csv import read_model_input
+from experiments.errors import InputError
+
+
+def file_of(tmp_path: Path, ratings: list[str]) -> Path:
+    path = tmp_path / "t.csv"
+    rows = [f'{i // 2},{"ab"[i % 2]},"{rating}"' for i, rating in enumerate(ratings)]
+    path.write_text("\n".join(["id,a,y", *rows]), encoding="utf-8")
+    return path
+
+
+def read(path: Path):
+    return read_long_table(path, "id", "y", ["a"])
+
+
+@pytest.mark.parametrize(
+    ("ratings", "beside"),
+    [(["1,003", "950"], "950"), (["1,003", "2,500"], ""), (["1,003", "950.5"], "950.5")],
+)
+def test_a_comma_that_may_part_thousands_is_refused_with_both_readings(tmp_path, ratings, beside) -> None:
+    with pytest.raises(InputError) as caught:
+        read(file_of(tmp_path, ratings))
+    said = str(caught.value)
+    assert "'1,003' of 'y' in line 2 can be read as 1.003 or as 1003" in said
+    assert (f"beside it stands {beside}" in said) == bool(beside)
+
+
+@pytest.mark.parametrize(
+    ("ratings", "values"),
+    [
+        (["1,003", "2,5"], [1.003, 2.5]),
+        (["0,125", "3"], [0.125, 3]),
+        (["0,125", "3,250"], [0.125, 3.25]),
+        (["1,0035", "3,250"], [1.0035, 3.25]),
+    ],
+)
+def test_a_column_that_shows_its_decimal_comma_is_read(tmp_path, ratings, values) -> None:
+    assert read(file_of(tmp_path, ratings)).rows["y"].tolist() == values
+
+
+def test_a_rating_far_from_the_others_is_named(tmp_path) -> None:
+    ratings = [str(1 + i % 7) for i in range(60)]
+    assert not read(file_of(tmp_path, ratings)).decisions
+    (said,) = read(file_of(tmp_path, [*ratings, "77", "3"])).decisions
+    assert "'y' holds 77 (line 62), far from the others (1 to 7)" in said
+
+
+def test_numbers_that_are_no_scale_are_left_alone(tmp_path) -> None:
+    reaction_times = [str(300 + 17 * (i % 23)) for i in range(60)]
+    assert not read(file_of(tmp_path, [*reaction_times, "2900"])).decisions
+
+
+@pytest.mark.parametrize(
+    ("item", "message"),
+    [
+        (["id"], "named as participant and as item"),
+        (["person"], "the participants again"),
+        (["y"], "two roles"),
+    ],
+)
+def test_the_participant_is_no_item(tmp_path, item, message) -> None:
+    path = tmp_path / "t.csv"
+    rows = [f"{i // 4},x{i // 4},{'ab'[i % 2]},{i % 5}" for i in range(24)]
+    path.write_text("\n".join(["id,person,a,y", *rows]))
+    with pytest.raises(InputError, match=message):
+        read_model_input(path, "id", "y", ["a"], item)
