@@ -27,6 +27,10 @@ Examples:
 
   stimuli blinks track.csv --out blinks.csv --plot series.png --plot-aligned aligned.png
 
+  stimuli blinks track.csv --out blinks.csv --report report.html --lids lids.csv --scale inter-ocular
+
+  stimuli blinks track.csv --out blinks.csv --curve take.usda --curve-format usd
+
   stimuli blinks track.csv --out blinks.csv --review review.csv --reject "left_distance_px:3=talking"
 """
 
@@ -85,6 +89,25 @@ def blinks(
         bool, typer.Option("--resample", help="Bring uneven times (time_s) to an even rate first.")
     ] = False,
     summary: Annotated[Path | None, typer.Option(help="Summary to write (JSON).")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Page to write (HTML): rates, phases, speeds, both eyes, quality, curves."),
+    ] = None,
+    lids: Annotated[
+        Path | None, typer.Option(help="Every frame's closure, and mm and degrees with --scale (CSV).")
+    ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(
+            help="mm in a pixel (of a card in the picture), 'inter-ocular' (60 mm) or 'eye-width' (28.2 mm)."
+        ),
+    ] = None,
+    curve: Annotated[
+        Path | None, typer.Option(help="The recording itself as an animation curve, looking down included.")
+    ] = None,
+    curve_format: Annotated[
+        str, typer.Option(help="Format of --curve, as of 'stimuli model export --format'.")
+    ] = "csv",
     plot: Annotated[
         Path | None, typer.Option(help="The labelled series as a figure (PNG, SVG, PDF).")
     ] = None,
@@ -100,6 +123,7 @@ def blinks(
     accept: Annotated[list[str] | None, typer.Option(help="N, N=reason or COLUMN:N; needs --review.")] = None,
 ) -> None:
     """Label, measure, review, write."""
+    from stimuli_builder.blinks.outputs import MoreOutputs
     from stimuli_builder.blinks.run import BlinksJob, run_blinks
 
     run_blinks(
@@ -116,6 +140,7 @@ def blinks(
             classify=preset == CLASSIFIER,
             events=events or out.with_name(f"{out.stem}.events.csv"),
             resample=resample,
+            more=MoreOutputs(report, lids, scale, curve, curve_format),
             summary=summary,
             plot=plot,
             plot_aligned=plot_aligned,

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from experiments.errors import InputError, did_you_mean
 from stimuli_builder.blinks.blink_model import BlinkModel
@@ -101,6 +102,24 @@ def _series_row(
             fontsize=7,
             color=colour,
         )
+
+
+def sequence_figure(blinks: pd.DataFrame) -> "Figure":
+    """Main sequence: peak closing and opening speed over amplitude, and closure over duration."""
+    figure = _figure(12, 4)
+    left, right = figure.subplots(1, 2)
+    for place, (column, part) in enumerate(blinks.groupby("column", sort=False)):
+        colour = (BLUE, AMBER, GREEN, GREY)[place % 4]
+        left.scatter(part["amplitude"], part["peak_closing_velocity"], 18, colour, label=f"{column}, closing")
+        left.scatter(
+            part["amplitude"], part["peak_opening_velocity"], 18, "none", edgecolors=colour,
+            label=f"{column}, opening",
+        )  # fmt: skip
+        right.scatter(part["duration_ms"], part["closure"], 18, colour, label=str(column))
+    _tidy(left, "amplitude", "peak speed (a second)")
+    _tidy(right, "duration (ms)", "greatest closure")
+    left.legend(frameon=False, fontsize=9)
+    return figure
 
 
 def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":

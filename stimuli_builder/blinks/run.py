@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from stimuli_builder.blinks.extract import (
     require_blinks,
 )
 from stimuli_builder.blinks.label_options import LabelOptions
+from stimuli_builder.blinks.outputs import MoreOutputs
 from stimuli_builder.blinks.profile import BlinkProfile
 from stimuli_builder.blinks.profile_table import write_profile_table
 from stimuli_builder.blinks.review import (
@@ -56,6 +57,7 @@ class BlinksJob:
     classify: bool = True
     events: Path | None = None
     resample: bool = False
+    more: MoreOutputs = field(default_factory=MoreOutputs)
     summary: Path | None = None
     plot: Path | None = None
     plot_aligned: Path | None = None
@@ -81,12 +83,15 @@ def run_blinks(job: BlinksJob) -> None:
         summarise(eye, frame, [p for p in profiles if p.eye == name and _is_of(p, eye)])
         for eye, name in zip(accepted, names, strict=True)
     ]
+    more = job.more.prepared(job.series, eyes, frame)
     _write_figures(job, eyes, decided, profiles)
     write_profile_table(job.profiles, profiles)
     if job.summary is not None:
         write_summary(job.summary, summaries)
     if job.review is not None and (job.reject or job.accept):
         write_reviews(job.review, reviews)
+    for write in more:
+        write()
     if job.events is not None and job.classify:
         write_events(job.events, eyes)
     write_blinks(job.out, frame)
@@ -127,8 +132,18 @@ def _check(job: BlinksJob) -> None:
     for figure in (job.plot, job.plot_aligned):
         if figure is not None:
             check_figure_name(figure)
+    job.more.check()
     events = job.events if job.classify else None
-    outputs = [job.out, job.profiles, events, job.summary, job.plot, job.plot_aligned, job.review]
+    outputs = [
+        job.out,
+        job.profiles,
+        events,
+        *job.more.paths,
+        job.summary,
+        job.plot,
+        job.plot_aligned,
+        job.review,
+    ]
     check_targets(outputs, [job.series])
 
 
@@ -227,7 +242,7 @@ def _report(
             f"the review names a blink at frame {review.minimum_frame} of {review.column}: none is there"
         )
     events = job.events if job.classify else None
-    written = [job.out, job.profiles, events, job.summary, job.plot, job.plot_aligned]
+    written = [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, job.plot_aligned]
     console.print(
         f"{len(frame)} blinks; wrote " + ", ".join(str(path) for path in written if path is not None)
     )

@@ -1,0 +1,177 @@
+"""The report of a recording's blinks as one page: rates, phases, speeds, both eyes, quality, figures."""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from stimuli_builder.blinks.extract import EyeBlinks
+from stimuli_builder.blinks.plots import sequence_figure, series_figure
+from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.units import Scale, closure_course
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NEARLY_CLOSED = 0.8
+"""Closure from which time counts into the closure ratio (PERCLOS: 80% closed)."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a table: what it is, and a value an eye."""
+
+    name: str
+    values: tuple[str, ...]
+
+
+def report_text(
+    source: Path,
+    eyes: Sequence[EyeBlinks],
+    frame: pd.DataFrame,
+    scale: Scale | None,
+    doubts: Sequence[str],
+) -> str:
+    """Return the page (HTML); it needs nothing from elsewhere.
+
+    Parameters
+    ----------
+    frame : the blinks table, reviewed.
+    doubts : lines about the recording's quality beside those that are counted here.
+    """
+    accepted = frame[frame["accepted"]]
+    environment = Environment(
+        loader=PackageLoader("stimuli_builder.blinks", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+    )
+    return environment.get_template("report.html.j2").render(
+        source=source.name,
+        columns=[eye.series.column for eye in eyes],
+        blinks=blink_rows(eyes, accepted, scale),
+        quality=quality_rows(eyes),
+        pairs=pair_lines(accepted),
+        doubts=list(doubts),
+        scale=None if scale is None else f"{scale.mm_per_px:.4f} mm in a pixel: {scale.rule}",
+        nearly_closed=f"{NEARLY_CLOSED:.0%}",
+        figures=[_svg(series_figure(eyes, _rejected(frame))), _svg(sequence_figure(accepted))],
+    )
+
+
+def _rejected(frame: pd.DataFrame) -> set[tuple[str, int]]:
+    rows = frame[~frame["accepted"]]
+    return {(str(column), int(number)) for column, number in zip(rows["column"], rows["number"], strict=True)}
+
+
+def blink_rows(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame, scale: Scale | None) -> list[Row]:
+    """Lines of the table of blinks, a value an eye; medians with the quartiles."""
+    parts = [accepted[accepted["column"] == eye.series.column] for eye in eyes]
+    minutes = [(e.series.distance.size - e.series.missing_frames) / e.series.fps / 60 for e in eyes]
+    unit = "px" if eyes[0].series.is_px else "units"
+    factor = 1.0
+    if scale is not None:
+        unit, factor = "mm", scale.mm_per_px
+
+    def spread(name: str, digits: int = 0, by: float = 1.0) -> tuple[str, ...]:
+        return tuple(_quartiles(part[name] * by, digits) for part in parts)
+
+    closed = [(part["closed_to_s"] - part["closed_from_s"]) * 1000 for part in parts]
+    pauses = [pd.Series(np.diff(np.sort(part["minimum_s"]))) for part in parts]
+    return [
+        Row("blinks", tuple(str(len(part)) for part in parts)),
+        Row("blinks a minute", tuple(f"{len(p) / m:.1f}" for p, m in zip(parts, minutes, strict=True))),
+        Row("complete / partial", tuple(_complete(part) for part in parts)),
+        Row("duration, ms", spread("duration_ms")),
+        Row("closing, ms", spread("down_ms")),
+        Row("closed phase, ms", tuple(_quartiles(part) for part in closed)),
+        Row("opening, ms", spread("up_ms")),
+        Row("greatest closure", spread("closure", 2)),
+        Row(f"amplitude, {unit}", spread("amplitude", 2, factor)),
+        Row(f"peak closing speed, {unit}/s", spread("peak_closing_velocity", 1, factor)),
+        Row(f"peak opening speed, {unit}/s", spread("peak_opening_velocity", 1, factor)),
+        Row(
+            "main sequence: closing speed over amplitude, 1/s", tuple(_main_sequence(part) for part in parts)
+        ),
+        Row("interval, s", tuple(_quartiles(part, 2) for part in pauses)),
+        Row("time nearly closed (closure ratio)", tuple(_closure_ratio(eye) for eye in eyes)),
+    ]
+
+
+def _complete(part: pd.DataFrame) -> str:
+    count = int(part["complete"].sum())
+    return f"{count} / {len(part) - count}"
+
+
+def _quartiles(values: "pd.Series[float]", digits: int = 0) -> str:
+    known = values.dropna()
+    if known.empty:
+        return "-"
+    low, middle, high = np.percentile(known, [25, 50, 75])
+    return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def _main_sequence(part: pd.DataFrame) -> str:
+    """Slope through the origin of peak closing speed on amplitude, and their correlation."""
+    amplitude, speed = part["amplitude"].to_numpy(), part["peak_closing_velocity"].to_numpy()
+    if len(part) < 3 or float(np.ptp(amplitude)) == 0:
+        return "-"
+    slope = float(amplitude @ speed / (amplitude @ amplitude))
+    return f"{slope:.1f} (r = {np.corrcoef(amplitude, speed)[0, 1]:.2f})"
+
+
+def _closure_ratio(eye: EyeBlinks) -> str:
+    if not eye.blinks:
+        return "-"
+    closure = closure_course(eye.series, eye.blinks[0].closed_distance)
+    known: Array = closure[np.isfinite(closure)]
+    return f"{(known >= NEARLY_CLOSED).mean():.1%}"
+
+
+def quality_rows(eyes: Sequence[EyeBlinks]) -> list[Row]:
+    """What the recording is worth: length, rate, gaps, and blinks that could not be measured."""
+    return [
+        Row("frames", tuple(f"{e.series.distance.size:,}" for e in eyes)),
+        Row("frames a second", tuple(f"{e.series.fps:g}" for e in eyes)),
+        Row("frames without a value", tuple(f"{e.series.missing_frames:,}" for e in eyes)),
+        Row("frames in filled gaps", tuple(f"{e.series.bridged_frames:,}" for e in eyes)),
+        Row("blinks that could not be measured", tuple(str(len(e.refused)) for e in eyes)),
+        Row("squints, gaze shifts, closed eyes", tuple(_others(e) for e in eyes)),
+    ]
+
+
+def _others(eye: EyeBlinks) -> str:
+    kinds = [event.kind for event in eye.events]
+    return ", ".join(str(kinds.count(kind)) for kind in ("squint", "gaze_shift", "closed_eye"))
+
+
+def pair_lines(accepted: pd.DataFrame) -> list[str]:
+    """How both eyes go together, in words; empty for one eye."""
+    pairs = accepted.dropna(subset=["partner"])
+    columns = list(dict.fromkeys(accepted["column"]))
+    if len(columns) != 2:
+        return []
+    first = pairs[pairs["column"] == columns[0]]
+    alone = [int((accepted["column"] == c).sum() - (pairs["column"] == c).sum()) for c in columns]
+    lines = [
+        f"{len(first)} blinks in both eyes; {alone[0]} in {columns[0]} alone, "
+        f"{alone[1]} in {columns[1]} alone"
+    ]
+    if len(first):
+        lines.append(
+            f"onset of {columns[0]} minus {columns[1]}: {_quartiles(first['partner_lag_ms'])} ms; "
+            f"greatest closure: {_quartiles(first['partner_closure'], 2)}"
+        )
+    return lines
+
+
+def _svg(figure: "Figure") -> str:
+    """A figure as an SVG element, without the XML head and the clock."""
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None})
+    text = stream.getvalue()
+    return text[text.index("<svg") :]

@@ -1,0 +1,84 @@
+"""What else `stimuli blinks` writes of a recording: the report, every frame in units, an animation curve."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
+from stimuli_builder.blinks.extract import EyeBlinks, rate_doubt
+from stimuli_builder.blinks.recorded_curve import recorded_curve
+from stimuli_builder.blinks.series import read_table
+from stimuli_builder.blinks.units import scale_of, write_lids
+from stimuli_builder.files import whole_text
+
+
+@dataclass(frozen=True)
+class MoreOutputs:
+    """Options of `stimuli blinks` for outputs beside the blinks table."""
+
+    report: Path | None = None
+    lids: Path | None = None
+    scale: str | None = None
+    curve: Path | None = None
+    curve_format: str = "csv"
+
+    @property
+    def paths(self) -> tuple[Path | None, ...]:
+        """Files to be written."""
+        return self.report, self.lids, self.curve
+
+    def check(self) -> None:
+        """Refuse a format nobody knows before anything is read."""
+        check_format(self.curve_format, CurveTarget())
+
+    def prepared(
+        self, source: Path, eyes: Sequence[EyeBlinks], frame: pd.DataFrame
+    ) -> list[Callable[[], None]]:
+        """Work out what is asked for; what comes back writes it and cannot be refused any more.
+
+        Raises
+        ------
+        InputError
+            The scale cannot be told, or a column without a blink has no closed level.
+        """
+        if not any(self.paths):
+            return []
+        table = read_table(source)
+        scale = scale_of(table, self.scale, source)
+        if scale is not None and not eyes[0].series.is_px:
+            raise InputError(f"--scale needs distances in px; '{eyes[0].series.column}' is in another unit")
+        writers: list[Callable[[], None]] = []
+        if self.curve is not None:
+            text = write_curve(self.curve_format, recorded_curve(eyes), CurveTarget())
+            writers.append(partial(_write_text, self.curve, text))
+        if self.lids is not None:
+            known = [(eye.series, eye.blinks[0].closed_distance) for eye in eyes if eye.blinks]
+            writers.append(partial(write_lids, self.lids, known, scale))
+        if self.report is not None:
+            from stimuli_builder.blinks.clinical_report import report_text
+
+            page = report_text(source, eyes, frame, scale, _doubts(table, eyes))
+            writers.append(partial(_write_text, self.report, page))
+        return writers
+
+
+def _write_text(path: Path, text: str) -> None:
+    with whole_text(path) as stream:
+        stream.write(text)
+
+
+def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
+    """What a track says of its own frames, and rates that are unlikely."""
+    lines = [doubt for doubt in (rate_doubt(eye) for eye in eyes) if doubt]
+    if "status" in table.columns:
+        counts = table["status"].value_counts()
+        for status in ("doubtful", "lost"):
+            if status in counts:
+                lines.append(f"{int(counts[status]):,} of {len(table):,} frames are {status}")
+    if "error_px" in table.columns and table["error_px"].notna().any():
+        lines.append(f"stated error of the points, median: {table['error_px'].median():.2f} px")
+    return lines

@@ -1,0 +1,113 @@
+"""Lids in units: mm, degrees of lid rotation, and closure from 0 to 1 for a person, frame by frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.blinks.events.levels import local_opening
+from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.series import BlinkSeries
+from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM
+from stimuli_builder.files import whole_file
+
+INTER_OCULAR_MM = 60.0
+"""Between the middles of both eyes' openings; people differ by some 6% (sd)."""
+LID_RADIUS_MM = 12.0
+"""Radius about which the upper lid's margin turns: the eyeball's."""
+SCALES = {
+    "inter-ocular": f"the middles of both eyes are {INTER_OCULAR_MM:g} mm apart",
+    "eye-width": f"an eye is {FISSURE_LENGTH_MM:g} mm from canthus to canthus",
+}
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Millimetres in a pixel, and the assumption it rests on."""
+
+    mm_per_px: float
+    rule: str
+
+
+def scale_of(table: pd.DataFrame, wanted: str | None, path: Path) -> Scale | None:
+    """Return the scale of a track: a number of mm in a pixel, or a rule of `SCALES`; None without a wish.
+
+    Raises
+    ------
+    InputError
+        The wish is no number and no rule, or the table has no landmarks for the rule.
+    """
+    if wanted is None:
+        return None
+    try:
+        value = float(wanted)
+    except ValueError:
+        return _by_rule(table, wanted, path)
+    if not (np.isfinite(value) and 0 < value < 10):
+        raise InputError(f"--scale is a number of mm in a pixel, above 0 and below 10, got {wanted}")
+    return Scale(value, f"{value:g} mm in a pixel, as given (a card or a ruler in the picture)")
+
+
+def _by_rule(table: pd.DataFrame, rule: str, path: Path) -> Scale:
+    if rule not in SCALES:
+        raise InputError(f"--scale {rule}: expected a number or a rule{did_you_mean(rule, SCALES)}")
+    count = 18 if rule == "inter-ocular" else 9
+    names = [f"{axis}{point:02d}" for point in range(1, count + 1) for axis in "xy"]
+    if not set(names) <= set(table.columns):
+        raise InputError(
+            f"{path.name}: --scale {rule} needs a track of {'both eyes' if count == 18 else 'an eye'}"
+        )
+    points = table[names].to_numpy(dtype=np.float64).reshape(len(table), -1, 9, 2)
+    if rule == "inter-ocular":
+        middles = (points[:, :, 0] + points[:, :, 5]) / 2
+        length, true = np.hypot(*(middles[:, 1] - middles[:, 0]).T), INTER_OCULAR_MM
+    else:
+        length, true = np.hypot(*(points[:, 0, 5] - points[:, 0, 0]).T), FISSURE_LENGTH_MM
+    if not np.isfinite(length).any():
+        raise InputError(f"{path.name}: no frame has landmarks, so there is no scale")
+    return Scale(true / float(np.nanmedian(length)), SCALES[rule])
+
+
+def closure_course(series: BlinkSeries, closed_distance: float) -> Array:
+    """Closure (n,) of a person's eye: 0 at its opening about then, 1 at lid contact; NaN in gaps.
+
+    c = (o - d) / (o - d0), o the local opening (drift of the head removed), d0 the closed distance.
+    """
+    known = np.isfinite(series.distance)
+    opening = np.full(known.size, np.nan)
+    opening[known] = local_opening(series.distance[known], series.fps)
+    span = np.maximum(opening - closed_distance, 1e-9)
+    return np.clip((opening - series.distance) / span, 0.0, 1.0)
+
+
+def lid_degrees(distance_mm: Array) -> Array:
+    """Rotation of the upper lid in degrees that opens the eye by a distance: 2 asin(d / (2 R)), R = 12 mm."""
+    half = np.arcsin(np.clip(distance_mm / (2 * LID_RADIUS_MM), 0, 1))
+    return np.asarray(np.degrees(2 * half))
+
+
+def write_lids(path: Path, eyes: Sequence[tuple[BlinkSeries, float]], scale: Scale | None) -> None:
+    """Write every frame's distance, closure and, with a scale, mm and degrees, a column an eye.
+
+    `eyes` holds each series with its closed distance.
+    """
+    first = eyes[0][0]
+    columns: dict[str, NDArray[Any]] = {
+        "frame": np.arange(first.distance.size),
+        "time_s": np.round(np.arange(first.distance.size) / first.fps, 6),
+    }
+    for series, closed in eyes:
+        name = series.column.removesuffix("_px")
+        columns[series.column] = np.round(series.distance, 4)
+        columns[f"{name}_closure"] = np.round(closure_course(series, closed), 5)
+        if scale is not None:
+            mm = series.distance * scale.mm_per_px
+            columns[f"{name}_mm"] = np.round(mm, 4)
+            columns[f"{name}_degrees"] = np.round(lid_degrees(mm), 3)
+    with whole_file(path) as partial:
+        pd.DataFrame(columns).to_csv(partial, index=False, lineterminator="\n")

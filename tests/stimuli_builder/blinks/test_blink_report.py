@@ -1,0 +1,115 @@
+"""The report, every frame in units, and the recording as a curve."""
+
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.series import BlinkSeries
+from stimuli_builder.blinks.units import INTER_OCULAR_MM, closure_course, lid_degrees, scale_of
+
+
+@pytest.fixture
+def labelled(stimuli, series_file, tmp_path):
+    """`stimuli blinks` on both eyes with further arguments."""
+
+    def run(*more):
+        eyes = ("--column", "gap_l", "--column", "gap_r", "--fps", 300)
+        return stimuli("blinks", series_file, *eyes, "--out", tmp_path / "b.csv", *more)
+
+    return run
+
+
+def test_the_report_is_one_page_with_a_value_for_each_eye(labelled, tmp_path):
+    ended = labelled("--report", tmp_path / "r.html")
+    assert ended.code == 0, ended.err
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", page)
+    assert page.count("<svg") == 2
+    cells = dict(re.findall(r'<th scope="row">([^<]+)</th><td>([^<]*)</td>', page))
+    assert cells["blinks"] == "4"
+    assert float(cells["blinks a minute"]) == pytest.approx(24, abs=0.2)
+    assert cells["complete / partial"] == "2 / 2"
+    duration = float(cells["duration, ms"].split()[0])
+    assert duration == pytest.approx(pd.read_csv(tmp_path / "b.csv")["duration_ms"][:4].median(), abs=1)
+    assert "4 blinks in both eyes; 0 in gap_l alone, 0 in gap_r alone" in page
+
+
+def test_every_frame_has_its_closure(labelled, tmp_path, make_known):
+    assert labelled("--lids", tmp_path / "l.csv").code == 0
+    lids, known = pd.read_csv(tmp_path / "l.csv"), make_known(noise=0.05)
+    assert list(lids.columns) == ["frame", "time_s", "gap_l", "gap_l_closure", "gap_r", "gap_r_closure"]
+    assert lids["gap_l_closure"][known.minima[0]] == pytest.approx(1, abs=0.03)
+    assert lids["gap_l_closure"][known.minima[1]] == pytest.approx(0.6, abs=0.03)
+    assert lids["gap_l_closure"][known.onsets[0] - 60] == pytest.approx(0, abs=0.03)
+
+
+def test_a_head_that_comes_nearer_closes_no_eye():
+    near = np.linspace(1, 1.2, 6000)
+    series = BlinkSeries(distance=30 * near, fps=300, column="d_px", is_px=True)
+    assert closure_course(series, 0.0).max() < 0.06
+
+
+@pytest.mark.parametrize(("format_name", "read"), [("json", json.loads), ("usd", str), ("gltf", json.loads)])
+def test_the_recording_is_exported_as_a_curve(labelled, tmp_path, make_known, format_name, read):
+    ended = labelled("--curve", tmp_path / "c", "--curve-format", format_name)
+    assert ended.code == 0, ended.err
+    content = read((tmp_path / "c").read_text(encoding="utf-8"))
+    if format_name == "json":
+        known = make_known(noise=0.05)
+        assert len(content["closure_left"]) == known.distance.size
+        assert content["closure_left"][known.minima[0]] == pytest.approx(1, abs=0.03)
+        assert content["closure_right"][known.minima[1]] == pytest.approx(0.5 / 0.95, abs=0.06)
+
+
+def track(columns=("x", "y"), shift=70.0):
+    """Table of two eyes 28 px wide whose middles are `shift` px apart."""
+    eye = np.array([[0, 0], [5, -4], [11, -6], [17, -6], [23, -4], [28, 0], [21, 3], [14, 4], [7, 3]], float)
+    points = np.concatenate([eye, eye + np.array([shift, 0])])
+    return pd.DataFrame(
+        {f"{a}{n + 1:02d}": [points[n, k]] * 5 for n in range(18) for k, a in enumerate(columns)}
+    )
+
+
+def test_scales_say_what_they_suppose(tmp_path):
+    scale = scale_of(track(), "inter-ocular", tmp_path)
+    assert scale.mm_per_px == pytest.approx(INTER_OCULAR_MM / 70)
+    assert "60 mm" in scale.rule
+    assert scale_of(track(), "eye-width", tmp_path).mm_per_px == pytest.approx(28.2 / 28)
+    assert scale_of(track(), "0.25", tmp_path).mm_per_px == 0.25
+    assert scale_of(track(), None, tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [("inter-oclar", "did you mean 'inter-ocular'"), ("-1", "above 0"), ("nan", "above 0")],
+)
+def test_a_scale_nobody_knows_is_refused(tmp_path, wanted, message):
+    with pytest.raises(InputError, match=message):
+        scale_of(track(), wanted, tmp_path)
+
+
+def test_a_chord_of_the_eyeball_is_its_angle():
+    assert lid_degrees(np.array([0.0, 12.0, 24.0])) == pytest.approx([0, 60, 180])
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--curve", "c.x", "--curve-format", "mya"), "unknown --format 'mya'"),
+        (("--report", "r.html", "--scale", "inter-ocular"), "needs a track of both eyes"),
+        (("--lids", "l.csv", "--scale", "0.5"), "is in another unit"),
+        (("--report", "b.csv"), "a name of its own"),
+    ],
+)
+def test_bad_input_leaves_nothing(labelled, monkeypatch, tmp_path, more, message):
+    monkeypatch.chdir(tmp_path)
+    before = set(tmp_path.iterdir())
+    ended = labelled(*[tmp_path / "b.csv" if word == "b.csv" else word for word in more])
+    assert ended.code == 2
+    assert message in ended.err
+    assert ended.err.count("\n") == 1
+    assert set(tmp_path.iterdir()) == before
