@@ -137,6 +137,14 @@ def anova(
     two_factor_pairs: Annotated[
         bool, typer.Option("--two-factor-pairs", help="Also compare all cells of every two-factor margin.")
     ] = False,
+    equivalence: Annotated[
+        str | None,
+        typer.Option(help="Bounds within which pairs count as equal, in rating units: 0.5 or -0.3,0.5."),
+    ] = None,
+    contrast: Annotated[
+        list[str] | None,
+        typer.Option(help="Weights of a factor's levels in their order: face:1,-1,0. Repeatable."),
+    ] = None,
 ) -> None:
     """ANOVA of a long table: factors within and between participants, covariates, groups of any sizes.
 
@@ -172,6 +180,8 @@ def anova(
             rating=rating,
             synthetic=data.synthetic,
             two_factor_pairs=two_factor_pairs,
+            equivalence_bounds=_bounds(equivalence),
+            planned_contrasts=[_contrast(text) for text in contrast or ()],
             decisions=data.decisions,
         )
     show(analysis)
@@ -197,6 +207,28 @@ def show(analysis: "Analysis") -> None:
             typer.echo(f"\n{table.title}: {len(table.rows)} rows, in the report and the JSON file")
         else:
             typer.echo("\n" + as_text(table))
+
+
+def _bounds(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        given = [float(part) for part in text.split(",")]
+    except ValueError:
+        given = []
+    if len(given) == 1:
+        given = [-abs(given[0]), abs(given[0])]
+    if len(given) != 2 or not given[0] < 0 < given[1]:
+        raise InputError(f"--equivalence should be like 0.5 or -0.3,0.5, got '{text}'")
+    return given[0], given[1]
+
+
+def _contrast(text: str) -> tuple[str, list[float]]:
+    factor, _, weights = text.rpartition(":")
+    try:
+        return factor.strip(), [float(weight) for weight in weights.split(",")]
+    except ValueError:
+        raise InputError(f"--contrast should be like face:1,-1,0, got '{text}'") from None
 
 
 def _scale(text: str | None) -> tuple[float, float] | None:

@@ -1,6 +1,6 @@
 """One analysis, complete: what tables, figures and report are made from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 from analysis.within.anova import AnovaResult, SumOfSquares, linear_anova
 from analysis.within.between import BetweenDesign, no_groups
 from analysis.within.cell_means import CellTable, name_cells
+from analysis.within.contrast_tests import Contrast, Equivalence, contrasts_of, equivalence, trends
 from analysis.within.marginal_means import MarginalMean, marginal_means
 from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of
+from analysis.within.simple_effects import SimpleEffect, simple_effects
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
@@ -50,6 +52,10 @@ class Analysis:
     pairs: tuple[Pair, ...]
     decisions: tuple[str, ...]
     labels: Labels = Labels()
+    simple_effects: tuple[SimpleEffect, ...] = ()
+    trends: tuple[Contrast, ...] = ()
+    contrasts: tuple[Contrast, ...] = ()
+    equivalence: tuple[Equivalence, ...] = ()
     experiment: "Experiment | None" = None
     exclusions: "Exclusions | None" = None
 
@@ -72,6 +78,8 @@ def analyse_cells(
     rating: str,
     synthetic: bool = False,
     two_factor_pairs: bool = False,
+    equivalence_bounds: tuple[float, float] | None = None,
+    planned_contrasts: Sequence[tuple[str, Sequence[float]]] = (),
     between: BetweenDesign | None = None,
     sum_of_squares: SumOfSquares = 3,
     decisions: tuple[str, ...] = (),
@@ -98,6 +106,14 @@ def analyse_cells(
         pairs=pairs,
         decisions=(*decisions, *cell_decisions(cells), *group_decisions(anova)),
         labels=labels or Labels(),
+        simple_effects=simple_effects(anova),
+        trends=trends(anova),
+        contrasts=tuple(
+            contrast
+            for factor, weights in planned_contrasts
+            for contrast in contrasts_of(anova, factor, [(" ".join(f"{w:g}" for w in weights), weights)])
+        ),
+        equivalence=equivalence(pairs, *equivalence_bounds) if equivalence_bounds else (),
         experiment=experiment,
         exclusions=exclusions,
     )

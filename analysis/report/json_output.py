@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
 
 
+_OF_SIMPLE = ("univariate", "multivariate", "mauchly", "eta_sq_partial", "eta_sq_partial_ci")
+
+
 def as_json(analysis: Analysis) -> str:
     """Indented JSON text, the same bytes for the same analysis; what does not exist is null."""
     return json_text(as_data(analysis))
@@ -56,6 +59,20 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in analysis.anova.effects],
         "marginal_means": [asdict(mean) for mean in analysis.means],
         "pairwise": [asdict(pair) for pair in analysis.pairs],
+        "simple_effects": [
+            {
+                "interaction": simple.interaction,
+                "of": simple.of,
+                "at": simple.at,
+                "p_value": simple.p_value,
+                "p_holm": simple.p_holm,
+                **{key: value for key, value in _effect(simple.test).items() if key in _OF_SIMPLE},
+            }
+            for simple in analysis.simple_effects
+        ],
+        "trends": [asdict(trend) for trend in analysis.trends],
+        "contrasts": [asdict(contrast) for contrast in analysis.contrasts],
+        "equivalence": [asdict(test) for test in analysis.equivalence],
         "dropped": [
             {"participant": d.participant, "missing_cells": list(d.missing_cells)} for d in cells.dropped
         ],

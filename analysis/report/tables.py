@@ -15,6 +15,7 @@ from analysis.report.numbers import (
     sum_text,
 )
 from analysis.within.effect_tests import Effect, UnivariateTest
+from analysis.within.simple_effects import SIGNIFICANCE
 
 TIMES = " × "
 SYNTHETIC_MARK = " [SYNTHETIC DATA]"
@@ -24,7 +25,8 @@ def all_tables(analysis: Analysis) -> tuple[Table, ...]:
     """Every table of the report, in its order."""
     tables = [paper_table(analysis), univariate_table(analysis), sphericity_table(analysis)]
     tables += [multivariate_table(analysis), effect_size_table(analysis), means_table(analysis)]
-    tables += [pairs_table(analysis), counts_table(analysis)]
+    tables += [pairs_table(analysis), simple_effects_table(analysis), contrasts_table(analysis)]
+    tables += [equivalence_table(analysis), counts_table(analysis)]
     return tuple(table for table in tables if table.rows)
 
 
@@ -262,6 +264,66 @@ def pairs_table(analysis: Analysis) -> Table:
     )
     header = ("Margin: pair", "Diff.", "95% CI", "t", "p", "Bonf.", "Holm", "dz")
     return Table("pairs", _title(analysis, "Pairs"), header, rows, 1, notes, folded=len(rows) > 24)
+
+
+def simple_effects_table(analysis: Analysis) -> Table:
+    """Simple effects of significant interactions."""
+    rows = []
+    for simple in analysis.simple_effects:
+        m = simple.test.multivariate
+        exact = m is not None and m.exact
+        f, df, p = _test_cells(simple.test, exact)
+        at = ", ".join(analysis.labels.level(name, level) for name, level in simple.at.items())
+        size = m.eta_sq_partial if m is not None and exact else simple.test.eta_sq_partial
+        label = f"{analysis.labels.factor(simple.of)} at {at}"
+        rows.append((label, f, df, p, p_value(simple.p_holm), share(size)))
+    notes = (
+        "Each factor of a significant interaction at each level of the others, with the error of the whole "
+        "model. Holm: adjusted for the levels it is tested at. ηₚ² belongs to the F beside it.",
+    )
+    header = ("Simple effect", "F", "df", "p", "Holm", "ηₚ²")
+    title = _title(analysis, "Simple effects")
+    return Table("simple", title, header, tuple(rows), 1, notes, folded=len(rows) > 24)
+
+
+def contrasts_table(analysis: Analysis) -> Table:
+    """Polynomial trends of factors whose levels are numbers, and planned contrasts."""
+    rows = tuple(
+        (
+            f"{analysis.labels.factor(c.factor)}: {c.name}",
+            fixed(c.estimate),
+            interval(c.ci),
+            fixed(c.t),
+            str(c.df),
+            p_value(c.p),
+        )
+        for c in (*analysis.trends, *analysis.contrasts)
+    )
+    notes = (
+        "Trends: orthonormal polynomials over the levels as they are spaced. Planned contrasts: weights as "
+        "given. Interval: 95%, unadjusted.",
+    )
+    header = ("Contrast", "Estimate", "95% CI", "t", "df", "p")
+    return Table("contrasts", _title(analysis, "Trends and contrasts"), header, rows, 1, notes)
+
+
+def equivalence_table(analysis: Analysis) -> Table:
+    """Two one-sided tests of every pair against the declared bounds."""
+    rows = tuple(
+        (
+            f"{e.effect}: {e.level_a} - {e.level_b}",
+            fixed(e.difference),
+            interval(e.ci),
+            p_value(e.p_lower),
+            p_value(e.p_upper),
+            "yes" if e.p < SIGNIFICANCE else "not shown",
+        )
+        for e in analysis.equivalence
+    )
+    bounds = interval(analysis.equivalence[0].bounds) if rows else ""
+    notes = (f"Two one-sided t tests (TOST) within {bounds}, α = .05; interval 90%.",)
+    header = ("Margin: pair", "Diff.", "90% CI", "p lower", "p upper", "equal")
+    return Table("equivalence", _title(analysis, "Equivalence"), header, rows, 1, notes)
 
 
 def counts_table(analysis: Analysis) -> Table:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, sidak, tukey
 from analysis.within.anova import AnovaResult
 from analysis.within.contrasts import effect_name
 from analysis.within.estimates import Margin, margin_of
@@ -20,6 +21,7 @@ class Pair:
     """t test of two levels of a margin on N - p error df; within participants it is the paired t test.
 
     `difference` is level_a minus level_b; `t`, `p` and `dz` are NaN where the difference does not vary.
+    Adjusted for the pairs of the margin: Bonferroni, Holm, Sidak, Tukey, false discovery rate.
     `dz` divides by the SD of the difference, pooled over groups; between groups it is Cohen's d, over the
     pooled SD of participants' means, and NaN where both group and level differ.
     Levels of a margin of several factors are joined with ':'.
@@ -35,17 +37,12 @@ class Pair:
     p: float
     p_bonferroni: float
     p_holm: float
+    p_sidak: float
+    p_tukey: float
+    p_fdr: float
     ci: tuple[float, float]
     dz: float
-
-
-def adjust(p: Floats) -> tuple[Floats, Floats]:
-    """Bonferroni and Holm adjusted p values (m,); NaN stays NaN and counts in m."""
-    m, order = p.size, np.argsort(p, kind="stable")
-    holm = np.empty_like(p)
-    stepped = np.maximum.accumulate((m - np.arange(m)) * p[order])
-    holm[order] = np.minimum(1.0, stepped)
-    return np.minimum(1.0, m * p), np.where(np.isnan(p), np.nan, holm)
+    dz_ci: tuple[float, float]
 
 
 def pairs_of(result: AnovaResult, factors: Sequence[str], confidence: float = 0.95) -> tuple[Pair, ...]:
@@ -81,7 +78,9 @@ def _tested(
         t = np.where(se > 0, estimate / se, np.nan)
         size = np.where(se > 0, estimate / spread, np.nan)
     p = 2 * special.stdtr(margin.df, -np.abs(t))
-    bonferroni, holm = adjust(p)
+    family = [bonferroni(p), holm(p), sidak(p), tukey(t, len(margin.combinations), margin.df)]
+    family = [np.where(np.isnan(p), np.nan, values) for values in (*family, false_discovery_rate(p))]
+    sizes = size_intervals(t, size, margin.df, confidence)
     reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2)) * se
     return tuple(
         Pair(
@@ -93,13 +92,29 @@ def _tested(
             t=float(t[i]),
             df=margin.df,
             p=float(p[i]),
-            p_bonferroni=float(bonferroni[i]),
-            p_holm=float(holm[i]),
+            p_bonferroni=float(family[0][i]),
+            p_holm=float(family[1][i]),
+            p_sidak=float(family[2][i]),
+            p_tukey=float(family[3][i]),
+            p_fdr=float(family[4][i]),
             ci=(float(estimate[i] - reach[i]), float(estimate[i] + reach[i])),
             dz=float(size[i]),
+            dz_ci=(float(sizes[i, 0]), float(sizes[i, 1])),
         )
         for i, (a, b) in enumerate(labels)
     )
+
+
+def size_intervals(t: Floats, size: Floats, df: int, confidence: float) -> Floats:
+    """Intervals (m, 2) of standardised differences from the noncentral t distribution.
+
+    The noncentralities that put t at the two tails, times size / t. Source: Steiger & Fouladi (1997).
+    """
+    tails = np.array([0.5 + confidence / 2, 0.5 - confidence / 2])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(t != 0, size / t, np.nan)
+        noncentral = special.nctdtrinc(float(df), tails, np.where(np.isnan(t), 0.0, t)[:, None])
+        return np.asarray(noncentral * scale[:, None], dtype=np.float64)
 
 
 def _spread(margin: Margin, weights: Floats) -> Floats:

@@ -113,3 +113,38 @@ def test_a_covariate_that_the_groups_determine_is_refused(tmp_path) -> None:
     assert "determined by the other groups" in str(
         anova(file, "--between", "g", "--covariate", "x").exception
     )
+
+
+def test_follow_up_tests_stand_in_the_json(tmp_path) -> None:
+    out = tmp_path / "o.json"
+    arguments = (
+        "--within",
+        "hour",
+        "--between",
+        "treatment",
+        "--equivalence",
+        "0.8",
+        "--contrast",
+        "hour:-1,0,0,0,1",
+    )
+    result = anova(OBK, *arguments, "--json", str(out))
+    assert result.exit_code == 0, result.exception
+    data = json.loads(out.read_text())
+    assert [t["name"] for t in data["trends"]] == ["linear", "quadratic", "cubic", "quartic"]
+    assert data["contrasts"][0]["weights"] == [-1, 0, 0, 0, 1]
+    assert len(data["equivalence"]) == len(data["pairwise"]) == 10 + 3
+    assert data["simple_effects"] == [] or {"of", "at", "p_holm"} <= set(data["simple_effects"][0])
+    assert "Trends and contrasts" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--equivalence", "0.2,0.5"), "--equivalence should be like"),
+        (("--contrast", "hour:1,1,-1,0,0"), "sum to zero"),
+        (("--contrast", "hour:a,b"), "--contrast should be like"),
+        (("--contrast", "our:1,-1"), "did you mean 'hour'"),
+    ],
+)
+def test_wrong_follow_ups_are_refused(arguments, message) -> None:
+    assert message in str(anova(OBK, "--within", "hour", *arguments).exception)

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from analysis.within.anova import within_anova
 from analysis.within.marginal_means import marginal_means
-from analysis.within.pairwise import adjust, one_factor_pairs, pairs_of
+from analysis.within.pairwise import one_factor_pairs, pairs_of
 from experiments.error_bars import within_participant_errors
 from experiments.errors import InputError
 
@@ -169,15 +169,6 @@ def test_multivariate_test_agrees_with_statsmodels_manova(data) -> None:
     assert test.f_value == pytest.approx(float(table.loc["Pillai's trace", "F Value"]), rel=RELATIVE)
     assert test.wilks == pytest.approx(float(table.loc["Wilks' lambda", "Value"]), rel=RELATIVE)
     assert (test.df_effect, test.df_error) == (3, 11)
-
-
-def test_adjustments_agree_with_statsmodels() -> None:
-    from statsmodels.stats.multitest import multipletests
-
-    p = np.random.default_rng(1).uniform(0, 0.2, 10)
-    bonferroni, holm = adjust(p)
-    assert bonferroni == pytest.approx(multipletests(p, method="bonferroni")[1])
-    assert holm == pytest.approx(multipletests(p, method="holm")[1])
 
 
 def test_within_participant_error_of_pure_participant_differences_is_zero() -> None:

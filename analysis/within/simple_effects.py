@@ -1,0 +1,136 @@
+"""Simple effects: one factor of an interaction tested at each level of the others."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.within.adjustments import holm
+from analysis.within.anova import AnovaResult
+from analysis.within.contrasts import orthonormal_basis
+from analysis.within.effect_tests import Effect, effects_of, error_scores, hypothesis_scores
+from experiments.errors import InputError
+
+Floats = NDArray[np.float64]
+
+SIGNIFICANCE = 0.05
+MAXIMUM_PLACES = 60
+"""An interaction with more combinations of the other factors' levels is not taken apart."""
+
+
+@dataclass(frozen=True)
+class SimpleEffect:
+    """The test of factor `of` where the others have the levels `at`, with the error of the whole model.
+
+    `p_value` is that of the multivariate test where there is one, else Greenhouse-Geisser's; `p_holm` is
+    adjusted for the places of this interaction at which `of` is tested.
+    """
+
+    interaction: str
+    of: str
+    at: dict[str, str]
+    test: Effect
+    p_value: float
+    p_holm: float
+
+
+def simple_effect(result: AnovaResult, of: str, at: Mapping[str, str]) -> Effect:
+    r"""Test one factor at given levels of others; factors named in neither are averaged over.
+
+    Notes
+    -----
+    The general hypothesis of `linear_anova` with M the contrasts of `of` at the within levels, and U the
+    directions of the group rows C (one group, or differences of groups where `of` is between):
+    :math:`U \propto C (X'X)^{-1} X'`. With q contrasts within, F is Hotelling's exact one on
+    :math:`q, \nu - q + 1`; emmeans' `joint_tests` prints :math:`T^2 / q` on :math:`q, \nu`: too large.
+    """
+    design, x = result.between, result.between.matrix
+    groups = {name: design.levels[k].index(at[name]) for k, name in enumerate(design.factors) if name in at}
+    z, members = _within_scores(result, of, at)
+    if of in design.factors:
+        size = len(design.levels[design.factors.index(of)])
+        rows = np.array([design.row({**groups, of: level}) for level in range(size)])
+        rows = rows[1:] - rows[0]
+    else:
+        rows = design.row(groups)[None]
+    directions = np.linalg.qr(_toward(x, rows))[0].T
+    basis = np.linalg.qr(x)[0]
+    floor = z.size * (8 * np.finfo(float).eps * float(np.abs(result.y).max())) ** 2
+    error = error_scores(z - basis @ (basis.T @ z), members, result.df_error, floor)
+    between = (of,) if of in design.factors else ()
+    scores = hypothesis_scores(directions @ z, between, error, floor)
+    return effects_of([scores], result.factors, error.ss, result.confidence)[0]
+
+
+def _toward(x: Floats, rows: Floats) -> Floats:
+    """Participants' weights (N, r) in the estimates of `rows` (r, p)."""
+    return np.asarray(x @ np.linalg.solve(x.T @ x, rows.T), dtype=np.float64)
+
+
+def _within_scores(result: AnovaResult, of: str, at: Mapping[str, str]) -> tuple[Floats, tuple[int, ...]]:
+    """Scores (N, q): contrasts of `of` (or the mean) at the levels `at`, over the mean of other factors."""
+    values: Floats = result.y
+    members: tuple[int, ...] = ()
+    for axis in reversed(range(len(result.factors))):
+        name = result.factors[axis]
+        if name == of:
+            values = np.moveaxis(values, axis + 1, -1)
+            members = (axis,)
+        elif name in at:
+            values = np.take(values, result.levels[axis].index(at[name]), axis=axis + 1)
+        else:
+            values = values.mean(axis=axis + 1)
+    if not members:
+        return values.reshape(len(values), 1), ()
+    flat = values.reshape(len(values), -1)
+    return (flat - flat.mean(axis=1, keepdims=True)) @ orthonormal_basis(flat.shape[1])[:, 1:], members
+
+
+def simple_effects(
+    result: AnovaResult, interactions: tuple[str, ...] | None = None
+) -> tuple[SimpleEffect, ...]:
+    """Simple effects of the named interactions; of every significant one where none is named.
+
+    Raises
+    ------
+    InputError
+        A name that is no effect, or an effect of one factor or with a covariate.
+    """
+    if interactions is None:
+        chosen = [e for e in result.effects if _is_interaction(result, e) and main_p(e) < SIGNIFICANCE]
+    else:
+        chosen = [result.effect(name) for name in interactions]
+        for effect in chosen:
+            if not _is_interaction(result, effect):
+                raise InputError(f"'{effect.effect}' is no interaction of factors; it has no simple effects")
+    return tuple(simple for effect in chosen for simple in _of_interaction(result, effect))
+
+
+def _is_interaction(result: AnovaResult, effect: Effect) -> bool:
+    return len(effect.factors) > 1 and set(effect.factors) <= set(result.all_factors)
+
+
+def main_p(effect: Effect) -> float:
+    """p of the exact multivariate test where there is one, else Greenhouse-Geisser's."""
+    if effect.multivariate is not None and effect.multivariate.exact:
+        return effect.multivariate.p_value
+    return effect.univariate.p_gg
+
+
+def _of_interaction(result: AnovaResult, effect: Effect) -> list[SimpleEffect]:
+    levels = dict(zip(result.all_factors, result.all_levels, strict=True))
+    found: list[SimpleEffect] = []
+    for of in effect.factors:
+        others = [name for name in effect.factors if name != of]
+        places = [dict(zip(others, at, strict=True)) for at in product(*(levels[o] for o in others))]
+        if len(places) > MAXIMUM_PLACES:
+            continue
+        tests = [simple_effect(result, of, at) for at in places]
+        p = np.array([main_p(test) for test in tests])
+        found += [
+            SimpleEffect(effect.effect, of, at, test, float(one), float(adjusted))
+            for at, test, one, adjusted in zip(places, tests, p, holm(p), strict=True)
+        ]
+    return found
