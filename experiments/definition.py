@@ -168,6 +168,12 @@ class Experiment(Declaration):
         return self
 
     @model_validator(mode="after")
+    def _trial_fits(self) -> Self:
+        if fault := self.trial.fault(self):
+            raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
     def _screening_fits_the_forms(self) -> Self:
         for number, rule in enumerate(self.screening, start=1):
             fault = rule.fault(self.forms) if isinstance(rule, ScreenFormAnswer) else None

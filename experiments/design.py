@@ -59,19 +59,6 @@ def blocks(experiment: "Experiment") -> list[BlockSpec]:
     return single * experiment.blocks.repeats
 
 
-def trials_per_participant(experiment: "Experiment") -> int:
-    """Rated trials of one participant, practice and attention checks not counted."""
-    return sum(len(block.clips) for block in blocks(experiment))
-
-
-def expected_minutes(experiment: "Experiment") -> float:
-    """Expected length of a visit in minutes: trials times the declared seconds a trial."""
-    seconds = (
-        trials_per_participant(experiment) + experiment.practice.trials
-    ) * experiment.trial.expected_seconds
-    return round(seconds / 60, 1)
-
-
 def render_settings(experiment: "Experiment", spec: ClipSpec) -> RenderSettings:
     """The experiment's render settings with the overrides of this clip's levels, in factor order."""
     settings = experiment.render

@@ -30,12 +30,12 @@ def single_clips(
     """
     rng = random.Random(seed)
     trials = _practice(experiment, rng)
-    for number, block in enumerate(_ordered_blocks(experiment, rng, slot), start=1):
+    for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
         clips = list(block.clips)
         if experiment.blocks.trial_order == "random":
             rng.shuffle(clips)
         main = [_of_one("main", number, block.label, clip) for clip in clips]
-        trials.extend(_with_attention(experiment, main, rng, asked))
+        trials.extend(with_attention(experiment, main, rng, asked))
     return trials
 
 
@@ -56,7 +56,8 @@ def _levels(experiment: "Experiment") -> list[BlockSpec]:
     return every[: len(every) // experiment.blocks.repeats]
 
 
-def _ordered_blocks(experiment: "Experiment", rng: random.Random, slot: int) -> list[BlockSpec]:
+def ordered_blocks(experiment: "Experiment", rng: random.Random, slot: int) -> list[BlockSpec]:
+    """The blocks of one participant in order, repeats included."""
     declared = experiment.blocks
     levels = _levels(experiment)
     if declared.order == "random":
@@ -89,7 +90,7 @@ def _of_one(kind: Literal["practice", "main"], block: int, label: str, clip: Cli
     return Trial(kind, block, label, (Shown("shown", clip),))
 
 
-def _with_attention(
+def with_attention(
     experiment: "Experiment", main: list[Trial], rng: random.Random, asked: Callable[[random.Random], int]
 ) -> list[Trial]:
     """Put the declared number of instructed ratings between a block's trials, never before the first."""

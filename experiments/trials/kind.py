@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 from experiments.assignment.trial import Trial
 from experiments.base import Declaration
 from experiments.columns.view import View
+from experiments.design import BlockSpec
 from experiments.schema.effects import Effect
 
 if TYPE_CHECKING:
@@ -20,6 +21,17 @@ class TrialDeclaration(Declaration):
 
     kind: str
     expected_seconds: Annotated[float, Field(gt=0)] = 6.0
+
+    def fault(self, experiment: "Experiment") -> str | None:
+        """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""
+        del experiment
+        return None
+
+
+def nothing_more(experiment: "Experiment") -> tuple[str, ...]:
+    """What a plan says of a kind whose trials the cells and exemplars tell already."""
+    del experiment
+    return ()
 
 
 @dataclass(frozen=True)
@@ -35,7 +47,9 @@ class Kind:
     effects: what an edit of each key of the declaration does to stored answers, by path below [trial].
     page: what of the declaration the participant's page is told. shown: makes it.
     assign: the trials of one participant in order, by declaration, seed and slot.
+    block_size: trials of one participant in a block, attention checks not counted.
     example: a [trial] as TOML, for the reference; it is what a newcomer copies.
+    plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
     """
 
     declaration: type[TrialDeclaration]
@@ -46,7 +60,9 @@ class Kind:
     page: type[Declaration]
     shown: "Callable[[Experiment], Declaration]"
     assign: "Callable[[Experiment, int, int], list[Trial]]"
+    block_size: "Callable[[Experiment, BlockSpec], int]"
     example: str
+    plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
 
     @property
     def name(self) -> str:

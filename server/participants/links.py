@@ -7,11 +7,11 @@ from uuid import UUID
 
 from sqlalchemy.orm import Session
 
-from experiments import design
 from experiments.assignment.trial import Trial
 from experiments.definition import Display, Experiment
 from experiments.errors import did_you_mean
 from experiments.trials import KINDS
+from experiments.trials.counts import expected_minutes
 from server.clock import now
 from server.context import Services
 from server.models import Link, Study, StudyRun
@@ -71,7 +71,7 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
             title=experiment.title,
             languages=list(experiment.languages),
             background=experiment.display.background,
-            expected_minutes=design.expected_minutes(experiment),
+            expected_minutes=expected_minutes(experiment),
         ),
         status="open" if resumable else "used" if over else _status(session, link, link.study, experiment),
         kind=link.kind,

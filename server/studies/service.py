@@ -15,6 +15,7 @@ from experiments.errors import InputError, did_you_mean
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.schema.stored import load_stored
+from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
@@ -72,9 +73,9 @@ def design_out(experiment: Experiment) -> DesignOut:
         cells=len(design.cells(experiment)),
         exemplars=experiment.exemplars.per_cell,
         unique_clips=len(design.clips(experiment)),
-        trials_per_participant=design.trials_per_participant(experiment),
-        blocks=[BlockOut(label=b.label, trials=len(b.clips)) for b in design.blocks(experiment)],
-        expected_minutes=design.expected_minutes(experiment),
+        trials_per_participant=trials_per_participant(experiment),
+        blocks=[BlockOut(label=label, trials=count) for label, count in block_sizes(experiment)],
+        expected_minutes=expected_minutes(experiment),
     )
 
 

@@ -5,6 +5,8 @@ from typing import Any
 
 from experiments import design
 from experiments.definition import Experiment
+from experiments.trials import KINDS
+from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
 from stimuli_builder.clips.exemplars import recorded_order
 
 
@@ -18,7 +20,7 @@ def summary(experiment: Experiment) -> dict[str, Any]:
     cells : list of cell labels, last factor fastest.
     exemplars_per_cell, unique_clips, trials_per_participant, practice_trials : counts.
     blocks : list of {label, trials} in declared order; order : how a participant's order is drawn.
-    expected_minutes : length of a visit.
+    expected_minutes : length of a visit. notes : what the kind of trial adds, such as counts of pairs.
     repeated_profiles : list of {exemplar, profile, group}: recordings that stand for a second exemplar.
     """
     return {
@@ -36,11 +38,12 @@ def summary(experiment: Experiment) -> dict[str, Any]:
         "cells": ["/".join(level for _, level in cell) for cell in design.cells(experiment)],
         "exemplars_per_cell": experiment.exemplars.per_cell,
         "unique_clips": len(design.clips(experiment)),
-        "trials_per_participant": design.trials_per_participant(experiment),
+        "trials_per_participant": trials_per_participant(experiment),
         "practice_trials": experiment.practice.trials,
-        "blocks": [{"label": block.label, "trials": len(block.clips)} for block in design.blocks(experiment)],
+        "blocks": [block._asdict() for block in block_sizes(experiment)],
         "order": experiment.blocks.order,
-        "expected_minutes": design.expected_minutes(experiment),
+        "expected_minutes": expected_minutes(experiment),
+        "notes": list(KINDS[experiment.trial.kind].plan(experiment)),
         "repeated_profiles": repeated_profiles(experiment),
     }
 

@@ -23,6 +23,8 @@ def print_plan(plan: dict[str, Any]) -> None:
         f"order {plan['order']}"
     )
     console.print(f"{plan['practice_trials']} practice trials; about {plan['expected_minutes']:.0f} minutes")
+    for note in plan["notes"]:
+        console.print(note)
     for entry in plan["repeated_profiles"]:
         console.print(
             f"exemplar {entry['exemplar']} of '{entry['group'] or 'all cells'}' shows the recorded profile "

@@ -4,6 +4,7 @@ import pytest
 
 from experiments import design
 from experiments.load import load_experiment
+from experiments.trials.counts import expected_minutes, trials_per_participant
 
 # design counts of Trutoiu et al. (2011), sections 4.1-4.3
 PAPER = {
@@ -18,9 +19,9 @@ def test_shipped_experiments_have_the_papers_counts(name: str) -> None:
     experiment = load_experiment(name)
     assert len(design.cells(experiment)) == PAPER[name]["cells"]
     assert len(set(design.clips(experiment))) == PAPER[name]["clips"]
-    assert design.trials_per_participant(experiment) == PAPER[name]["trials"]
+    assert trials_per_participant(experiment) == PAPER[name]["trials"]
     assert [len(block.clips) for block in design.blocks(experiment)] == PAPER[name]["blocks"]
-    assert design.expected_minutes(experiment) == pytest.approx(PAPER[name]["minutes"], abs=1)
+    assert expected_minutes(experiment) == pytest.approx(PAPER[name]["minutes"], abs=1)
 
 
 @pytest.mark.parametrize("name", PAPER)

@@ -5,7 +5,7 @@ from experiments.trials.clip_rating.answer import RatingAnswer
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import ClipRating
 from experiments.trials.clip_rating.page import ShownClipRating, shown
-from experiments.trials.clip_rating.plan import assign
+from experiments.trials.clip_rating.plan import assign, block_size
 from experiments.trials.kind import Kind
 
 EFFECTS: dict[str, Effect] = {
@@ -42,5 +42,6 @@ CLIP_RATING = Kind(
     page=ShownClipRating,
     shown=shown,
     assign=assign,
+    block_size=block_size,
     example=EXAMPLE,
 )

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from experiments.assignment.order import single_clips
 from experiments.assignment.trial import Trial
+from experiments.design import BlockSpec
 from experiments.trials.clip_rating.declaration import clip_rating_of
 
 if TYPE_CHECKING:
@@ -19,3 +20,9 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
         return rng.randint(scale.minimum, scale.maximum)
 
     return single_clips(experiment, seed, slot, asked)
+
+
+def block_size(experiment: "Experiment", block: BlockSpec) -> int:
+    """One trial a clip."""
+    del experiment
+    return len(block.clips)

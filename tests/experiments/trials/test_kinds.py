@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -18,6 +19,7 @@ from experiments.schema.keys import paths
 from experiments.schema.stored import load_stored
 from experiments.schema.upgrades import FORMAT
 from experiments.trials import KINDS, reserved_names, views
+from experiments.trials.counts import block_sizes, trials_per_participant
 from experiments.trials.kind import Kind
 from tests.experiments.trials.toy import TOY
 
@@ -110,6 +112,16 @@ def test_its_trials_show_clips_of_the_design_in_its_roles(kind: Kind, slot: int)
         if trial.kind != "attention":
             assert {shown.role for shown in trial.shown} == set(kind.roles)
             assert {shown.clip for shown in trial.shown} <= clips
+
+
+def test_its_trials_are_as_many_as_its_blocks_say(kind: Kind) -> None:
+    experiment = declared(kind)
+    main = [trial for trial in kind.assign(experiment, 5, 0) if trial.kind == "main"]
+    sizes = Counter[str]()
+    for block in block_sizes(experiment):
+        sizes[block.label] += block.trials
+    assert Counter(trial.block_label for trial in main) == sizes
+    assert trials_per_participant(experiment) == len(main)
 
 
 def test_the_page_is_told_a_part_of_it(kind: Kind) -> None:

@@ -48,7 +48,8 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
     random.Random(seed).shuffle(pairs)
     roles = ("first", "second") if slot % 2 == 0 else ("second", "first")
     return [
-        Trial("main", 1, "all", tuple(Shown(role, clip) for role, clip in zip(roles, pair, strict=True)))
+        Trial("main", block, "all", tuple(Shown(role, clip) for role, clip in zip(roles, pair, strict=True)))
+        for block in range(1, experiment.blocks.repeats + 1)
         for pair in pairs
     ]
 
@@ -72,5 +73,6 @@ TOY = Kind(
     page=ShownSameOrNot,
     shown=shown,
     assign=assign,
+    block_size=lambda _, block: len(block.clips) - 1,
     example='[trial]\nkind = "same_or_not"\nquestion = { en = "The same?", de = "Gleich?" }\n',
 )
