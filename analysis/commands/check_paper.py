@@ -1,4 +1,4 @@
-"""`analysis check-paper`: what printed figures say about themselves."""
+"""`analysis check-paper`: what printed figures and sentences say about themselves."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -13,28 +13,65 @@ def register(app: typer.Typer) -> None:
 
 
 def check_paper(
-    figures: Annotated[
+    file: Annotated[
         Path | None,
-        typer.Argument(help="TOML file of printed figures; the shipped ones of the paper if left out."),
+        typer.Argument(
+            help="A manuscript or report (HTML, TeX, DOCX, PDF, Markdown, text), or a TOML file of printed "
+            "figures; the shipped figures of the paper if left out."
+        ),
     ] = None,
     json: Annotated[Path | None, typer.Option(help="Write the findings to this JSON file too.")] = None,
 ) -> None:
-    """Check a paper from its printed figures alone: df, p, SE or SD, and means that cannot all hold.
+    """Check a paper from what it prints: p, df and effect sizes of its statistics; SE or SD; joint means.
 
     Examples:
 
-      analysis check-paper
+      analysis check-paper manuscript.docx
 
-      analysis check-paper figures.toml --json findings.json
+      analysis check-paper out/analysis/exp1/report.html --json findings.json
 
-    The shipped analysis/paper/published/FIGURES.toml shows the format; docs/analysis.md explains it.
+      analysis check-paper figures.toml
+
+    The shipped analysis/paper/published/FIGURES.toml shows the format of figures (docs/analysis.md).
     """
+    from analysis.paper.printed import SHIPPED
+
+    if file is None or file.suffix.lower() == ".toml":
+        _check_figures(file or SHIPPED, json)
+    else:
+        _check_document(file, json)
+
+
+def _check_document(file: Path, json: Path | None) -> None:
     from analysis.files import json_text, whole_file
-    from analysis.paper import check as checks
-    from analysis.paper.printed import SHIPPED, load_figures
+    from analysis.paper.document import read_document
+    from analysis.paper.statistics import check_text
     from analysis.report.formats import wrap
 
-    paper = load_figures(figures or SHIPPED)
+    result = check_text(read_document(file))
+    typer.echo(
+        f"{file.name}: {len(result.statistics)} statistics read, {result.n_checked} checked, "
+        f"{result.n_wrong} do not fit, {len(result.unread)} could not be read"
+    )
+    for statistic in result.statistics:
+        for problem in statistic.problems:
+            grave = " (significant by one, not by the other)" if statistic.verdict == "decision" else ""
+            typer.echo("\n".join(wrap(f"- {statistic.text}: {problem}{grave}")))
+    for fragment in result.unread:
+        typer.echo("\n".join(wrap(f"- could not be read: {fragment}")))
+    if json is not None:
+        counts = {"read": len(result.statistics), "checked": result.n_checked, "wrong": result.n_wrong}
+        with whole_file(json) as temporary:
+            temporary.write_text(json_text({"file": file.name, **counts, **asdict(result)}), encoding="utf-8")
+
+
+def _check_figures(figures: Path, json: Path | None) -> None:
+    from analysis.files import json_text, whole_file
+    from analysis.paper import check as checks
+    from analysis.paper.printed import load_figures
+    from analysis.report.formats import wrap
+
+    paper = load_figures(figures)
     findings = checks.check_paper(paper)
     typer.echo("\n".join(wrap(f"{paper.title}. {paper.source}")))
     for study in paper.study:

@@ -7,6 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from analysis.files import whole_file
+from analysis.paper.document import plain
+from analysis.paper.statistics import check_text
 from analysis.plans.result import Analysis
 from analysis.report.formats import Table, as_latex, as_markdown
 from analysis.report.json_output import as_json
@@ -102,6 +104,16 @@ def _latex(analysis: Analysis, tables: tuple[Table, ...]) -> str:
     return head + "\n".join(as_latex(table) for table in tables)
 
 
+def self_check(said: tuple[str, ...]) -> str:
+    """What `check-paper` finds in the report's own sentences, in words."""
+    result = check_text(plain("\n\n".join(said)))
+    return (
+        f"Checked by analysis check-paper: {len(result.statistics)} statistics read in these sentences, "
+        f"{result.n_checked} recomputed from their own df, {result.n_wrong} do not fit, "
+        f"{len(result.unread)} could not be read."
+    )
+
+
 def _render(
     template: str, analysis: Analysis, pictures: tuple[Picture, ...], sections: tuple[Section, ...]
 ) -> str:
@@ -123,6 +135,7 @@ def _render(
         first=tables[0],
         tables=tables[1:],
         sentences=sentences(analysis),
+        self_check=self_check(sentences(analysis)),
         left_out=left_out(analysis.exclusions) if analysis.exclusions else (),
         pictures=pictures,
         sections=sections,

@@ -7,6 +7,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from analysis.paper.document import plain
+from analysis.paper.statistics import check_text
 from analysis.plans.result import Analysis, analyse_cells
 from analysis.plans.sensitivity import bayes_factors
 from analysis.plans.study import analyse_study
@@ -16,7 +18,7 @@ from analysis.report.json_output import as_data, as_json
 from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables, paper_table
-from analysis.report.write import write_report
+from analysis.report.write import self_check, write_report
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
@@ -66,6 +68,13 @@ def test_every_f_of_a_sentence_stands_beside_its_own_effect_size(analysis) -> No
     for df1, df2, f, eta in (match for matches in found for match in matches):
         size = float(f) * float(df1) / (float(f) * float(df1) + float(df2))
         assert float(eta) == pytest.approx(size, abs=0.0101), (f, df1, df2)
+
+
+def test_the_report_finds_no_fault_with_its_own_sentences(analysis) -> None:
+    said = self_check(sentences(analysis))
+    read, checked, wrong, unread = map(int, re.findall(r"\d+", said))
+    assert read == checked >= len(analysis.anova.effects)
+    assert (wrong, unread) == (0, 0), check_text(plain("\n\n".join(sentences(analysis))))
 
 
 def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:

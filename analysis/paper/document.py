@@ -1,0 +1,153 @@
+"""The text of a manuscript or report: plain text, Markdown, HTML, TeX, DOCX, or the text layer of a PDF."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+from experiments.errors import InputError
+
+KINDS = (".txt", ".md", ".html", ".htm", ".tex", ".docx", ".pdf")
+
+_HIDDEN = frozenset({"script", "style", "head", "svg", "template"})
+_BLOCKS = frozenset({"p", "li", "tr", "td", "th", "div", "h1", "h2", "h3", "h4", "figcaption", "br", "table"})
+_TEX_WORDS = {
+    r"\eta": "η",
+    r"\chi": "χ",
+    r"\omega": "ω",
+    r"\epsilon": "ε",
+    r"\varepsilon": "ε",
+    r"\le": "<",
+    r"\leq": "<",
+    r"\ge": ">",
+    r"\geq": ">",
+    r"\times": "×",
+    r"\pm": "±",
+}
+_SIGNS = str.maketrans(
+    {
+        **dict.fromkeys("\u00a0\u2009\u202f\u2002\u2003\u2005\u2006\u2007\u200a\t", " "),
+        **dict.fromkeys("−‒–—\u2010\u2011", "-"),
+        **dict.fromkeys("\u200b\u00ad\ufeff", ""),
+        "²": "2",
+        "ₚ": "p",
+        "≤": "<",
+        "≥": ">",
+        "𝐹": "F",
+        "𝑝": "p",
+        "𝑡": "t",
+        "𝜂": "η",
+        "𝜒": "χ",
+    }
+)
+
+
+def read_document(path: Path) -> str:
+    """The text of a file by its suffix, one paragraph, list item or table cell a line.
+
+    Parameters
+    ----------
+    path : Path
+        A file whose suffix is one of `KINDS`.
+
+    Returns
+    -------
+    str
+        Text with plain signs: spaces, minus, superscript and subscript as ordinary characters.
+
+    Raises
+    ------
+    InputError
+        No file, another suffix, a damaged file, or a PDF without a text layer.
+    """
+    if not path.is_file():
+        raise InputError(f"no file {path}; expected {', '.join(KINDS)} or a TOML file of figures")
+    suffix = path.suffix.lower()
+    if suffix == ".docx":
+        return plain(_docx(path))
+    if suffix == ".pdf":
+        return plain(_pdf(path))
+    if suffix not in KINDS:
+        raise InputError(f"{path.name}: cannot read '{suffix}'; expected {', '.join(KINDS)} or .toml")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is not UTF-8 text ({error.reason}); save it as UTF-8") from error
+    if suffix in (".html", ".htm"):
+        return plain(html_text(text))
+    if suffix == ".tex":
+        return plain(tex_text(text))
+    return plain(re.sub(r"[*_`\\]", "", text) if suffix == ".md" else text)
+
+
+def plain(text: str) -> str:
+    """Text with one kind of space and minus, and no raised or lowered signs."""
+    return re.sub(r" {2,}", " ", text.translate(_SIGNS))
+
+
+class _Text(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.parts: list[str] = []
+        self.hidden = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        del attrs
+        self.hidden += tag in _HIDDEN
+        if tag in _BLOCKS:
+            self.parts.append("\n")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.hidden -= tag in _HIDDEN and self.hidden > 0
+        if tag in _BLOCKS:
+            self.parts.append("\n")
+
+    def handle_data(self, data: str) -> None:
+        if not self.hidden:
+            self.parts.append(re.sub(r"\s+", " ", data))
+
+
+def html_text(html: str) -> str:
+    """What a reader of an HTML page sees, a line a block."""
+    parser = _Text()
+    parser.feed(html)
+    parser.close()
+    return "".join(parser.parts)
+
+
+def tex_text(tex: str) -> str:
+    """TeX source without comments, mathematics signs and formatting; names of Greek letters as letters."""
+    text = re.sub(r"(?<!\\)%.*", "", tex)
+    text = re.sub(r"\\[,;:! ]|~", " ", text)
+    text = re.sub(r"\\([%&#_$])", r"\1", text)
+    for word, sign in sorted(_TEX_WORDS.items(), key=lambda item: -len(item[0])):
+        text = re.sub(re.escape(word) + r"(?![A-Za-z])", sign, text)
+    text = re.sub(r"\\[A-Za-z]+\*?(\[[^\]]*\])?", "", text)
+    text = re.sub(r"[{}$]|\\[()\[\]]", "", text)
+    return re.sub(r"\\\\|(?<!\S)&(?!\S)", "\n", re.sub(r"[\^_]", "", text))
+
+
+def _docx(path: Path) -> str:
+    # only this kind of file needs the package
+    from docx import Document
+    from docx.opc.exceptions import OpcError
+
+    try:
+        document = Document(str(path))
+    except (OpcError, KeyError, ValueError) as error:
+        raise InputError(f"{path.name} is not a readable DOCX file: {error}") from error
+    lines = [paragraph.text for paragraph in document.paragraphs]
+    lines += [cell.text for table in document.tables for row in table.rows for cell in row.cells]
+    return "\n".join(lines)
+
+
+def _pdf(path: Path) -> str:
+    from pypdf import PdfReader
+    from pypdf.errors import PyPdfError
+
+    try:
+        text = "\n".join(page.extract_text() for page in PdfReader(path).pages)
+    except (PyPdfError, ValueError, KeyError) as error:
+        raise InputError(f"{path.name} is not a readable PDF file: {error}") from error
+    if not text.strip():
+        raise InputError(f"{path.name} has no text layer (a scan?); save it as text first")
+    return text

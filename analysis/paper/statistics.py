@@ -1,0 +1,218 @@
+"""Statistics reported in running text: found, recomputed from their own numbers, or not readable."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from scipy import special
+
+from analysis.paper.printed import Rounded
+from analysis.report.numbers import share
+from analysis.within.eta_squared import partial_eta_squared_ci
+
+Kind = Literal["F", "t", "chi2", "r", "z"]
+Verdict = Literal["consistent", "inconsistent", "decision", "unchecked"]
+
+KINDS: tuple[Kind, ...] = ("F", "t", "chi2", "r", "z")
+
+_NUMBER = r"-?(?:\d+(?:\.\d+)?|\.\d+)"
+_STATISTIC = re.compile(
+    rf"(?<![A-Za-z])(?:"
+    rf"(?P<F>F) ?[(\[] ?(?P<f1>{_NUMBER}) ?[,;/] ?(?P<f2>{_NUMBER}) ?[)\]]"
+    rf"|(?P<t>t) ?[(\[] ?(?P<t1>{_NUMBER}) ?[)\]]"
+    rf"|(?P<chi2>(?:χ|chi)[- ]?2|chi[- ]squared?|X2) ?[(\[] ?(?P<c1>{_NUMBER})"
+    rf"(?: ?[,;] ?N ?= ?[\d,]+)? ?[)\]]"
+    rf"|(?P<r>r) ?[(\[] ?(?P<r1>{_NUMBER}) ?[)\]]"
+    rf"|(?P<z>[zZ])(?= ?= ?-?[\d.])"
+    rf") ?= ?(?P<value>{_NUMBER})"
+)
+_P = re.compile(rf"(?<![A-Za-z])[pP] ?(?P<sign>[=<>]) ?(?P<p>{_NUMBER})")
+_ETA = re.compile(
+    rf"(?P<before>partial |generali[sz]ed )?(?:η|eta)(?P<after> squared|[- ]?2 ?p|[- ]?2| ?p ?2)?"
+    rf" ?= ?(?P<eta>{_NUMBER})"
+    rf"(?:,? ?(?P<level>\d\d) ?% ?CI:? ?[\[(] ?(?P<low>{_NUMBER}) ?[,;] ?(?P<high>{_NUMBER}) ?[\])])?"
+)
+_LOOKS_LIKE = re.compile(r"(?<![A-Za-z])(?:F ?[(\[]|t ?[(\[] ?\d|(?:χ|chi) ?-?2 ?[(\[]|[pP] ?[=<>] ?\.?\d)")
+
+REACH = 160
+"""Characters after a statistic in which its p and its effect size are looked for."""
+
+INTERVAL_TOLERANCE = 0.015
+"""How far a printed bound of an effect size may lie from the recomputed one."""
+
+
+@dataclass(frozen=True)
+class ReportedStatistic:
+    """One statistic as printed, with what recomputation says.
+
+    `p_range` are the p values that printed statistic and df allow, given their rounding; `problems` say what
+    does not fit. `decision`: significant at .05 by one and not by the other.
+    """
+
+    text: str
+    kind: Kind
+    df: tuple[str, ...]
+    value: str
+    p: str | None
+    effect_size: str | None
+    p_range: tuple[float, float]
+    verdict: Verdict
+    problems: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TextCheck:
+    """The statistics read in a text, and fragments that look like statistics and could not be read."""
+
+    statistics: tuple[ReportedStatistic, ...]
+    unread: tuple[str, ...]
+
+    @property
+    def n_checked(self) -> int:
+        """Statistics with a p or an effect size to compare with."""
+        return sum(s.verdict != "unchecked" for s in self.statistics)
+
+    @property
+    def n_wrong(self) -> int:
+        """Statistics that do not fit their p or effect size."""
+        return sum(s.verdict in ("inconsistent", "decision") for s in self.statistics)
+
+
+def check_text(text: str) -> TextCheck:
+    """Read and check every statistic of `text` (plain signs, see `analysis.paper.document.plain`)."""
+    matches = list(_STATISTIC.finditer(text))
+    found, covered = [], []
+    for match, following in zip(matches, [*matches[1:], None], strict=True):
+        end = min(match.end() + REACH, following.start() if following else len(text))
+        tail = text[match.end() : end].split("\n\n")[0]
+        reported, used = _reported(match, tail)
+        found.append(reported)
+        covered.append((match.start(), match.end() + used))
+    unread = [
+        " ".join(text[m.start() : m.start() + 60].split())
+        for m in _LOOKS_LIKE.finditer(text)
+        if not any(start <= m.start() < end for start, end in covered)
+    ]
+    return TextCheck(tuple(found), tuple(unread))
+
+
+def _reported(match: re.Match[str], tail: str) -> tuple[ReportedStatistic, int]:
+    kind = next(k for k in KINDS if match[k])
+    df = tuple(match[g] for g in ("f1", "f2", "t1", "c1", "r1") if match[g])
+    p, eta = _P.search(tail), _ETA.search(tail) if kind == "F" else None
+    allowed = p_range(kind, df, match["value"])
+    problems = [
+        *(_p_problems(p, allowed) if p else ()),
+        *(_eta_problems(df, match["value"], eta) if eta else ()),
+    ]
+    crosses = bool(p and problems and _crosses(p, allowed))
+    verdict: Verdict = "consistent" if p or eta else "unchecked"
+    if problems:
+        verdict = "decision" if crosses else "inconsistent"
+    used = max(p.end() if p else 0, eta.end() if eta else 0)
+    text = " ".join((match[0] + tail[:used]).split())
+    said = f"{p['sign']} {p['p']}" if p else None
+    size = eta["eta"] if eta else None
+    reported = ReportedStatistic(
+        text,
+        kind,
+        df,
+        match["value"],
+        said,
+        size,
+        allowed,
+        verdict,
+        tuple(problems),
+    )
+    return reported, used
+
+
+def _corners(printed: str, whole_is_exact: bool = False) -> tuple[float, ...]:
+    """The ends of what rounds to a printed number."""
+    if whole_is_exact and "." not in printed:
+        return (float(printed),)
+    rounded = Rounded.of(printed)
+    return float(rounded.low), float(rounded.high)
+
+
+def p_range(kind: Kind, df: tuple[str, ...], value: str) -> tuple[float, float]:
+    """Smallest and largest p that a printed statistic allows, two-sided for t, r and z."""
+    values = [abs(v) for v in _corners(value.lstrip("-"))]
+    degrees = product(*(_corners(d, whole_is_exact=True) for d in df))
+    p = [_p(kind, at, max(v, 0.0)) for at in degrees for v in values]
+    return min(p), max(p)
+
+
+def _p(kind: Kind, df: tuple[float, ...], value: float) -> float:
+    if min(df, default=1.0) <= 0:
+        return float("nan")
+    if kind == "F":
+        return float(special.fdtrc(df[0], df[1], value))
+    if kind == "t":
+        return float(2 * special.stdtr(df[0], -value))
+    if kind == "chi2":
+        return float(special.chdtrc(df[0], value))
+    if kind == "r":
+        r = min(value, 1 - 1e-12)
+        return float(2 * special.stdtr(df[0], -r * np.sqrt(df[0] / (1 - r * r))))
+    return float(2 * special.ndtr(-value))
+
+
+def _p_problems(p: re.Match[str], allowed: tuple[float, float]) -> Iterator[str]:
+    low, high = allowed
+    printed = float(p["p"])
+    if printed > 1 or printed < 0:
+        yield f"p = {p['p']} is no probability"
+        return
+    if p["sign"] == "<":
+        fits = low < printed
+    elif p["sign"] == ">":
+        fits = high > printed
+    else:
+        least, largest = _corners(p["p"])
+        fits = low <= largest and high >= least
+    if not fits:
+        shown = _shown(low) if _shown(low) == _shown(high) else f"{_shown(low)} to {_shown(high)}"
+        yield f"p {p['sign']} {p['p']} is printed, the statistic gives p = {shown}"
+
+
+def _shown(p: float) -> str:
+    return share(p, 3) if p >= 0.001 else f"{p:.1e}"
+
+
+def _crosses(p: re.Match[str], allowed: tuple[float, float], level: float = 0.05) -> bool:
+    printed = float(p["p"])
+    if not 0 <= printed <= 1:
+        return False
+    claimed = printed <= level if p["sign"] == "<" else printed < level if p["sign"] == "=" else False
+    return (claimed and allowed[0] > level) or (not claimed and allowed[1] < level)
+
+
+def _eta_problems(df: tuple[str, ...], value: str, eta: re.Match[str]) -> Iterator[str]:
+    first, second = (_corners(d, whole_is_exact=True) for d in df)
+    sizes = [f * a / (f * a + b) for f in _corners(value) for a in first for b in second if f > 0]
+    least, largest = _corners(eta["eta"])
+    before, after = eta["before"] or "", eta["after"] or ""
+    partial = before.startswith("partial") or "p" in after
+    # a generalised or plain eta squared may be smaller than the partial one, never larger
+    if sizes and (max(sizes) < least or (partial and min(sizes) > largest)):
+        yield f"η² = {eta['eta']} is printed, F and df give a partial η² of {share(float(np.mean(sizes)), 2)}"
+        return
+    if eta["low"] is None or not partial:
+        return
+    low, high = float(eta["low"]), float(eta["high"])
+    f, df1, df2 = (np.array([float(n)]) for n in (value, *df))
+    (bounds,) = partial_eta_squared_ci(f, df1, df2, float(eta["level"]) / 100)
+    # with few error df the interval of the noncentral F may end below the size, which is biased upwards
+    if max(abs(bounds[0] - low), abs(bounds[1] - high)) <= INTERVAL_TOLERANCE:
+        return
+    if not low <= float(eta["eta"]) <= high:
+        yield f"the interval [{eta['low']}, {eta['high']}] does not hold its own η² = {eta['eta']}"
+        return
+    yield (
+        f"the {eta['level']}% interval [{eta['low']}, {eta['high']}] is not that of the noncentral F, "
+        f"[{share(float(bounds[0]), 2)}, {share(float(bounds[1]), 2)}]"
+    )

@@ -1,0 +1,98 @@
+"""Statistics in running text: read, recomputed, and told when they do not fit."""
+
+import pytest
+from typer.testing import CliRunner
+
+from analysis.cli import app
+from analysis.paper.document import html_text, plain, read_document, tex_text
+from analysis.paper.statistics import check_text
+from experiments.errors import InputError
+
+
+def only(text: str):
+    (statistic,) = check_text(plain(text)).statistics
+    return statistic
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "F(1, 30) = 4.56, p = .041, partial η² = .13",
+        "F(2.21, 33.13) = 11.20, p < .001",
+        "F(3, 29) = 0.50, p = .685",
+        "t(28) = -2.10, p = .045",
+        "χ²(2, N = 90) = 9.21, p = .010",
+        "r(48) = .31, p = .028",
+        "z = 2.33, p = .020",
+        "F(1, 18) = 0.2, p > .05",
+        "F(1, 40) = 9.00, p = .005, generalised η² = .05",
+    ],
+)
+def test_what_fits_is_consistent(text) -> None:
+    assert only(text).verdict == "consistent", only(text).problems
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict", "why"),
+    [
+        ("F(1, 30) = 4.56, p = .41", "decision", "gives p = .0"),
+        ("F(1, 30) = 4.56, p = .030", "inconsistent", "gives p = .041"),
+        ("t(28) = 1.20, p < .05", "decision", "the statistic gives"),
+        ("F(12, 31) = 4.21, p < .001, partial η² = .12", "inconsistent", "partial η² of .62"),
+        ("F(1, 30) = 4.56, p = .041, η² = .40", "inconsistent", "partial η² of .13"),
+        ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.20, .40]", "inconsistent", "does not hold"),
+        ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.10, .14]", "inconsistent", "noncentral F"),
+        ("r(48) = .31, p = 1.2", "inconsistent", "no probability"),
+    ],
+)
+def test_what_does_not_fit_is_told(text, verdict, why) -> None:
+    statistic = only(text)
+    assert statistic.verdict == verdict
+    assert why in statistic.problems[0]
+
+
+def test_each_statistic_has_its_own_p_and_what_is_unread_is_said() -> None:
+    result = check_text("F(1, 30) = 4.56, and t(28) = 2.10, p = .045. Also F (see Table 2) and p = .03.")
+    assert [s.verdict for s in result.statistics] == ["unchecked", "consistent"]
+    assert any(fragment.startswith("p = .03") for fragment in result.unread)
+
+
+def test_html_and_tex_are_read_as_their_readers_see_them() -> None:
+    html = "<p><em>F</em>(1,&nbsp;30) = 4.56, <i>p</i> = .041, η<sub>p</sub><sup>2</sup> = .13</p>"
+    html += "<script>F(1, 2) = 3</script>"
+    tex = r"$F(1, 30) = 4.56$, $p = .041$, $\eta_p^2 = .13$ % F(1, 30) = 9, p = .5"
+    for text in (html_text(html), tex_text(tex)):
+        statistic = only(text)
+        assert (statistic.effect_size, statistic.verdict) == (".13", "consistent")
+
+
+def test_docx_and_pdf(tmp_path) -> None:
+    docx = pytest.importorskip("docx", reason="python-docx is not installed")
+    document = docx.Document()
+    document.add_paragraph("F(1, 30) = 4.56, p = .41")
+    document.save(tmp_path / "m.docx")
+    result = CliRunner().invoke(app, ["check-paper", str(tmp_path / "m.docx")])
+    assert "1 statistics read, 1 checked, 1 do not fit, 0 could not be read" in result.output
+    (tmp_path / "broken.docx").write_bytes(b"no zip")
+    with pytest.raises(InputError, match="not a readable DOCX"):
+        read_document(tmp_path / "broken.docx")
+
+
+def test_a_pdf_is_read_by_its_text_layer(tmp_path) -> None:
+    pytest.importorskip("pypdf", reason="pypdf is not installed")
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    figure.text(0.1, 0.5, "F(1, 30) = 4.56, p = .041")
+    figure.savefig(tmp_path / "m.pdf")
+    assert only(read_document(tmp_path / "m.pdf")).verdict == "consistent"
+    Figure().savefig(tmp_path / "empty.pdf")
+    with pytest.raises(InputError, match="no text layer"):
+        read_document(tmp_path / "empty.pdf")
+
+
+@pytest.mark.parametrize(("name", "message"), [("absent.txt", "no file"), ("m.xyz", "cannot read '.xyz'")])
+def test_other_files_are_refused(tmp_path, name, message) -> None:
+    (tmp_path / "m.xyz").write_text("x")
+    with pytest.raises(InputError, match=message):
+        read_document(tmp_path / name)
