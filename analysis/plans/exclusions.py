@@ -134,10 +134,10 @@ def _attention(rule: rules.ExcludeAttention, rows: pd.DataFrame) -> Finding:
 
 
 def _playback(rule: rules.ExcludePlayback, rows: pd.DataFrame) -> Finding:
-    poor = ~rows["verdict"].isin(["good", ""]).to_numpy()
+    poor = rows["verdict"].isin(["flagged", "failed"]).to_numpy()
     shares = pd.Series(poor, index=rows.index).groupby(rows["run"], observed=True).mean()
     return [
-        (str(run), f"{share:.0%} of plays were not good")
+        (str(run), f"{share:.0%} of plays were flagged or failed")
         for run, share in shares.items()
         if share > rule.more_than
     ]

@@ -1,4 +1,4 @@
-"""Exclusion by the share of plays that were not good."""
+"""Exclusion by the share of plays that were flagged or failed."""
 
 from typing import Annotated, Literal
 
@@ -8,7 +8,7 @@ from experiments.base import Declaration
 
 
 class ExcludePlayback(Declaration):
-    """Leave out participants with more than this share of plays that were not good."""
+    """Leave out participants with more than this share of plays that were flagged or failed."""
 
     rule: Literal["poor_playback_share"] = "poor_playback_share"
     more_than: Annotated[float, Field(ge=0, le=1)] = 0.2

@@ -1,4 +1,4 @@
-"""When a play of a clip is flagged or failed."""
+"""When a play of a clip is uncertain, flagged or failed."""
 
 from typing import Annotated
 
@@ -8,10 +8,12 @@ from experiments.base import Declaration
 
 
 class PlaybackRules(Declaration):
-    """When a play is flagged or failed. Counts are frames of the clip, times are milliseconds.
+    """When a play is uncertain, flagged or failed. Counts are frames of the clip, times are milliseconds.
 
     A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
-    breaking a `flagged_*` limit is flagged, any other is good.
+    breaking a `flagged_*` limit is flagged. One whose animation clock ran more unevenly than
+    `uncertain_unevenness_ms` is uncertain: all frames were drawn, and one may not have reached the screen.
+    Frames that stay for several refreshes are allowed more. Any other play is good.
     """
 
     flagged_missing_frames: Annotated[int, Field(ge=0)] = 0
@@ -19,6 +21,7 @@ class PlaybackRules(Declaration):
     flagged_late_frames: Annotated[int, Field(ge=0)] = 2
     flagged_longest_gap_ms: Annotated[float, Field(gt=0)] = 70.0
     failed_longest_gap_ms: Annotated[float, Field(gt=0)] = 250.0
+    uncertain_unevenness_ms: Annotated[float, Field(gt=0)] = 3.0
     fail_on_focus_lost: bool = True
     flag_video_fallback: bool = True
     max_repeats: Annotated[int, Field(ge=0, le=5)] = 1

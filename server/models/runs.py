@@ -122,7 +122,7 @@ class Rating(Base):
             ondelete="CASCADE",
         ),
         one_of("method", "webcodecs", "video", "none"),
-        one_of("verdict", "good", "flagged", "failed"),
+        one_of("verdict", "good", "uncertain", "flagged", "failed"),
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -144,6 +144,8 @@ class Rating(Base):
     frames_late: Mapped[int | None]
     frames_missing: Mapped[int | None]
     longest_gap_ms: Mapped[float | None]
+    clock_gap_ms: Mapped[float | None]
+    clock_late_ms: Mapped[float | None]
     stalls: Mapped[int | None]
     focus_lost: Mapped[bool | None]
     refresh_rate_hz: Mapped[float | None]

@@ -1,6 +1,6 @@
 """The heat map participants x trials, kept up to date from new ratings alone.
 
-One letter a trial: `.` not answered, `g` good, `f` flagged, `x` failed and not yet shown again.
+One letter a trial: `.` not answered, `g` good, `u` uncertain, `f` flagged, `x` failed and not yet shown again.
 """
 
 import threading
@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 
 from server.models import Rating, StudyRun
 
-LETTERS = {"good": "g", "flagged": "f", "failed": "x"}
-_BETTER = {".": 0, "x": 1, "f": 2, "g": 3}
+LETTERS = {"good": "g", "uncertain": "u", "flagged": "f", "failed": "x"}
+_BETTER = {".": 0, "x": 1, "f": 2, "u": 3, "g": 4}
 # Two transactions may commit in another order than they took their numbers; read a few again.
 _READ_AGAIN = 200
 

@@ -22,10 +22,11 @@ class MonitoredRun(BaseModel):
     last_seen_at: datetime
     answered: int
     trials: int
+    uncertain: int
     flagged: int
     failed: int
     excluded: bool
-    heat: str = Field(description="One letter a trial: . open, g good, f flagged, x failed.")
+    heat: str = Field(description="One letter a trial: . open, g good, u uncertain, f flagged, x failed.")
 
 
 class FunnelStep(BaseModel):

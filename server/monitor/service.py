@@ -89,6 +89,7 @@ def monitored(run: Any, heat: HeatMap, moment: datetime, lease: timedelta) -> Mo
             "last_seen_at": run.last_seen_at,
             "answered": len(letters) - letters.count("."),
             "trials": run.trials_total,
+            "uncertain": letters.count("u"),
             "flagged": letters.count("f"),
             "failed": letters.count("x"),
             "excluded": run.excluded,

@@ -68,7 +68,7 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
     run = repository.find_run(session, study, public_id)
     plays = repository.plays(session, run)
     answered = len({rating.trial_index for rating, _, _ in plays})
-    not_good = sum(rating.verdict != "good" for rating, _, _ in plays)
+    not_good = sum(rating.verdict in ("flagged", "failed") for rating, _, _ in plays)
     return Timeline(
         summary=summary(run, answered, not_good),
         device=run.device,

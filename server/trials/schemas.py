@@ -22,6 +22,12 @@ class PlaybackLog(BaseModel):
     frames_late: Count | None = None
     frames_missing: Count | None = None
     longest_gap_ms: Milliseconds | None = None
+    clock_gap_ms: Milliseconds | None = Field(
+        default=None, description="Longest time between two callbacks of the animation clock."
+    )
+    clock_late_ms: Annotated[float, Field(ge=-1e10, le=1e10, allow_inf_nan=False)] | None = Field(
+        default=None, description="Longest time by which a callback ran after its refresh."
+    )
     stalls: Count | None = None
     focus_lost: Count | None = Field(default=None, description="How often focus was lost.")
     refresh_rate_hz: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] | None = None
@@ -54,7 +60,7 @@ class Receipt(BaseModel):
 
     rating_id: str
     saved_at: datetime
-    verdict: Literal["good", "flagged", "failed"]
+    verdict: Literal["good", "uncertain", "flagged", "failed"]
     rule: str = Field(description="The rule that gave the verdict, empty where good.")
     again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
     remaining: int = Field(description="Trials of the run that still need an answer.")

@@ -1,4 +1,8 @@
-"""The playback verdict of one play, by the declared rules: good, flagged, or failed with the rule's name."""
+"""The playback verdict of one play, by the declared rules: good, uncertain, flagged or failed, and by which rule.
+
+`good` says that every frame was on the screen, within the uncertainty that docs/participant.md states per browser.
+`uncertain` says that nothing is known against the play, and not enough for it.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,9 +10,14 @@ from typing import Literal
 
 from experiments.rules import PlaybackRules
 
-Verdict = Literal["good", "flagged", "failed"]
+Verdict = Literal["good", "uncertain", "flagged", "failed"]
 Ruling = tuple[Verdict, str]
 GOOD: Ruling = ("good", "")
+ASSUMED_REFRESH_HZ = 60.0
+SLACK_SHARE = 0.7
+"""Share of a frame's slack that the clock may be uneven by; measured by `make scope` (decision 0351)."""
+ROUNDING = 0.05
+"""60 fps on a screen of 59.9 Hz counts as one refresh a frame."""
 
 
 @dataclass(frozen=True)
@@ -16,6 +25,7 @@ class Playback:
     """What the page measured of one play, over all its views; None where it could not.
 
     frames_seen: different frames in the page's log of drawn frames, see `frames_in_log`.
+    clock_gap_ms, clock_late_ms: how unevenly the animation clock ran that drew the clip.
     """
 
     method: Literal["webcodecs", "video", "none"]
@@ -26,10 +36,19 @@ class Playback:
     longest_gap_ms: float | None
     focus_lost: bool | None
     frames_seen: int | None = None
+    refresh_rate_hz: float | None = None
+    clock_gap_ms: float | None = None
+    clock_late_ms: float | None = None
 
 
 def judge(
-    rules: PlaybackRules, playback: Playback, clip_sha256: str | None, frames: int, *, rated: bool
+    rules: PlaybackRules,
+    playback: Playback,
+    clip_sha256: str | None,
+    frames: int,
+    fps: float,
+    *,
+    rated: bool,
 ) -> Ruling:
     """The verdict on one play and the rule that gave it.
 
@@ -37,7 +56,8 @@ def judge(
     ----------
     rules: as declared. playback: as measured.
     clip_sha256: of the clip assigned, None for trials without one.
-    frames: that should have been drawn, over all views. rated: False where no rating could be given.
+    frames: that should have been drawn, over all views. fps: of the clip, in frames a second.
+    rated: False where no rating could be given.
     """
     if clip_sha256 is None:
         return GOOD if rated else ("failed", "not_rated")
@@ -49,7 +69,10 @@ def judge(
     if failed or not rated:
         return "failed", failed or "not_rated"
     flagged = _flagged(rules, playback, frames)
-    return ("flagged", flagged) if flagged else GOOD
+    if flagged:
+        return "flagged", flagged
+    uncertain = _uncertain(rules, playback, fps)
+    return ("uncertain", uncertain) if uncertain else GOOD
 
 
 def _failed(rules: PlaybackRules, playback: Playback) -> str:
@@ -75,6 +98,34 @@ def _flagged(rules: PlaybackRules, playback: Playback, frames: int) -> str:
         return "no_frame_log"
     # The counts are the page's own; its log of drawn frames must tell the same.
     return "" if frames - playback.frames_seen == playback.frames_missing else "frame_log_disagrees"
+
+
+def _uncertain(rules: PlaybackRules, playback: Playback, fps: float) -> str:
+    if playback.method == "video":
+        return "video_fallback"
+    unevenness_ms = _unevenness_ms(playback)
+    if unevenness_ms is None:
+        return "no_clock_record"
+    limit_ms = rules.uncertain_unevenness_ms + SLACK_SHARE * _slack_ms(playback.refresh_rate_hz, fps)
+    return "uncertain_unevenness_ms" if unevenness_ms > limit_ms else ""
+
+
+def _unevenness_ms(playback: Playback) -> float | None:
+    """By how much the animation clock was later than even, at the worst."""
+    if playback.clock_gap_ms is None or playback.clock_late_ms is None:
+        return None
+    return max(playback.clock_gap_ms - _refresh_ms(playback.refresh_rate_hz), playback.clock_late_ms)
+
+
+def _slack_ms(refresh_rate_hz: float | None, fps: float) -> float:
+    """How long the shortest-shown frame stays beyond one refresh: it may come that much late and is still seen."""
+    refresh_ms = _refresh_ms(refresh_rate_hz)
+    refreshes = int(1000 / fps / refresh_ms + ROUNDING)
+    return max(0, refreshes - 1) * refresh_ms
+
+
+def _refresh_ms(refresh_rate_hz: float | None) -> float:
+    return 1000 / (refresh_rate_hz or ASSUMED_REFRESH_HZ)
 
 
 def frames_in_log(indices: Iterable[int]) -> int:

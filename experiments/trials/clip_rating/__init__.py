@@ -14,6 +14,7 @@ EFFECTS: dict[str, Effect] = {
     "views": "measured",
     "start": "measured",
     "fixation_ms": "measured",
+    "pointer_delay_ms": "wording",
     "confirm": "measured",
     "comment": "wording",
     "expected_seconds": "wording",

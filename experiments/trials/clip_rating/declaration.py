@@ -29,13 +29,17 @@ class Scale(Declaration):
 
 
 class ClipRating(TrialDeclaration):
-    """The single-clip rating: start by key, one view (or `views`), answer after the clip's end."""
+    """The single-clip rating: start by key, one view (or `views`), answer after the clip's end.
+
+    A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+    """
 
     kind: Literal["clip_rating"] = "clip_rating"
     scale: Scale
     views: Annotated[int, Field(ge=1, le=10)] = 1
     start: Literal["key", "fixation"] = "key"
     fixation_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
+    pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
     confirm: bool = False
     comment: bool = False
 

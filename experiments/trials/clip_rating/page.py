@@ -20,6 +20,7 @@ class ShownClipRating(Declaration):
     views: int
     start: Literal["key", "fixation"]
     fixation_ms: int
+    pointer_delay_ms: int
     confirm: bool
     comment: bool
     expected_seconds: float
@@ -34,6 +35,7 @@ def shown(experiment: "Experiment") -> ShownClipRating:
         views=trial.views,
         start=trial.start,
         fixation_ms=trial.fixation_ms,
+        pointer_delay_ms=trial.pointer_delay_ms,
         confirm=trial.confirm,
         comment=trial.comment,
         expected_seconds=trial.expected_seconds,

@@ -1721,6 +1721,8 @@ export interface components {
         /**
          * ClipRating
          * @description The single-clip rating: start by key, one view (or `views`), answer after the clip's end.
+         *
+         *     A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
          */
         ClipRating: {
             /**
@@ -1750,6 +1752,11 @@ export interface components {
              * @default 500
              */
             fixation_ms: number;
+            /**
+             * Pointer Delay Ms
+             * @default 1500
+             */
+            pointer_delay_ms: number;
             /**
              * Confirm
              * @default false
@@ -3015,6 +3022,16 @@ export interface components {
             frames_missing?: number | null;
             /** Longest Gap Ms */
             longest_gap_ms?: number | null;
+            /**
+             * Clock Gap Ms
+             * @description Longest time between two callbacks of the animation clock.
+             */
+            clock_gap_ms?: number | null;
+            /**
+             * Clock Late Ms
+             * @description Longest time by which a callback ran after its refresh.
+             */
+            clock_late_ms?: number | null;
             /** Stalls */
             stalls?: number | null;
             /**
@@ -3167,7 +3184,7 @@ export interface components {
              * Verdict
              * @enum {string}
              */
-            verdict: "good" | "flagged" | "failed";
+            verdict: "good" | "uncertain" | "flagged" | "failed";
             /**
              * Rule
              * @description The rule that gave the verdict, empty where good.
@@ -3865,6 +3882,8 @@ export interface components {
             start: "key" | "fixation";
             /** Fixation Ms */
             fixation_ms: number;
+            /** Pointer Delay Ms */
+            pointer_delay_ms: number;
             /** Confirm */
             confirm: boolean;
             /** Comment */

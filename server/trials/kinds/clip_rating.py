@@ -41,10 +41,10 @@ def judge(loaded: "LoadedVersion", clips: tuple[int, ...], rating: RatingIn) -> 
     """The verdict on one play over all its views, and the rule that gave it."""
     rules, rated = loaded.experiment.playback, rating.response is not None
     if not clips:
-        return judge_play(rules, _playback(rating.playback), None, 0, rated=rated)
+        return judge_play(rules, _playback(rating.playback), None, 0, 0.0, rated=rated)
     clip = loaded.clips[clips[0]]
     frames = clip.frames * clip_rating_of(loaded.experiment).views
-    return judge_play(rules, _playback(rating.playback), clip.sha256, frames, rated=rated)
+    return judge_play(rules, _playback(rating.playback), clip.sha256, frames, clip.fps, rated=rated)
 
 
 def _playback(log: PlaybackLog) -> Playback:
@@ -58,6 +58,9 @@ def _playback(log: PlaybackLog) -> Playback:
         longest_gap_ms=log.longest_gap_ms,
         focus_lost=bool(log.focus_lost),
         frames_seen=seen,
+        refresh_rate_hz=log.refresh_rate_hz,
+        clock_gap_ms=log.clock_gap_ms,
+        clock_late_ms=log.clock_late_ms,
     )
 
 

@@ -7,9 +7,10 @@ import { TRIAL_COLOURS } from "./colours";
 export function Quality({ runs }: { runs: Schemas["MonitoredRun"][] }) {
   const total = (count: (run: Schemas["MonitoredRun"]) => number) => runs.reduce((sum, run) => sum + count(run), 0);
   const flagged = total((run) => run.flagged);
+  const uncertain = total((run) => run.uncertain);
   const failed = total((run) => run.failed);
   const answered = total((run) => run.answered);
-  const counts = { g: answered - flagged - failed, f: flagged, x: failed, ".": total((run) => run.trials) - answered };
+  const counts = { g: answered - uncertain - flagged - failed, u: uncertain, f: flagged, x: failed, ".": total((run) => run.trials) - answered };
   const doubtful = runs.filter((run) => run.answered >= 10 && run.flagged + run.failed > 0.1 * run.answered);
   return (
     <Card withBorder>

@@ -6,7 +6,7 @@ import { type Column, DataTable } from "../ui/DataTable";
 import { fixed, words } from "../ui/format";
 
 type Trial = Schemas["TimelineTrial"];
-const COLOURS: Record<string, string> = { good: "teal.9", flagged: "yellow.9", failed: "red.9" };
+const COLOURS: Record<string, string> = { good: "teal.9", uncertain: "blue.9", flagged: "yellow.9", failed: "red.9" };
 
 const COLUMNS: Column<Trial>[] = [
   {

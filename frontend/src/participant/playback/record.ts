@@ -1,5 +1,6 @@
 /** From the frames that were drawn to the figures stored with the rating. */
 import type { PlaybackLog } from "../../api/schema";
+import { shownPeriod } from "./schedule";
 
 /** Every key of the server's log, with the list of drawn frames. */
 export type PlaybackRecord = Required<PlaybackLog> & { drawn: NonNullable<PlaybackLog["drawn"]> };
@@ -14,6 +15,9 @@ export interface Showing {
   frames: number;
   fps: number;
   stalls: number;
+  /** How unevenly the animation clock ran; null where it could not be seen. */
+  clock_gap_ms: number | null;
+  clock_late_ms: number | null;
   /** How often the page was hidden or lost focus. */
   focus_lost: number;
 }
@@ -41,6 +45,8 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
     frames_late: sum(showings.map((showing) => late(showing, refresh_ms))),
     frames_missing: sum(showings.map((showing) => Math.max(0, showing.frames - distinct(showing.drawn)))),
     longest_gap_ms: gaps.length ? round(Math.max(...gaps)) : null,
+    clock_gap_ms: greatest(showings.map((showing) => showing.clock_gap_ms)),
+    clock_late_ms: greatest(showings.map((showing) => showing.clock_late_ms)),
     stalls: sum(showings.map((showing) => showing.stalls)),
     focus_lost: sum(showings.map((showing) => showing.focus_lost)),
     ...screen,
@@ -51,7 +57,7 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
 function late({ drawn, fps }: Showing, refresh_ms: number): number {
   const start = drawn[0];
   if (!start) return 0;
-  const due = (index: number): number => start[1] + ((index - start[0]) * 1000) / fps;
+  const due = (index: number): number => start[1] + (index - start[0]) * shownPeriod(1000 / fps, refresh_ms);
   return drawn.filter(([index, at_ms]) => at_ms - due(index) > refresh_ms + JITTER_MS).length;
 }
 
@@ -61,5 +67,8 @@ function gapsOf(drawn: Showing["drawn"]): number[] {
 
 const distinct = (drawn: Showing["drawn"]): number => new Set(drawn.map(([index]) => index)).size;
 const sum = (numbers: number[]): number => numbers.reduce((total, number) => total + number, 0);
+/** Null where one of them is: what was not seen once is not known. */
+const greatest = (values: (number | null)[]): number | null =>
+  values.length === 0 || values.includes(null) ? null : round(Math.max(...values.map((value) => value ?? 0)));
 const round = (ms: number): number => Math.round(ms * 100) / 100;
 const worst = (showings: Showing[]): PlaybackMethod => showings.find((showing) => showing.method !== "webcodecs")?.method ?? "webcodecs";

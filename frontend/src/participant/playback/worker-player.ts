@@ -9,6 +9,11 @@ interface Waiting {
   reject: (error: Error) => void;
 }
 
+/** A page laid out anew while a clip's first frames are drawn takes their place on the way to the screen. */
+function layoutShown(): Promise<void> {
+  return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => resolve())));
+}
+
 export class WorkerPlayer implements ClipPlayer {
   readonly method = "webcodecs";
   readonly element = document.createElement("canvas");
@@ -47,9 +52,12 @@ export class WorkerPlayer implements ClipPlayer {
     const { frames, fps } = (await this.prepared.get(sha256)) ?? { frames: 0, fps: 30 };
     // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
     const asked = this.ask(`played ${sha256}`, Infinity);
+    this.tell({ type: "warm" });
+    await layoutShown();
     this.tell({ type: "play", sha256, ...options });
     const message = (await asked) as FromWorker & { type: "played" };
-    return { method: "webcodecs", drawn: message.drawn, ended_at_ms: message.ended_at_ms, stalls: 0, frames, fps };
+    const { drawn, ended_at_ms, clock_gap_ms, clock_late_ms } = message;
+    return { method: "webcodecs", drawn, ended_at_ms, clock_gap_ms, clock_late_ms, stalls: 0, frames, fps };
   }
 
   release(sha256: string): void {

@@ -4,6 +4,7 @@
  */
 import { decodeClip, type DecodedClip } from "./decode";
 import { absoluteNow, type FromWorker, type ToWorker } from "./protocol";
+import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
 import { FrameSchedule } from "./schedule";
 
 interface Scope {
@@ -12,6 +13,10 @@ interface Scope {
   requestAnimationFrame(callback: (now: number) => void): number;
 }
 const scope = self as unknown as Scope;
+
+/** Refreshes before a clip's first frame: a browser that has just begun to draw may put two pictures into one. */
+const WARM_REFRESHES = 4;
+const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callback), absoluteNow, performance.timeOrigin);
 
 const clips = new Map<string, DecodedClip>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
@@ -49,42 +54,48 @@ function cross(): void {
   context.fillRect(width / 2 - line / 2, height / 2 - arm, line, 2 * arm);
 }
 
+/** The surround at each refresh, so that the way to the screen is in step when the first frame comes. */
+function warm(): void {
+  clock.start(blank);
+}
+
 function play(sha256: string, refresh_ms: number, fixation_ms: number): void {
   const clip = clips.get(sha256);
   if (!clip || !context) {
     scope.postMessage({ type: "failed", sha256, reason: "expected a prepared clip and a canvas" });
     return;
   }
-  if (fixation_ms === 0) return show(sha256, clip, refresh_ms);
   const until = absoluteNow() + fixation_ms;
-  blank();
-  cross();
-  const wait = (): void => {
-    if (absoluteNow() < until) scope.requestAnimationFrame(wait);
-    else show(sha256, clip, refresh_ms);
-  };
-  scope.requestAnimationFrame(wait);
+  const show = showing(sha256, clip, refresh_ms);
+  clock.start((refresh_at_ms, ran_at_ms) => {
+    if (absoluteNow() >= until && clock.refreshes > WARM_REFRESHES) {
+      clock.start(show);
+      return show(refresh_at_ms, ran_at_ms);
+    }
+    blank();
+    if (fixation_ms > 0) cross();
+  });
 }
 
-function show(sha256: string, clip: DecodedClip, refresh_ms: number): void {
+function showing(sha256: string, clip: DecodedClip, refresh_ms: number): Job {
   const schedule = new FrameSchedule(clip.bitmaps.length, 1000 / clip.fps, refresh_ms);
+  const evenness = new EvennessMeter();
   const drawn: [number, number][] = [];
-  const tick = (now: number): void => {
-    if (schedule.isOver(now)) {
+  return (refresh_at_ms, ran_at_ms) => {
+    evenness.add(refresh_at_ms, ran_at_ms);
+    if (schedule.isOver(refresh_at_ms)) {
+      clock.stop();
       blank();
-      const ended_at_ms = absoluteNow();
-      scope.postMessage({ type: "played", sha256, drawn, frames: clip.bitmaps.length, fps: clip.fps, ended_at_ms });
+      const figures = { frames: clip.bitmaps.length, fps: clip.fps, ended_at_ms: absoluteNow(), ...evenness.read() };
+      scope.postMessage({ type: "played", sha256, drawn, ...figures });
       return;
     }
-    const index = schedule.next(now);
+    const index = schedule.next(refresh_at_ms);
     const bitmap = index === null ? undefined : clip.bitmaps[index];
-    if (index !== null && bitmap && context) {
-      context.drawImage(bitmap, 0, 0, context.canvas.width, context.canvas.height);
-      drawn.push([index, absoluteNow()]);
-    }
-    scope.requestAnimationFrame(tick);
+    if (index === null || !bitmap || !context) return;
+    context.drawImage(bitmap, 0, 0, context.canvas.width, context.canvas.height);
+    drawn.push([index, absoluteNow()]);
   };
-  scope.requestAnimationFrame(tick);
 }
 
 function resize(width: number, height: number): void {
@@ -103,5 +114,6 @@ scope.onmessage = ({ data }) => {
   } else if (data.type === "prepare") void prepare(data.sha256, data.bytes, data.fps);
   else if (data.type === "release") release(data.sha256);
   else if (data.type === "blank") resize(data.width, data.height);
+  else if (data.type === "warm") warm();
   else play(data.sha256, data.refresh_ms, data.fixation_ms);
 };

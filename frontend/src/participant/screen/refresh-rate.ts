@@ -1,4 +1,4 @@
-/** The screen's refresh rate in Hz, from the median interval of animation frames. */
+/** The screen's refresh rate in Hz, from the mean interval of animation frames. */
 
 const FRAMES = 60;
 const LIMIT_MS = 3_000;
@@ -20,12 +20,13 @@ export function measureRefreshRate(): Promise<number | null> {
   });
 }
 
-/** Null where there are too few stamps to tell, for instance in a hidden page. */
+/** Null where there are too few stamps to tell, for instance in a hidden page. Missed refreshes are left out. */
 export function refreshRate(stamps: readonly number[]): number | null {
-  const gaps = stamps
-    .slice(1)
-    .map((stamp, place) => stamp - (stamps[place] ?? stamp))
-    .sort((a, b) => a - b);
-  const median = gaps[Math.floor(gaps.length / 2)];
-  return gaps.length < 10 || !median ? null : Math.round((1000 / median) * 10) / 10;
+  const gaps = stamps.slice(1).map((stamp, place) => stamp - (stamps[place] ?? stamp));
+  const median = [...gaps].sort((a, b) => a - b)[Math.floor(gaps.length / 2)];
+  if (gaps.length < 10 || !median) return null;
+  // Time stamps may be rounded to a whole millisecond, so that the mean tells more than the median.
+  const regular = gaps.filter((gap) => Math.abs(gap - median) < median / 4);
+  const mean = regular.reduce((total, gap) => total + gap, 0) / regular.length;
+  return Math.round(10_000 / mean) / 10;
 }

@@ -3,6 +3,7 @@ import type { ShownClipRating } from "../../../api/schema";
 import { pick, type Translate } from "../../../i18n";
 import { h, uniqueId } from "../../../ui/element";
 import { listenKeys } from "../../../ui/keys";
+import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
 import { keyFor, valueOf } from "./scale-keys";
 
@@ -31,6 +32,7 @@ class ScaleView {
   private readonly keys: HTMLButtonElement[];
   private readonly comment: HTMLTextAreaElement | null;
   private readonly confirm: HTMLButtonElement | null;
+  private readonly meant: MeantPress;
   private chosen: { value: number; at_ms: number } | null = null;
   private changes = 0;
   private over = false;
@@ -41,6 +43,7 @@ class ScaleView {
     private readonly resolve: (rated: Rated) => void,
   ) {
     const { trial, t, signal } = options;
+    this.meant = new MeantPress(trial.pointer_delay_ms, signal);
     this.keys = this.makeKeys();
     this.comment = trial.comment ? h("textarea", { rows: 2, maxlength: 2000, id: uniqueId("comment") }) : null;
     this.confirm = trial.confirm || trial.comment ? button(t("confirm"), () => this.finish()) : null;
@@ -58,7 +61,9 @@ class ScaleView {
       const value = scale.minimum + place;
       const end = value === scale.minimum ? pick(scale.low, language) : value === scale.maximum ? pick(scale.high, language) : "";
       const label = t("rating_key", { value, maximum: scale.maximum }) + (end ? `, ${end}` : "");
-      const onclick = (event: Event): void => this.choose(value, event.timeStamp);
+      const onclick = (event: Event): void => {
+        if (this.meant.allows(event)) this.choose(value, event.timeStamp);
+      };
       return h(
         "button",
         { type: "button", class: "key", "aria-label": label, "aria-pressed": "false", "data-value": value, onclick },

@@ -1,6 +1,7 @@
 /** One showing of a clip: waits for the start key, plays, and notes what disturbed it. */
 import { isStartKey, listenKeys } from "../../../ui/keys";
 import { h } from "../../../ui/element";
+import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
 import type { Showing } from "../../playback/record";
 import { watchFocus } from "../../screen/attention";
@@ -19,7 +20,9 @@ export function waitForStart(session: Session, place: Stage, prompt: string, not
   const { signal, done } = screenSignal(session);
   const { t } = session;
   return new Promise((resolve) => {
+    const meant = new MeantPress(session.run.trial.pointer_delay_ms, signal);
     const start = (event: Event): void => {
+      if (!meant.allows(event)) return;
       done();
       resolve(performance.timeOrigin + event.timeStamp);
     };

@@ -1,0 +1,68 @@
+/** The worker's animation clock: calls one job at each screen refresh, and says how evenly it ran. */
+
+/** What a refresh is for. Times are absolute, in ms: the refresh's own, and when the callback ran. */
+export type Job = (refresh_at_ms: number, ran_at_ms: number) => void;
+
+export class RefreshClock {
+  private job: Job | null = null;
+  private going = false;
+  private count = 0;
+
+  constructor(
+    private readonly request: (callback: (now: number) => void) => unknown,
+    private readonly now_ms: () => number,
+    private readonly origin_ms: number,
+  ) {}
+
+  /** Refreshes since the clock was started. */
+  get refreshes(): number {
+    return this.count;
+  }
+
+  /** From the next refresh on; takes the place of the job before. */
+  start(job: Job): void {
+    this.job = job;
+    if (this.going) return;
+    this.going = true;
+    this.count = 0;
+    this.request((now) => this.tick(now));
+  }
+
+  stop(): void {
+    this.job = null;
+  }
+
+  private tick(now: number): void {
+    if (!this.job) {
+      this.going = false;
+      return;
+    }
+    this.count += 1;
+    this.request((next) => this.tick(next));
+    this.job(this.origin_ms + now, this.now_ms());
+  }
+}
+
+/** How evenly the clock ran while a clip was shown, in ms; what it cannot see, nobody else in the page can. */
+export interface Evenness {
+  /** Longest time between two callbacks. */
+  clock_gap_ms: number;
+  /** Longest time by which a callback ran after the refresh it was for. */
+  clock_late_ms: number;
+}
+
+export class EvennessMeter {
+  private before_ms: number | null = null;
+  private gap_ms = 0;
+  private late_ms = 0;
+
+  add(refresh_at_ms: number, ran_at_ms: number): void {
+    if (this.before_ms !== null) this.gap_ms = Math.max(this.gap_ms, ran_at_ms - this.before_ms);
+    this.late_ms = Math.max(this.late_ms, ran_at_ms - refresh_at_ms);
+    this.before_ms = ran_at_ms;
+  }
+
+  read(): Evenness {
+    return { clock_gap_ms: this.gap_ms, clock_late_ms: this.late_ms };
+  }
+}
