@@ -171,21 +171,6 @@ PLAYBACK: tuple[Column, ...] = (
         minimum=0,
         source="t",
     ),
-    Column(
-        "clock_gap_ms",
-        "number",
-        "Longest time between two callbacks of the animation clock that drew the clip.",
-        unit="ms",
-        minimum=0,
-        source="t",
-    ),
-    Column(
-        "clock_late_ms",
-        "number",
-        "Longest time by which a callback of the animation clock ran after the refresh it was for.",
-        unit="ms",
-        source="t",
-    ),
     Column("stalls", "integer", "How often playback waited for data.", minimum=0, source="t"),
     Column(
         "focus_lost",
@@ -252,5 +237,23 @@ ORIGIN: tuple[Column, ...] = (
         "pooled.",
         minimum=1,
         source="v.series",
+    ),
+)
+
+CLOCK: tuple[Column, ...] = (
+    Column(
+        "clock_gap_ms",
+        "number",
+        "Longest time between two callbacks of the animation clock that drew the clip.",
+        unit="ms",
+        minimum=0,
+        source="t",
+    ),
+    Column(
+        "clock_late_ms",
+        "number",
+        "Longest time by which a callback of the animation clock ran after the refresh it was for.",
+        unit="ms",
+        source="t",
     ),
 )

@@ -1,6 +1,6 @@
 """The heat map participants x trials, kept up to date from new ratings alone.
 
-One letter a trial: `.` not answered, `g` good, `u` uncertain, `f` flagged, `x` failed and not yet shown again.
+One letter a trial: `.` not answered, `g` good, `u` uncertain, `f` flagged, `x` failed, not yet shown again.
 """
 
 import threading

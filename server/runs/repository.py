@@ -66,7 +66,7 @@ def page_of_runs(
 
 
 def answered(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]]:
-    """Run number -> (trials answered, plays that were not good); for one page of runs."""
+    """Run number -> (trials answered, plays that were flagged or failed); for one page of runs."""
     bad = func.sum(case((Rating.verdict.in_(("flagged", "failed")), 1), else_=0))
     query = select(Rating.study_run_id, func.count(Rating.trial_index.distinct()), bad)
     query = query.where(Rating.study_run_id.in_(runs)).group_by(Rating.study_run_id)

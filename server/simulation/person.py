@@ -149,6 +149,8 @@ class Person:
             "frames_late": 0,
             "frames_missing": len(lost),
             "longest_gap_ms": round(period * (2 if lost else 1), 2),
+            "clock_gap_ms": round(rng.uniform(16.8, 18), 2),
+            "clock_late_ms": round(rng.uniform(0.2, 1.5), 2),
             "stalls": 0,
             "focus_lost": int(chance > 1 - FAILED_SHARE),
             "refresh_rate_hz": 60.0,

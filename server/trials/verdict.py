@@ -1,6 +1,6 @@
-"""The playback verdict of one play, by the declared rules: good, uncertain, flagged or failed, and by which rule.
+"""The playback verdict of one play, by the declared rules: good, uncertain, flagged or failed, and why.
 
-`good` says that every frame was on the screen, within the uncertainty that docs/participant.md states per browser.
+`good` says that every frame was on the screen, within the uncertainty that docs/participant.md states.
 `uncertain` says that nothing is known against the play, and not enough for it.
 """
 
@@ -118,7 +118,7 @@ def _unevenness_ms(playback: Playback) -> float | None:
 
 
 def _slack_ms(refresh_rate_hz: float | None, fps: float) -> float:
-    """How long the shortest-shown frame stays beyond one refresh: it may come that much late and is still seen."""
+    """How long a frame stays beyond one refresh at least: it may come that much late and is still seen."""
     refresh_ms = _refresh_ms(refresh_rate_hz)
     refreshes = int(1000 / fps / refresh_ms + ROUNDING)
     return max(0, refreshes - 1) * refresh_ms

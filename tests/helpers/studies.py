@@ -210,6 +210,8 @@ def good_playback(trial: Any) -> dict[str, Any]:
         "frames_late": 0,
         "frames_missing": 0,
         "longest_gap_ms": 34.0,
+        "clock_gap_ms": 17.4,
+        "clock_late_ms": 0.8,
         "stalls": 0,
         "focus_lost": 0,
         "refresh_rate_hz": 60.0,

@@ -12,7 +12,7 @@ DELAY = 20.0
 def record(drawn: dict[int, float] | None = None, verdict: str = "good") -> Record:
     """A play drawn on time, changed where `drawn` says so."""
     times = {index: 5 + index * PERIOD for index in range(FRAMES)} | (drawn or {})
-    return Record(tuple(times.items()), FRAMES, FPS, verdict, "", times[0], {})
+    return Record(tuple(times.items()), FRAMES, FPS, verdict, "", times[0])
 
 
 def log(onsets: dict[int, float] | None = None, without: tuple[int, ...] = ()) -> list[Change]:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
-from typing import Any
 
 from tools.scope import bars
 
@@ -33,7 +32,8 @@ class Record:
     verdict: str
     rule: str
     key_to_first_frame_ms: float | None
-    evidence: dict[str, Any]
+    clock_gap_ms: float | None = None
+    clock_late_ms: float | None = None
 
 
 @dataclass(frozen=True)

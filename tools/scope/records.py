@@ -26,7 +26,8 @@ def _record(row: dict[str, Any], frames: int, fps: float) -> Record:
         verdict=row["verdict"],
         rule=row["verdict_rule"] or "",
         key_to_first_frame_ms=row["key_to_first_frame_ms"],
-        evidence=_json(row.get("evidence")) or {},
+        clock_gap_ms=row["clock_gap_ms"],
+        clock_late_ms=row["clock_late_ms"],
     )
 
 

@@ -24,6 +24,7 @@ RATINGS = View(
         *base.EXCLUSION,
         *base.SAVED,
         *base.ORIGIN,
+        *base.CLOCK,
     ),
     rows="""FROM trial_ratings t
 JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index

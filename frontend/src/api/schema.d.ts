@@ -2059,7 +2059,7 @@ export interface components {
         };
         /**
          * ExcludePlayback
-         * @description Leave out participants with more than this share of plays that were not good.
+         * @description Leave out participants with more than this share of plays that were flagged or failed.
          */
         ExcludePlayback: {
             /**
@@ -2202,6 +2202,7 @@ export interface components {
              *       "flagged_late_frames": 2,
              *       "flagged_longest_gap_ms": 70,
              *       "failed_longest_gap_ms": 250,
+             *       "uncertain_unevenness_ms": 3,
              *       "fail_on_focus_lost": true,
              *       "flag_video_fallback": true,
              *       "max_repeats": 1
@@ -2687,6 +2688,8 @@ export interface components {
             answered: number;
             /** Trials */
             trials: number;
+            /** Uncertain */
+            uncertain: number;
             /** Flagged */
             flagged: number;
             /** Failed */
@@ -2695,7 +2698,7 @@ export interface components {
             excluded: boolean;
             /**
              * Heat
-             * @description One letter a trial: . open, g good, f flagged, x failed.
+             * @description One letter a trial: . open, g good, u uncertain, f flagged, x failed.
              */
             heat: string;
         };
@@ -3054,10 +3057,12 @@ export interface components {
         };
         /**
          * PlaybackRules
-         * @description When a play is flagged or failed. Counts are frames of the clip, times are milliseconds.
+         * @description When a play is uncertain, flagged or failed. Counts are frames of the clip, times are milliseconds.
          *
          *     A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
-         *     breaking a `flagged_*` limit is flagged, any other is good.
+         *     breaking a `flagged_*` limit is flagged. One whose animation clock ran more unevenly than
+         *     `uncertain_unevenness_ms` is uncertain: all frames were drawn, and one may not have reached the screen.
+         *     Frames that stay for several refreshes are allowed more. Any other play is good.
          */
         PlaybackRules: {
             /**
@@ -3085,6 +3090,11 @@ export interface components {
              * @default 250
              */
             failed_longest_gap_ms: number;
+            /**
+             * Uncertain Unevenness Ms
+             * @default 3
+             */
+            uncertain_unevenness_ms: number;
             /**
              * Fail On Focus Lost
              * @default true

@@ -107,6 +107,8 @@ function ratingOf(trial: RunState["trials"][number]): RatingBody {
     frames,
     fps: 30,
     stalls: 0,
+    clock_gap_ms: 17,
+    clock_late_ms: 1,
     focus_lost: 0,
   };
   return {

@@ -15,7 +15,11 @@ GOOD = Playback(
     longest_gap_ms=34.0,
     focus_lost=False,
     frames_seen=45,
+    refresh_rate_hz=60.0,
+    clock_gap_ms=17.5,
+    clock_late_ms=1.2,
 )
+FPS = 30
 
 
 @pytest.mark.parametrize(
@@ -35,20 +39,36 @@ GOOD = Playback(
         ({"clip_sha256": "b" * 64}, ("failed", "wrong_clip")),
         ({"frames_seen": None}, ("flagged", "no_frame_log")),
         ({"frames_seen": 40}, ("flagged", "frame_log_disagrees")),
+        ({"clock_gap_ms": None}, ("uncertain", "no_clock_record")),
+        ({"clock_late_ms": None}, ("uncertain", "no_clock_record")),
+        ({"clock_late_ms": 14.0}, ("good", "")),
+        ({"clock_late_ms": 15.0}, ("uncertain", "uncertain_unevenness_ms")),
+        ({"clock_gap_ms": 32.0}, ("uncertain", "uncertain_unevenness_ms")),
+        ({"clock_gap_ms": 28.0, "refresh_rate_hz": 120.0}, ("good", "")),
+        (
+            {"clock_gap_ms": 32.0, "frames_missing": 1, "frames_seen": 44},
+            ("flagged", "flagged_missing_frames"),
+        ),
     ],
 )
 def test_the_declared_rules(change, expected) -> None:
-    assert judge(PlaybackRules(), replace(GOOD, **change), CLIP, 45, rated=True) == expected
+    assert judge(PlaybackRules(), replace(GOOD, **change), CLIP, 45, FPS, rated=True) == expected
 
 
 def test_a_play_without_a_rating_has_failed() -> None:
-    assert judge(PlaybackRules(), GOOD, CLIP, 45, rated=False) == ("failed", "not_rated")
+    assert judge(PlaybackRules(), GOOD, CLIP, 45, FPS, rated=False) == ("failed", "not_rated")
 
 
 def test_lost_focus_may_be_declared_harmless_enough_to_flag() -> None:
     rules = PlaybackRules(fail_on_focus_lost=False, flag_video_fallback=False)
-    assert judge(rules, replace(GOOD, focus_lost=True), CLIP, 45, rated=True) == ("flagged", "focus_lost")
-    assert judge(rules, replace(GOOD, method="video"), CLIP, 45, rated=True) == ("good", "")
+    assert judge(rules, replace(GOOD, focus_lost=True), CLIP, 45, FPS, rated=True) == (
+        "flagged",
+        "focus_lost",
+    )
+    assert judge(rules, replace(GOOD, method="video"), CLIP, 45, FPS, rated=True) == (
+        "uncertain",
+        "video_fallback",
+    )
 
 
 def test_views_are_counted_one_by_one() -> None:
@@ -68,3 +88,12 @@ def test_views_are_counted_one_by_one() -> None:
 )
 def test_only_failed_main_plays_are_repeated(kind: str, play: int, verdict: str, settled: bool) -> None:
     assert is_settled(kind, play, verdict, 1) is settled
+
+
+@pytest.mark.parametrize(("fps", "refresh_rate_hz", "verdict"), [
+    (24, 60.0, "good"), (25, 60.0, "good"), (30, 59.94, "good"), (50, 60.0, "uncertain"),
+    (60, 60.0, "uncertain"), (60, 59.9, "uncertain"), (60, 144.0, "good"), (60, None, "uncertain"),
+])  # fmt: skip
+def test_a_frame_that_stays_for_several_refreshes_may_come_later(fps, refresh_rate_hz, verdict) -> None:
+    play = replace(GOOD, clock_gap_ms=1000 / (refresh_rate_hz or 60) + 7, refresh_rate_hz=refresh_rate_hz)
+    assert judge(PlaybackRules(), play, CLIP, 45, fps, rated=True)[0] == verdict

@@ -10,7 +10,13 @@ export function Quality({ runs }: { runs: Schemas["MonitoredRun"][] }) {
   const uncertain = total((run) => run.uncertain);
   const failed = total((run) => run.failed);
   const answered = total((run) => run.answered);
-  const counts = { g: answered - uncertain - flagged - failed, u: uncertain, f: flagged, x: failed, ".": total((run) => run.trials) - answered };
+  const counts = {
+    g: answered - uncertain - flagged - failed,
+    u: uncertain,
+    f: flagged,
+    x: failed,
+    ".": total((run) => run.trials) - answered,
+  };
   const doubtful = runs.filter((run) => run.answered >= 10 && run.flagged + run.failed > 0.1 * run.answered);
   return (
     <Card withBorder>

@@ -13,7 +13,14 @@ export type ToWorker =
 export type FromWorker =
   | { type: "prepared"; sha256: string; frames: number; width: number; height: number; fps: number }
   | { type: "failed"; sha256: string; reason: string }
-  | ({ type: "played"; sha256: string; drawn: [index: number, at_ms: number][]; frames: number; fps: number; ended_at_ms: number } & Evenness);
+  | ({
+      type: "played";
+      sha256: string;
+      drawn: [index: number, at_ms: number][];
+      frames: number;
+      fps: number;
+      ended_at_ms: number;
+    } & Evenness);
 
 /** A clock that page and worker share: performance.now() counts from another origin in each. */
 export function absoluteNow(): number {

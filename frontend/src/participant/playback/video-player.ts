@@ -52,7 +52,15 @@ export class VideoPlayer implements ClipPlayer {
     this.video.style.visibility = "visible";
     await playToEnd(this.video);
     this.video.style.visibility = "hidden";
-    return { method: "video", clock_gap_ms: null, clock_late_ms: null, ended_at_ms: absoluteNow(), frames: clip.frames, fps: clip.fps, ...watch.stop() };
+    return {
+      method: "video",
+      clock_gap_ms: null,
+      clock_late_ms: null,
+      ended_at_ms: absoluteNow(),
+      frames: clip.frames,
+      fps: clip.fps,
+      ...watch.stop(),
+    };
   }
 
   release(sha256: string): void {
