@@ -6,13 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from stimuli_builder.tracking.labels import Labels
     from stimuli_builder.tracking.learn import Lesson
-    from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
-    from stimuli_builder.tracking.shapes import Points
-    from stimuli_builder.video import VideoInfo
+    from stimuli_builder.tracking.model import TrainingOptions
 
 Video = Annotated[
     Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")
@@ -57,7 +52,7 @@ def register(app: typer.Typer) -> None:
 
 def track(
     video: Video,
-    out: Annotated[Path, typer.Option(help="Track to write (CSV).")],
+    out: Annotated[Path, typer.Option(help="Track to write (CSV), or the folder for a folder's tracks.")],
     labels: LabelFile = None,
     model: Annotated[
         Path | None, typer.Option(help="Reuse a model of 'stimuli train' instead of labels.")
@@ -108,43 +103,29 @@ def track(
       stimuli track eye.mp4 --labels eye.labels.json --one-eye --out track.csv --preview seen.mp4
 
       stimuli track take2.mp4 --model actor1.npz --out track2.csv --plot track2.png
-    """
-    from experiments.errors import InputError
-    from stimuli_builder.progress import frame_progress
-    from stimuli_builder.tracking.learn import open_video
-    from stimuli_builder.tracking.track import track_video
 
-    if labels is not None and model is not None:
-        raise InputError("expected --labels or --model, or neither; give one of them")
-    if relabel is not None and (labels is not None or model is not None):
-        raise InputError("--relabel belongs to tracking without --labels and --model; leave them out")
-    _check_outputs([video, labels, model, relabel], out, preview, plot)
-    info = open_video(video, accept_variable_rate)
-    options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
-    hints: Mapping[int, Points] = {}
-    if labels is None and model is None:
-        trained, hints = _label_free(info, options, one_eye, relabel)
-    else:
-        trained = _model(info, labels, model, options, one_eye, refine, folds)
-    with frame_progress() as progress:
-        task = progress.add_task("tracking", total=info.frame_count)
-        summary = track_video(
-            trained,
-            info,
-            out,
-            lambda now: progress.update(task, completed=now.frames, refresh=False),
-            hints,
-        )
-    print(
-        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
-        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
-        f"{summary.lost:,} lost\n"
-        f"{summary.fit_fps:,.0f} frames/s fit only, "
-        f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
+      stimuli track recordings/ --out tracks/    # every video of a folder; what is there already is kept
+    """
+    from stimuli_builder.tracking.cli_track import TrackJob, run_track, track_folder
+
+    job = TrackJob(
+        video=video,
+        out=out,
+        options=_options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels),
+        labels=labels,
+        model=model,
+        relabel=relabel,
+        one_eye=one_eye,
+        preview=preview,
+        plot=plot,
+        refine=refine,
+        folds=folds,
+        accept_variable_rate=accept_variable_rate,
     )
-    if relabel is not None:
-        _relabel(relabel, info, trained, out, hints)
-    _pictures(trained, info, out, preview, plot)
+    if video.is_dir():
+        track_folder(job)
+    else:
+        run_track(job)
 
 
 def train(
@@ -174,6 +155,7 @@ def train(
     """
     from experiments.errors import InputError
     from stimuli_builder.files import check_targets
+    from stimuli_builder.tracking.cli_track import report_modes
     from stimuli_builder.tracking.learn import learn, open_video
     from stimuli_builder.tracking.model import save_model
 
@@ -183,7 +165,7 @@ def train(
     info = open_video(video, accept_variable_rate)
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
     lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine)
-    _report_modes(lesson)
+    report_modes(lesson)
     _report_folds(lesson)
     if out is not None:
         save_model(lesson.model, out)
@@ -198,113 +180,6 @@ def _options(
     if paper_modes:
         return TrainingOptions(shape, look, coupled, base_pixels=base_pixels)
     return TrainingOptions(shape, look, coupled, 1, 1, 1, base_pixels)
-
-
-def _model(
-    info: "VideoInfo",
-    labels: Path | None,
-    model: Path | None,
-    options: "TrainingOptions",
-    one_eye: bool,
-    refine: bool | None,
-    folds: int,
-) -> "CoupledModel":
-    """Train from labels, or load a model and check that it is for as many eyes as wanted."""
-    from experiments.errors import InputError
-    from stimuli_builder.tracking.learn import learn
-    from stimuli_builder.tracking.model import load_model
-
-    if labels is not None:
-        lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine)
-        _report_modes(lesson)
-        return lesson.model
-    if model is None:
-        raise InputError("expected --labels or --model")
-    trained = load_model(model)
-    if one_eye and trained.eyes == 2:
-        raise InputError(f"{model}: a model of two eyes, --one-eye expects one; leave --one-eye out")
-    return trained
-
-
-def _by_hand(path: Path | None, info: "VideoInfo") -> "Labels | None":
-    from stimuli_builder.tracking.labels import load_labels
-
-    return load_labels(path, info.size_px, info.frame_count) if path is not None and path.exists() else None
-
-
-def _relabel(
-    path: Path, info: "VideoInfo", model: "CoupledModel", out: Path, hints: "Mapping[int, Points]"
-) -> None:
-    from stimuli_builder.tracking.relabel import worst_frames, write_relabel
-
-    before = _by_hand(path, info)
-    worst = worst_frames(out, model.eyes, info.fps, hints)
-    new = write_relabel(path, info, model.markers, worst, {} if before is None else before.frames)
-    print(f"{path}: {new} frames to correct on the labelling page; run the same command again then")
-
-
-def _label_free(
-    info: "VideoInfo", options: "TrainingOptions", one_eye: bool, relabel: Path | None
-) -> "tuple[CoupledModel, Mapping[int, Points]]":
-    """Find the eyes by the detector and train on what it saw."""
-    from stimuli_builder.progress import frame_progress
-    from stimuli_builder.tracking.labelfree import label_free_lesson, survey
-
-    with frame_progress() as progress:
-        task = progress.add_task("finding eyes", total=info.frame_count)
-        seen = survey(info, one_eye=one_eye, advance=lambda now: progress.update(task, completed=now))
-    found = f"eyes found on {len(seen.points):,} of {seen.looked_at:,} frames looked at"
-    more = f"; {seen.several_faces:,} show several faces, the largest is taken" if seen.several_faces else ""
-    print(found + more)
-    by_hand = _by_hand(relabel, info)
-    lesson = label_free_lesson(info, seen, options, one_eye=one_eye, by_hand=by_hand)
-    _report_modes(lesson)
-    return lesson.model, seen.points
-
-
-def _check_outputs(
-    inputs: "Sequence[Path | None]", out: Path, preview: Path | None, plot: Path | None
-) -> None:
-    from stimuli_builder.files import check_targets
-
-    check_targets([out, preview, plot], inputs)
-    if preview is not None:
-        from stimuli_builder.video_writer import check_video_name
-
-        check_video_name(preview)
-    if plot is not None:
-        from stimuli_builder.blinks.plots import check_figure_name
-
-        check_figure_name(plot)
-
-
-def _pictures(
-    model: "CoupledModel", info: "VideoInfo", out: Path, preview: Path | None, plot: Path | None
-) -> None:
-    if preview is not None:
-        from stimuli_builder.progress import frame_progress
-        from stimuli_builder.tracking.preview import write_preview
-
-        with frame_progress() as progress:
-            task = progress.add_task("preview", total=info.frame_count)
-            write_preview(model, info, out, preview, lambda: progress.advance(task))
-        print(f"{preview}: preview written")
-    if plot is not None:
-        from stimuli_builder.tracking.plot import plot_track
-
-        found = plot_track(out, info.fps, plot)
-        print(f"{plot}: trace with {found} blinks")
-
-
-def _report_modes(lesson: "Lesson") -> None:
-    model = lesson.model
-    kept = [f"{share:.1%}" for share in model.variance_kept]
-    print(
-        f"trained on {len(model.examples)} frames: {model.mode_counts[0]} shape modes ({kept[0]}), "
-        f"{model.mode_counts[1]} appearance modes ({kept[1]}), "
-        f"{model.mode_counts[2]} coupled modes ({kept[2]}), "
-        f"{model.mesh.pixel_count:,} base pixels, labels {'refined' if lesson.refined else 'as given'}"
-    )
 
 
 def _report_folds(lesson: "Lesson") -> None:

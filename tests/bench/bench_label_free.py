@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stimuli_builder.tracking.certainty import lid_difference
+from stimuli_builder.tracking.certainty import lid_difference, widths
 from stimuli_builder.tracking.labelfree import label_free_lesson, survey
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import TrainingOptions
@@ -65,6 +65,16 @@ def main() -> None:
             n: numbers(row, names, name).reshape(-1, 2) for n, row in rows.items() if row["status"] != "lost"
         }
         tell("track", points, labels.frames, labels.markers)
+        stated = [float(rows[n]["error_px"]) for n in labels.frames if n in points]
+        true = [
+            lid_difference(points[n], labels.frames[n]) * widths(points[n])
+            for n in labels.frames
+            if n in points
+        ]
+        print_line(
+            f"  stated error {np.mean(stated):.2f} px, lids off by {np.mean(true):.2f} px (means); "
+            f"{np.mean(np.array(true) <= 2 * np.array(stated)):.0%} within twice the stated error"
+        )
         print_line(
             f"  {summary.doubtful} doubtful, {summary.lost} lost; {summary.fit_fps:.0f} frames/s fit only, "
             f"{summary.end_to_end_fps:.0f} with decoding"

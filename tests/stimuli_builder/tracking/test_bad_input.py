@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stimuli_builder.tracking.labels import load_labels
+from stimuli_builder.tracking.model import save_model
 from stimuli_builder.video import scan_video
 from stimuli_builder.video_writer import VideoWriter
 
@@ -195,3 +196,38 @@ def test_outputs_that_cannot_be_written_are_refused_first(stimuli, recording, tm
     )
     assert code == 2
     assert "does not exist; make it first" in error
+
+
+@pytest.fixture
+def folder(recording, lesson, tmp_path):
+    """A folder of two videos of which one is none, and a model for the other."""
+    path = tmp_path / "recordings"
+    path.mkdir()
+    (path / "a.mp4").write_bytes(recording.video.read_bytes())
+    (path / "b.mov").write_bytes(b"no video")
+    (path / "notes.txt").write_text("left alone")
+    save_model(lesson.model, tmp_path / "m.npz")
+    return path
+
+
+def test_a_folder_is_tracked_and_goes_on_where_it_stopped(stimuli, folder, tmp_path):
+    given = ("track", folder, "--model", tmp_path / "m.npz", "--out", tmp_path / "tracks")
+    code, said, error = stimuli(*given)
+    assert code == 2
+    assert [path.name for path in (tmp_path / "tracks").iterdir()] == ["a.csv"]
+    assert "b.mov: not a video that can be read" in error
+    assert error.strip().splitlines()[-1].startswith("error: 1 of 2 videos could not be tracked")
+    before = (tmp_path / "tracks" / "a.csv").stat().st_mtime_ns
+    (folder / "b.mov").unlink()
+    code, said, error = stimuli(*given)
+    assert (code, error) == (0, "")
+    assert "there already" in said
+    assert (tmp_path / "tracks" / "a.csv").stat().st_mtime_ns == before
+
+
+def test_a_folder_takes_no_options_of_one_video(stimuli, folder, recording, tmp_path):
+    one = ("--labels", recording.labels)
+    assert "are one video's" in stimuli("track", folder, "--out", tmp_path / "tracks", *one)[2]
+    (tmp_path / "none").mkdir()
+    assert "no video in this folder" in stimuli("track", tmp_path / "none", "--out", tmp_path / "t")[2]
+    assert not (tmp_path / "tracks").exists()

@@ -1,0 +1,184 @@
+"""What `stimuli track` does: one video, or every video of a folder."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.plots import check_figure_name
+from stimuli_builder.files import check_targets, temporary_beside
+from stimuli_builder.progress import frame_progress
+from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.labels import Labels, load_labels
+from stimuli_builder.tracking.learn import Lesson, learn, open_video
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, load_model
+from stimuli_builder.tracking.plot import plot_track
+from stimuli_builder.tracking.preview import write_preview
+from stimuli_builder.tracking.relabel import worst_frames, write_relabel
+from stimuli_builder.tracking.shapes import Points
+from stimuli_builder.tracking.track import TrackSummary, track_video
+from stimuli_builder.video import VideoInfo
+from stimuli_builder.video_writer import check_video_name
+
+VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".mpg", ".wmv"}
+
+
+@dataclass(frozen=True)
+class TrackJob:
+    """One call of `stimuli track`; the fields are its options."""
+
+    video: Path
+    out: Path
+    options: TrainingOptions
+    labels: Path | None = None
+    model: Path | None = None
+    relabel: Path | None = None
+    one_eye: bool = False
+    preview: Path | None = None
+    plot: Path | None = None
+    refine: bool | None = None
+    folds: int = 5
+    accept_variable_rate: bool = False
+
+
+def run_track(job: TrackJob) -> None:
+    """Track one video and write what is asked for; all checks come first."""
+    _check(job)
+    info = open_video(job.video, job.accept_variable_rate)
+    model, hints = _model(job, info)
+    with frame_progress() as progress:
+        task = progress.add_task("tracking", total=info.frame_count)
+        summary = track_video(
+            model,
+            info,
+            job.out,
+            lambda now: progress.update(task, completed=now.frames, refresh=False),
+            hints,
+        )
+    _report(job.out, summary)
+    if job.relabel is not None:
+        _relabel(job.relabel, info, model, job.out, hints)
+    _pictures(job, info, model)
+
+
+def track_folder(job: TrackJob) -> None:
+    """Track every video of a folder into tracks of their names; tracks that are there already are kept.
+
+    Raises
+    ------
+    InputError
+        The folder holds no video, outputs of one video are asked for, or some video was refused: the others
+        are tracked all the same, and each refusal is told when it comes.
+    """
+    if job.labels or job.relabel or job.preview or job.plot:
+        raise InputError("a folder takes --model or nothing: labels, --relabel and pictures are one video's")
+    videos = sorted(path for path in job.video.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
+    if not videos:
+        raise InputError(f"{job.video}: no video in this folder ({' '.join(sorted(VIDEO_SUFFIXES))})")
+    if job.out.exists() and not job.out.is_dir():
+        raise InputError(f"{job.out}: expected a folder for the tracks of {job.video}, this is a file")
+    job.out.mkdir(exist_ok=True)
+    refused = 0
+    for number, video in enumerate(videos, start=1):
+        out = job.out / f"{video.stem}.csv"
+        if out.exists():
+            print(f"{number}/{len(videos)} {out}: there already")
+            continue
+        print(f"{number}/{len(videos)} {video.name}")
+        try:
+            run_track(replace(job, video=video, out=out))
+        except InputError as error:
+            refused += 1
+            sys.stderr.write(f"error: {error}\n")
+    if refused:
+        raise InputError(
+            f"{refused} of {len(videos)} videos could not be tracked; the others are in {job.out}"
+        )
+
+
+def _check(job: TrackJob) -> None:
+    if job.labels is not None and job.model is not None:
+        raise InputError("expected --labels or --model, or neither; give one of them")
+    if job.relabel is not None and (job.labels is not None or job.model is not None):
+        raise InputError("--relabel belongs to tracking without --labels and --model; leave them out")
+    if job.relabel is not None:
+        temporary_beside(job.relabel)
+    check_targets([job.out, job.preview, job.plot], [job.video, job.labels, job.model, job.relabel])
+    if job.preview is not None:
+        check_video_name(job.preview)
+    if job.plot is not None:
+        check_figure_name(job.plot)
+
+
+def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points]]:
+    """A model from labels, from a file, or from what the detector sees; then with its detections."""
+    if job.labels is not None:
+        lesson = learn(info, job.labels, job.options, one_eye=job.one_eye, folds=job.folds, refine=job.refine)
+        report_modes(lesson)
+        return lesson.model, {}
+    if job.model is None:
+        return _label_free(job, info)
+    model = load_model(job.model)
+    if job.one_eye and model.eyes == 2:
+        raise InputError(f"{job.model}: a model of two eyes, --one-eye expects one; leave --one-eye out")
+    return model, {}
+
+
+def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points]]:
+    by_hand = _by_hand(job.relabel, info)
+    with frame_progress() as progress:
+        task = progress.add_task("finding eyes", total=info.frame_count)
+        seen = survey(info, one_eye=job.one_eye, advance=lambda now: progress.update(task, completed=now))
+    line = f"eyes found on {len(seen.points):,} of {seen.looked_at:,} frames looked at"
+    more = f"; {seen.several_faces:,} show several faces, the largest is taken" if seen.several_faces else ""
+    print(line + more)
+    lesson = label_free_lesson(info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand)
+    report_modes(lesson)
+    return lesson.model, seen.points
+
+
+def _by_hand(path: Path | None, info: VideoInfo) -> Labels | None:
+    return load_labels(path, info.size_px, info.frame_count) if path is not None and path.exists() else None
+
+
+def _relabel(
+    path: Path, info: VideoInfo, model: CoupledModel, out: Path, hints: Mapping[int, Points]
+) -> None:
+    before = _by_hand(path, info)
+    worst = worst_frames(out, model.eyes, info.fps, hints)
+    new = write_relabel(path, info, model.markers, worst, {} if before is None else before.frames)
+    print(f"{path}: {new} frames to correct on the labelling page; run the same command again then")
+
+
+def _report(out: Path, summary: TrackSummary) -> None:
+    print(
+        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
+        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
+        f"{summary.lost:,} lost\n"
+        f"{summary.fit_fps:,.0f} frames/s fit only, "
+        f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
+    )
+
+
+def _pictures(job: TrackJob, info: VideoInfo, model: CoupledModel) -> None:
+    if job.preview is not None:
+        with frame_progress() as progress:
+            task = progress.add_task("preview", total=info.frame_count)
+            write_preview(model, info, job.out, job.preview, lambda: progress.advance(task))
+        print(f"{job.preview}: preview written")
+    if job.plot is not None:
+        count = plot_track(job.out, info.fps, job.plot)
+        print(f"{job.plot}: trace with {count} blinks")
+
+
+def report_modes(lesson: Lesson) -> None:
+    """Print how many frames trained and how much of their variance is kept."""
+    model = lesson.model
+    kept = [f"{share:.1%}" for share in model.variance_kept]
+    print(
+        f"trained on {len(model.examples)} frames: {model.mode_counts[0]} shape modes ({kept[0]}), "
+        f"{model.mode_counts[1]} appearance modes ({kept[1]}), "
+        f"{model.mode_counts[2]} coupled modes ({kept[2]}), "
+        f"{model.mesh.pixel_count:,} base pixels, labels {'refined' if lesson.refined else 'as given'}"
+    )
