@@ -151,6 +151,7 @@ def test_no_dask_scheduler_ends_in_one_line(small: Small, tmp_path: Path) -> Non
 
 FULL_DISK = """
 import resource, signal, sys
+sys.dont_write_bytecode = True  # else CPython keeps modules compiled up to the limit
 from stimuli_builder.cli import main
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, 8_000))
