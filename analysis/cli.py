@@ -16,11 +16,17 @@ app = typer.Typer(
 def _gather() -> None:
     from analysis.commands.check_paper import register as register_check_paper
     from analysis.commands.models import register as register_models
+    from analysis.commands.opinion import register as register_opinion
+    from analysis.commands.pairs import register as register_pairs
     from analysis.commands.run import register as register_run
+    from analysis.commands.thresholds import register as register_thresholds
 
     register_run(app)
     register_check_paper(app)
     register_models(app)
+    register_pairs(app)
+    register_thresholds(app)
+    register_opinion(app)
 
 
 _gather()

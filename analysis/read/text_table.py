@@ -39,8 +39,8 @@ class TextTable:
         return row + 2
 
 
-def read_text_table(path: Path, wanted: Sequence[str], optional: Sequence[str] = ()) -> TextTable:
-    """Read the `wanted` columns (all must exist) and those of `optional` that exist, as text.
+def read_text_table(path: Path, wanted: Sequence[str] | None, optional: Sequence[str] = ()) -> TextTable:
+    """Read the `wanted` columns (all must exist; None: every one) and those of `optional` there, as text.
 
     The separator (comma, semicolon or tab) is taken from the header line. Ids keep their leading zeros,
     and names like `None` or `NA` stay names.
@@ -51,6 +51,7 @@ def read_text_table(path: Path, wanted: Sequence[str], optional: Sequence[str] =
         No file, no text, no rows, rows of unequal length, a column missing or there twice.
     """
     header, separator = _header(path)
+    wanted = header if wanted is None else wanted
     for name in wanted:
         if name not in header:
             raise InputError(f"{path.name} has no column '{name}'{did_you_mean(name, header)}")

@@ -1,0 +1,88 @@
+"""`analysis thresholds`."""
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.commands.output import JsonOption, save_json, show_tables, working
+
+
+class FunctionChoice(StrEnum):
+    """Shape of the psychometric function."""
+
+    NORMAL = "normal"
+    LOGISTIC = "logistic"
+    WEIBULL = "weibull"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="thresholds")(thresholds)
+
+
+def thresholds(
+    file: Annotated[Path, typer.Argument(help="CSV file, one row a trial.")],
+    x: Annotated[str, typer.Option(help="Column of the stimulus, a number.")] = "x",
+    response: Annotated[
+        str, typer.Option(help="Column of the answer: 1 or 0, yes or no, correct or wrong.")
+    ] = "response",
+    guess: Annotated[
+        float, typer.Option(help="Lower asymptote: 0 for yes/no, 0.5 for two-interval forced choice.")
+    ] = 0.0,
+    lapse: Annotated[
+        str, typer.Option(help="Upper asymptote is 1 minus this: a number, or 'fit' (0 to 0.1).")
+    ] = "0",
+    function: Annotated[FunctionChoice, typer.Option(help="Shape of the function.")] = FunctionChoice.NORMAL,
+    participant: Annotated[
+        str | None, typer.Option(help="Column that names the person: each is fitted, and their mean.")
+    ] = None,
+    by: Annotated[
+        str | None, typer.Option(help="Column of a condition: each of its levels is fitted.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Psychometric functions: thresholds with profile likelihood intervals.
+
+    Examples:
+
+      analysis thresholds trials.csv --x duration --response seen
+
+      analysis thresholds trials.csv --x duration --response correct --guess 0.5 --participant id --json out.json
+
+      analysis thresholds trials.csv --x contrast --function weibull --lapse fit --by eye
+    """
+    from analysis.report.threshold_tables import people_table, threshold_table, threshold_text
+    from analysis.thresholds.people import fit_thresholds, read_answers
+    from experiments.errors import InputError
+
+    if not 0 <= guess < 1:
+        raise InputError(f"expected --guess from 0 to below 1, got {guess:g}")
+    upper = _lapse(lapse, guess)
+    with working("reading trials"):
+        answers = read_answers(file, x, response, participant, by)
+    with working("fitting"):
+        result = fit_thresholds(answers, function.value, guess, upper)
+    typer.echo(threshold_text(result, file.stem, answers.synthetic))
+    show_tables(threshold_table(result, file.stem, answers.synthetic))
+    if result.people:
+        show_tables(people_table(result, file.stem, answers.synthetic))
+    save_json(json, asdict(result), answers.synthetic)
+
+
+def _lapse(text: str, guess: float) -> float | None:
+    from experiments.errors import InputError
+
+    if text == "fit":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < 1 - guess:
+        raise InputError(
+            f"expected --lapse as a number from 0 to below {1 - guess:g}, or 'fit'; got '{text}'"
+        )
+    return value

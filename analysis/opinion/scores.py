@@ -1,0 +1,210 @@
+"""Mean opinion scores with intervals, and a model of who gave them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from analysis.opinion.projection import Projection, alternating_projection
+from analysis.read.text_table import name_lines, numbers, read_text_table, texts_required
+from experiments.errors import InputError
+
+Array = NDArray[np.float64]
+Repeats = Literal["mean", "votes"]
+
+
+@dataclass(frozen=True, eq=False)
+class Votes:
+    """Votes by person and item: means (people, items), NaN where none, and how many votes each rests on."""
+
+    scores: Array
+    counts: Array
+    people: tuple[str, ...]
+    items: tuple[str, ...]
+    all_votes: tuple[Array, ...]
+    source: str
+    synthetic: bool
+    decisions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ItemScore:
+    """One item. mos, sd (n - 1), se and the 95% interval (t with n - 1); `recovered` from the model."""
+
+    name: str
+    mos: float
+    sd: float
+    n: int
+    se: float
+    ci_low: float
+    ci_high: float
+    recovered: float
+    recovered_se: float
+    recovered_ci_low: float
+    recovered_ci_high: float
+
+
+@dataclass(frozen=True)
+class PersonScore:
+    """One person: bias against the others, inconsistency, correlation with the MOS, and BT.500's ruling."""
+
+    name: str
+    n: int
+    bias: float
+    inconsistency: float
+    correlation: float | None
+    rejected_bt500: bool
+
+
+@dataclass(frozen=True)
+class OpinionResult:
+    """Everything `analysis opinion` knows of a table."""
+
+    items: tuple[ItemScore, ...]
+    participants: tuple[PersonScore, ...]
+    n_votes: int
+    repeats: Repeats
+    iterations: int
+    decisions: tuple[str, ...]
+
+
+def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
+    """Read one row a vote.
+
+    Raises
+    ------
+    InputError
+        As `read_text_table`; a rating that is no number, no rating at all.
+    """
+    roles = [item, participant, rating]
+    for name in roles:
+        if roles.count(name) > 1:
+            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+    table = read_text_table(path, roles, ("synthetic",))
+    for name in roles[:2]:
+        texts_required(table, name)
+    values = numbers(table, rating)
+    keep = np.isfinite(values)
+    if not keep.all():
+        lines = name_lines(table, ~keep)
+        table.decisions.append(f"{int((~keep).sum())} rows without a rating left out ({lines})")
+    if not keep.any():
+        raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
+    people, who = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
+    items, which = np.unique(table.columns[item].astype(str).to_numpy()[keep], return_inverse=True)
+    totals, counts = np.zeros((people.size, items.size)), np.zeros((people.size, items.size))
+    np.add.at(totals, (who, which), values[keep])
+    np.add.at(counts, (who, which), 1.0)
+    scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
+    synthetic = "synthetic" in table.columns and bool((table.columns["synthetic"] == "1").any())
+    return Votes(
+        scores,
+        counts,
+        tuple(str(one) for one in people),
+        tuple(str(one) for one in items),
+        tuple(values[keep][which == index] for index in range(items.size)),
+        path.name,
+        synthetic,
+        tuple(table.decisions),
+    )
+
+
+def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
+    """Compute opinion scores.
+
+    Parameters
+    ----------
+    votes : Votes
+    repeats : {"mean", "votes"}
+        A person's repeated votes on an item count as their mean (n is people) or each by itself (n is votes).
+
+    Raises
+    ------
+    InputError
+        Fewer than two people or items.
+    """
+    if len(votes.people) < 2 or len(votes.items) < 2:
+        raise InputError(
+            f"{votes.source}: expected two people and two items or more, got {len(votes.people)} and "
+            f"{len(votes.items)}"
+        )
+    model = alternating_projection(votes.scores)
+    decisions = list(votes.decisions)
+    if np.any(votes.counts > 1):
+        word = "a person's mean counts once" if repeats == "mean" else "every vote counts"
+        decisions.append(f"some people rated an item more than once: {word}")
+    return OpinionResult(
+        tuple(_item(votes, model, index, repeats) for index in range(len(votes.items))),
+        _people(votes, model),
+        int(votes.counts.sum()),
+        repeats,
+        model.iterations,
+        tuple(decisions),
+    )
+
+
+def _item(votes: Votes, model: Projection, index: int, repeats: Repeats) -> ItemScore:
+    column = votes.scores[:, index]
+    values = votes.all_votes[index] if repeats == "votes" else column[np.isfinite(column)]
+    n, mos = values.size, float(values.mean())
+    sd = float(values.std(ddof=1)) if n > 1 else float("nan")
+    se = sd / float(np.sqrt(n))
+    half = float(stats.t.ppf(0.975, n - 1)) * se if n > 1 else float("nan")
+    recovered, error = float(model.quality[index]), float(model.quality_se[index])
+    wide = float(stats.norm.ppf(0.975)) * error
+    return ItemScore(
+        votes.items[index],
+        mos,
+        sd,
+        n,
+        se,
+        mos - half,
+        mos + half,
+        recovered,
+        error,
+        recovered - wide,
+        recovered + wide,
+    )
+
+
+def _people(votes: Votes, model: Projection) -> tuple[PersonScore, ...]:
+    rejected = bt500_rejects(votes.scores)
+    mos = np.nanmean(votes.scores, axis=0)
+    people = []
+    for index, name in enumerate(votes.people):
+        row = votes.scores[index]
+        seen = np.isfinite(row)
+        varied = seen.sum() > 2 and np.ptp(row[seen]) > 0 and np.ptp(mos[seen]) > 0
+        people.append(
+            PersonScore(
+                name,
+                int(votes.counts[index].sum()),
+                float(model.bias[index]),
+                float(model.inconsistency[index]),
+                float(np.corrcoef(row[seen], mos[seen])[0, 1]) if varied else None,
+                bool(rejected[index]),
+            )
+        )
+    return tuple(people)
+
+
+def bt500_rejects(scores: Array) -> NDArray[np.bool_]:
+    """Screen people by ITU-R BT.500: too many votes far from an item's mean, on both sides alike (people,).
+
+    A vote is far beyond 2 SD of the item's votes where their kurtosis is between 2 and 4, beyond sqrt(20) SD
+    elsewhere; a person goes where more than 5% of the votes are far and the sides differ by less than 30%.
+    """
+    mean, sd = np.nanmean(scores, axis=0), np.nanstd(scores, axis=0, ddof=1)
+    centred = scores - mean
+    with np.errstate(invalid="ignore", divide="ignore"):
+        kurtosis = np.nanmean(centred**4, axis=0) / np.nanmean(centred**2, axis=0) ** 2
+    limit = np.where((kurtosis >= 2) & (kurtosis <= 4), 2.0, np.sqrt(20.0)) * sd
+    varied = sd > 0
+    above = np.sum((centred >= limit) & varied, axis=1)
+    below = np.sum((centred <= -limit) & varied, axis=1)
+    share = (above + below) / np.sum(np.isfinite(scores), axis=1)
+    lean = np.abs(above - below) / np.maximum(above + below, 1)
+    return np.asarray((share > 0.05) & (lean < 0.3))

@@ -1,0 +1,1 @@
+"""Paired comparisons: abilities of items from which of two was preferred."""

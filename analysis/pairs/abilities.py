@@ -1,0 +1,294 @@
+"""Abilities of items, their contrasts, and how well the model holds."""
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons
+from analysis.pairs.connected import refuse_disconnected, separated
+from analysis.pairs.factors import FactorTest, ItemFactors, factor_tests
+from analysis.pairs.likelihood import Counts, Fit, Method, Model, counted, fit, free_abilities, scores
+from analysis.pairs.transitivity import Transitivity, transitivity
+from experiments.errors import InputError
+
+Array = NDArray[np.float64]
+Z_95 = float(stats.norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class Item:
+    """One item: ability against the first item in sorted order, on the method's scale."""
+
+    name: str
+    ability: float
+    se: float
+    p: float
+    ci_low: float
+    ci_high: float
+    se_robust: float | None
+    se_centred: float
+    centred: float
+    rank: int
+    wins: int
+    losses: int
+    ties: int
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """Difference of two abilities, and its Holm-corrected p."""
+
+    first: str
+    second: str
+    difference: float
+    se: float
+    z: float
+    p: float
+    p_holm: float
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One more parameter of the model, or a test of it."""
+
+    estimate: float
+    se: float
+    z: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """Likelihood-ratio statistic against the saturated model of the pairs."""
+
+    deviance: float
+    df: int
+    p: float
+    ordered: bool
+
+
+@dataclass(frozen=True)
+class PairsResult:
+    """Everything `analysis pairs` knows of a table; `docs/analysis.md` says what each key is."""
+
+    method: Method
+    scale: str
+    reference: str
+    items: tuple[Item, ...]
+    contrasts: tuple[Contrast, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    n_comparisons: int
+    n_ties: int
+    n_participants: int | None
+    log_likelihood: float
+    goodness: Goodness
+    order_effect: Parameter | None
+    log_nu: Parameter | None
+    tie_probability_max: float | None
+    factors: tuple[FactorTest, ...]
+    transitivity: Transitivity
+    firth: bool
+    decisions: tuple[str, ...] = field(default_factory=tuple)
+
+
+SCALES: dict[Method, str] = {
+    "bradley-terry": "log odds of winning",
+    "davidson": "log odds of winning, given that there is no tie",
+    "thurstone": "standard deviations of the difference of two items (case V; x 1.414 for those of an item)",
+}
+
+
+def fit_abilities(
+    comparisons: Comparisons,
+    method: Method = "bradley-terry",
+    *,
+    order_effect: bool = False,
+    firth: bool = False,
+    factors: ItemFactors | None = None,
+) -> PairsResult:
+    """Fit a model of paired comparisons.
+
+    Parameters
+    ----------
+    comparisons : Comparisons
+    method : {"bradley-terry", "davidson", "thurstone"}
+    order_effect : bool
+        Whether the left (first) side has an advantage of its own.
+    firth : bool
+        Firth's penalised likelihood (Bradley-Terry only).
+    factors : ItemFactors, optional
+        Abilities as a linear function of the items' factors.
+
+    Raises
+    ------
+    InputError
+        Items that were never compared with the rest; an item that always wins (without `firth`); ties under a
+        method that has none.
+    """
+    _refuse_unfit(comparisons, method, firth)
+    ties = method == "davidson"
+    counts = counted(comparisons, ties=ties)
+    design = free_abilities(len(comparisons.items)) if factors is None else factors.design(comparisons.items)
+    model = Model(method, design, order_effect)
+    fitted = fit(model, counts, firth=firth)
+    full = np.zeros((len(comparisons.items), model.names))
+    full[:, : design.shape[1]] = design
+    return PairsResult(
+        method,
+        SCALES[method],
+        comparisons.items[0],
+        _items(comparisons, model, fitted, full, counts),
+        _contrasts(comparisons.items, full, fitted),
+        tuple(tuple(row) for row in (full @ fitted.covariance @ full.T).tolist()),
+        comparisons.outcome.size,
+        comparisons.ties,
+        len(comparisons.participants) if comparisons.participant is not None else None,
+        fitted.log_likelihood,
+        goodness_of_fit(model, counts, fitted),
+        _parameter(fitted, design.shape[1]) if order_effect else None,
+        _parameter(fitted, -1) if ties else None,
+        float(np.exp(fitted.parameters[-1]) / (2 + np.exp(fitted.parameters[-1]))) if ties else None,
+        () if factors is None else factor_tests(comparisons.items, factors, model, counts),
+        transitivity(comparisons),
+        firth,
+        comparisons.decisions,
+    )
+
+
+def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None:
+    if len(comparisons.items) < 2:
+        raise InputError(
+            f"{comparisons.source}: expected two items or more, got '{comparisons.items[0]}' alone"
+        )
+    if comparisons.ties and method != "davidson":
+        raise InputError(
+            f"{comparisons.source}: {comparisons.ties} comparisons are ties, which {method} does not know; "
+            "use --method davidson"
+        )
+    if not comparisons.ties and method == "davidson":
+        raise InputError(f"{comparisons.source}: no comparison is a tie; use --method bradley-terry")
+    if firth and method != "bradley-terry":
+        raise InputError(f"--firth is for --method bradley-terry, got {method}")
+    refuse_disconnected(comparisons)
+    always = separated(comparisons)
+    if always and not firth:
+        raise InputError(
+            f"{comparisons.source}: {always}, so that no finite ability fits; add --firth for finite "
+            "estimates (--method bradley-terry), or leave the item out"
+        )
+
+
+def _items(
+    comparisons: Comparisons, model: Model, fitted: Fit, full: Array, counts: Counts
+) -> tuple[Item, ...]:
+    abilities = full @ fitted.parameters
+    standard = np.sqrt(np.clip(np.diag(full @ fitted.covariance @ full.T), 0.0, None))
+    centring = full - full.mean(axis=0)
+    centred = np.sqrt(np.clip(np.diag(centring @ fitted.covariance @ centring.T), 0.0, None))
+    robust = _robust(comparisons, model, fitted, counts)
+    spread = None if robust is None else np.sqrt(np.clip(np.diag(full @ robust @ full.T), 0.0, None))
+    ranks = stats.rankdata(-np.round(abilities, 10), method="min").astype(int)
+    return tuple(
+        Item(
+            name,
+            float(abilities[k]),
+            float(standard[k]),
+            _two_sided(abilities[k], standard[k]),
+            float(abilities[k] - Z_95 * standard[k]),
+            float(abilities[k] + Z_95 * standard[k]),
+            None if spread is None else float(spread[k]),
+            float(centred[k]),
+            float(abilities[k] - abilities.mean()),
+            int(ranks[k]),
+            *_record(comparisons, k),
+        )
+        for k, name in enumerate(comparisons.items)
+    )
+
+
+def _two_sided(estimate: float, se: float) -> float:
+    return float(2 * stats.norm.sf(abs(estimate) / se)) if se > 0 else float("nan")
+
+
+def _record(comparisons: Comparisons, item: int) -> tuple[int, int, int]:
+    on_left, on_right = comparisons.left == item, comparisons.right == item
+    for_left, for_right = comparisons.outcome == LEFT, comparisons.outcome == RIGHT
+    won = int(np.sum((on_left & for_left) | (on_right & for_right)))
+    lost = int(np.sum((on_left & for_right) | (on_right & for_left)))
+    return won, lost, int(np.sum(on_left | on_right)) - won - lost
+
+
+def _robust(comparisons: Comparisons, model: Model, fitted: Fit, counts: Counts) -> Array | None:
+    """Sandwich covariance, raters as clusters, times G / (G - 1): Liang & Zeger 1986, Biometrika 73, 13."""
+    if comparisons.participant is None or len(comparisons.participants) < 2:
+        return None
+    z = scores(model, counts.left, counts.right)
+    pair = {
+        (int(left), int(right)): index
+        for index, (left, right) in enumerate(zip(counts.left, counts.right, strict=True))
+    }
+    sides = zip(comparisons.left.tolist(), comparisons.right.tolist(), strict=True)
+    index = np.array([pair[one] for one in sides])
+    if model.method == "thurstone":
+        difference = z[index, LEFT] - z[index, RIGHT]
+        eta = difference @ fitted.parameters
+        sign = np.where(comparisons.outcome == LEFT, 1.0, -1.0)
+        rows = (sign * np.exp(stats.norm.logpdf(eta) - stats.norm.logcdf(sign * eta)))[:, None] * difference
+    else:
+        expected = np.einsum("mo,mop->mp", fitted.shares, z)
+        rows = z[index, comparisons.outcome] - expected[index]
+    count = len(comparisons.participants)
+    clusters = np.zeros((count, rows.shape[1]))
+    np.add.at(clusters, comparisons.participant, rows)
+    sandwich: Array = fitted.covariance @ (clusters.T @ clusters) @ fitted.covariance * count / (count - 1)
+    return sandwich
+
+
+def _contrasts(items: tuple[str, ...], full: Array, fitted: Fit) -> tuple[Contrast, ...]:
+    rows = []
+    for first, second in combinations(range(len(items)), 2):
+        contrast = full[first] - full[second]
+        se = float(np.sqrt(max(0.0, contrast @ fitted.covariance @ contrast)))
+        difference = float(contrast @ fitted.parameters)
+        z = difference / se if se > 0 else float("nan")
+        rows.append((items[first], items[second], difference, se, z, _two_sided(difference, se)))
+    told = [row[-1] for row in rows if np.isfinite(row[-1])]
+    holm = iter(multipletests(told, method="holm")[1].tolist() if told else [])
+    return tuple(Contrast(*row, next(holm) if np.isfinite(row[-1]) else float("nan")) for row in rows)
+
+
+def _parameter(fitted: Fit, index: int) -> Parameter:
+    estimate, se = float(fitted.parameters[index]), float(np.sqrt(fitted.covariance[index, index]))
+    return Parameter(estimate, se, estimate / se, _two_sided(estimate, se))
+
+
+def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
+    """Compare with the saturated model of the pairs: only this pair form tells a fit.
+
+    Pairs are taken together over their two orders unless the model has an order effect.
+    """
+    outcomes, expected = counts.outcomes, counts.totals[:, None] * fitted.shares
+    if not model.order_effect:
+        outcomes, expected = _unordered(counts, outcomes), _unordered(counts, expected)
+    ratio = np.where(outcomes > 0, outcomes / np.where(expected > 0, expected, 1.0), 1.0)
+    deviance = float(2 * np.sum(outcomes * np.log(ratio)))
+    df = outcomes.shape[0] * (outcomes.shape[1] - 1) - model.names
+    return Goodness(
+        deviance, df, float(stats.chi2.sf(deviance, df)) if df > 0 else float("nan"), model.order_effect
+    )
+
+
+def _unordered(counts: Counts, values: Array) -> Array:
+    """Add up both orders of a pair (m, o): the item that comes first in the alphabet as the left one."""
+    swapped = counts.left > counts.right
+    turned = values.copy()
+    turned[swapped, LEFT], turned[swapped, RIGHT] = values[swapped, RIGHT], values[swapped, LEFT]
+    low, high = np.minimum(counts.left, counts.right), np.maximum(counts.left, counts.right)
+    _, index = np.unique(np.stack([low, high]), axis=1, return_inverse=True)
+    total = np.zeros((int(index.max()) + 1, values.shape[1]))
+    np.add.at(total, index.ravel(), turned)
+    return total

@@ -1,0 +1,58 @@
+"""Opinion scores as tables and words."""
+
+from analysis.opinion.scores import OpinionResult
+from analysis.report.formats import Table
+from analysis.report.numbers import DASH, fixed, share
+from analysis.report.pairs_tables import SYNTHETIC_MARK
+
+
+def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> Table:
+    """Items from the best down."""
+    rows = tuple(
+        (
+            item.name,
+            fixed(item.mos),
+            fixed(item.sd),
+            str(item.n),
+            f"{fixed(item.ci_low)} to {fixed(item.ci_high)}",
+            fixed(item.recovered),
+            fixed(item.recovered_se),
+        )
+        for item in sorted(result.items, key=lambda one: (-one.mos, one.name))
+    )
+    header = ("Item", "MOS", "SD", "n", "95% CI", "Recovered", "SE")
+    notes = (
+        "Recovered: biases taken off, votes weighted by each person's consistency (alternating projection).",
+    )
+    title = f"{SYNTHETIC_MARK if synthetic else ''}Mean opinion scores, {name}"
+    return Table("opinion", title, header, rows, 1, notes)
+
+
+def raters_table(result: OpinionResult, name: str, synthetic: bool = False) -> Table:
+    """People from the most biased down."""
+    rows = tuple(
+        (
+            person.name,
+            str(person.n),
+            fixed(person.bias),
+            fixed(person.inconsistency),
+            DASH if person.correlation is None else share(person.correlation, 2),
+            "rejected" if person.rejected_bt500 else "",
+        )
+        for person in sorted(result.participants, key=lambda one: (-abs(one.bias), one.name))
+    )
+    header = ("Person", "Votes", "Bias", "Inconsistency", "r with MOS", "BT.500")
+    title = f"{SYNTHETIC_MARK if synthetic else ''}People, {name}"
+    return Table("opinion-people", title, header, rows, 1, (), True)
+
+
+def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> str:
+    """What was computed, in words; nobody is left out by the screening."""
+    rejected = [person.name for person in result.participants if person.rejected_bt500]
+    said = [
+        f"{SYNTHETIC_MARK if synthetic else ''}{name}: {result.n_votes} votes on {len(result.items)} items by "
+        f"{len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
+    ]
+    if rejected:
+        said.append(f"BT.500 would reject {', '.join(rejected)}; nobody was left out.")
+    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])

@@ -1,0 +1,74 @@
+"""Paired comparisons as tables and words."""
+
+from analysis.pairs.abilities import PairsResult
+from analysis.report.formats import Table
+from analysis.report.numbers import apa_p, fixed, p_value
+
+SYNTHETIC_MARK = "[SYNTHETIC DATA] "
+
+
+def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """Items from the ablest down, against the reference."""
+    robust = any(item.se_robust is not None for item in result.items)
+    header = ["Rank", "Item", "Ability", "SE", "95% CI", "p", "Won", "Lost", "Tied"]
+    rows = []
+    for item in sorted(result.items, key=lambda one: (one.rank, one.name)):
+        row = [str(item.rank), item.name, fixed(item.ability, 3), fixed(item.se, 3)]
+        row += [f"{fixed(item.ci_low)} to {fixed(item.ci_high)}", p_value(item.p)]
+        row += [str(item.wins), str(item.losses), str(item.ties)]
+        if robust and item.se_robust is not None:
+            row.insert(4, fixed(item.se_robust, 3))
+        rows.append(tuple(row))
+    if robust:
+        header.insert(4, "robust SE")
+    notes = (f"Abilities in {result.scale}; '{result.reference}' is 0.",)
+    title = f"{_mark(synthetic)}Abilities, {name}"
+    return Table("abilities", title, tuple(header), tuple(rows), 2, notes)
+
+
+def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """Every pair of items, Holm-corrected."""
+    rows = tuple(
+        (f"{c.first} - {c.second}", fixed(c.difference, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_holm))
+        for c in result.contrasts
+    )
+    title = f"{_mark(synthetic)}Differences between items, {name}"
+    return Table("pair-contrasts", title, ("Items", "Difference", "SE", "z", "p (Holm)"), rows, 1, (), True)
+
+
+def factors_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """Likelihood-ratio tests of the factors, and their coefficients in treatment coding."""
+    rows = []
+    for test in result.factors:
+        rows.append((test.factor, fixed(test.chi2, 3), str(test.df), p_value(test.p), ""))
+        for level, estimate, se in zip(test.levels, test.estimates, test.standard_errors, strict=True):
+            rows.append(
+                (f"  {level} - {test.reference}", "", "", "", f"{fixed(estimate, 3)} ({fixed(se, 3)})")
+            )
+    title = f"{_mark(synthetic)}Factors of the items, {name}"
+    return Table("pair-factors", title, ("Factor", "chi2", "df", "p", "b (SE)"), tuple(rows), 1)
+
+
+def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
+    """What was fitted and how well it holds, in words."""
+    people = "" if result.n_participants is None else f" by {result.n_participants} raters"
+    said = [
+        f"{_mark(synthetic)}{name}: {result.method}{' with Firth penalty' if result.firth else ''}, "
+        f"{result.n_comparisons} comparisons of {len(result.items)} items{people}, {result.n_ties} ties."
+    ]
+    fit = result.goodness
+    if fit.df > 0:
+        said.append(f"Fit of the pairs: G2({fit.df}) = {fixed(fit.deviance)}, {apa_p(fit.p)}.")
+    if result.order_effect is not None:
+        advantage = result.order_effect
+        said.append(f"Advantage of the left side: {fixed(advantage.estimate)}, {apa_p(advantage.p)}.")
+    if result.tie_probability_max is not None:
+        said.append(f"Two equal items tie with probability {fixed(result.tie_probability_max)}.")
+    triples = result.transitivity
+    if triples.triples:
+        said.append(f"{triples.weak_violations} of {triples.triples} triples break weak transitivity.")
+    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
+
+
+def _mark(synthetic: bool) -> str:
+    return SYNTHETIC_MARK if synthetic else ""

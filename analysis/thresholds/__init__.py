@@ -1,0 +1,1 @@
+"""Thresholds: psychometric functions of a stimulus, by person and over people."""

@@ -1,0 +1,202 @@
+"""Thresholds of every person and condition, and their mean over people."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from analysis.read.text_table import TextTable, name_lines, numbers, read_text_table, texts_required
+from analysis.thresholds.psychometric import Shape, Threshold, Trials, fit_threshold
+from experiments.errors import InputError
+
+Array = NDArray[np.float64]
+YES = frozenset({"1", "yes", "true", "correct", "seen", "y", "1.0"})
+NO = frozenset({"0", "no", "false", "wrong", "incorrect", "unseen", "n", "0.0"})
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Rows of a table: stimulus x (n,), answer 0 or 1 (n,), and names of person and condition (n,)."""
+
+    x: Array
+    response: Array
+    participant: NDArray[np.object_] | None
+    condition: NDArray[np.object_] | None
+    source: str
+    synthetic: bool
+    decisions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PersonThreshold:
+    """One person's fit in one condition; `fit` is None where `reason` says why not."""
+
+    participant: str
+    condition: str
+    fit: Threshold | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class MeanThreshold:
+    """Mean over people of their thresholds: a random-effects model of estimates with known errors.
+
+    tau is the SD between people (REML); the interval uses t with people - 1 degrees of freedom (Hartung & Knapp
+    2001, Statistics in Medicine 20, 3875).
+    """
+
+    condition: str
+    people: int
+    mean: float
+    se: float
+    ci_low: float
+    ci_high: float
+    tau: float
+
+
+@dataclass(frozen=True)
+class ThresholdsResult:
+    """Everything `analysis thresholds` knows of a table."""
+
+    pooled: dict[str, Threshold]
+    people: tuple[PersonThreshold, ...]
+    means: tuple[MeanThreshold, ...]
+    n_trials: int
+    decisions: tuple[str, ...]
+
+
+def read_answers(
+    path: Path, x: str, response: str, participant: str | None = None, by: str | None = None
+) -> Answers:
+    """Read one row a trial: a number `x` and a `response` of 0/1, yes/no or correct/wrong.
+
+    Raises
+    ------
+    InputError
+        As `read_text_table`; a response that is neither, a stimulus that is no number.
+    """
+    roles = [x, response, *(name for name in (participant, by) if name)]
+    for name in roles:
+        if roles.count(name) > 1:
+            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+    table = read_text_table(path, roles, ("synthetic",))
+    for name in roles[2:]:
+        texts_required(table, name)
+    values, answers = numbers(table, x), _binary(table, response)
+    keep = np.isfinite(values) & np.isfinite(answers)
+    if not keep.all():
+        lines = name_lines(table, ~keep)
+        table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer left out ({lines})")
+    if not keep.any():
+        raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
+    synthetic = "synthetic" in table.columns and bool((table.columns["synthetic"] == "1").any())
+    names = [
+        None if name is None else table.columns[name].astype(object).to_numpy()[keep]
+        for name in (participant, by)
+    ]
+    return Answers(
+        values[keep], answers[keep], names[0], names[1], path.name, synthetic, tuple(table.decisions)
+    )
+
+
+def _binary(table: TextTable, response: str) -> Array:
+    texts = table.columns[response].astype(str).str.casefold().to_numpy()
+    values = np.full(texts.size, np.nan)
+    values[np.isin(texts, list(YES))], values[np.isin(texts, list(NO))] = 1.0, 0.0
+    unknown = np.isnan(values) & (texts != "") & (texts != "na") & (texts != "nan")
+    if unknown.any():
+        row = int(np.argmax(unknown))
+        raise InputError(
+            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}; "
+            "expected 1 or 0 (yes or no, correct or wrong)"
+        )
+    return values
+
+
+def counted(x: Array, response: Array) -> Trials:
+    """Count trials and positive answers at each level of x."""
+    levels, index = np.unique(x, return_inverse=True)
+    n, k = np.zeros(levels.size), np.zeros(levels.size)
+    np.add.at(n, index, 1.0)
+    np.add.at(k, index, response)
+    return Trials(levels, n, k)
+
+
+def fit_thresholds(answers: Answers, shape: Shape, guess: float, lapse: float | None) -> ThresholdsResult:
+    """Fit every condition over all trials and, where people are named, every person in it.
+
+    Raises
+    ------
+    InputError
+        Where a condition cannot be fitted at all.
+    """
+    labels = np.full(answers.x.size, "all", dtype=object) if answers.condition is None else answers.condition
+    pooled: dict[str, Threshold] = {}
+    people: list[PersonThreshold] = []
+    for condition in sorted({str(label) for label in labels}):
+        rows = labels == condition
+        try:
+            pooled[condition] = fit_threshold(
+                counted(answers.x[rows], answers.response[rows]), shape, guess, lapse
+            )
+        except InputError as error:
+            where = "" if condition == "all" else f" ({condition})"
+            raise InputError(f"{answers.source}{where}: {error}") from error
+        if answers.participant is not None:
+            people += _people(answers, rows, condition, shape, guess, lapse)
+    means = [mean for condition in pooled if (mean := mean_threshold(people, condition)) is not None]
+    return ThresholdsResult(pooled, tuple(people), tuple(means), answers.x.size, answers.decisions)
+
+
+def _people(
+    answers: Answers, rows: NDArray[np.bool_], condition: str, shape: Shape, guess: float, lapse: float | None
+) -> list[PersonThreshold]:
+    fits = []
+    names = answers.participant
+    for name in sorted({str(one) for one in names[rows]}) if names is not None else []:
+        own = rows & (names == name)
+        try:
+            fit = fit_threshold(counted(answers.x[own], answers.response[own]), shape, guess, lapse)
+            fits.append(PersonThreshold(name, condition, fit, ""))
+        except InputError as error:
+            fits.append(PersonThreshold(name, condition, None, str(error)))
+    return fits
+
+
+def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThreshold | None:
+    r"""Average thresholds over people, each weighted by 1 / (se^2 + tau^2); None below two people.
+
+    tau^2 maximises the restricted likelihood of
+
+    .. math::
+
+        y_i \sim N(\mu, s_i^2 + \tau^2) \tag{1}
+
+    with y_i a person's threshold and s_i its standard error.
+    """
+    own = [one.fit for one in people if one.condition == condition and one.fit is not None]
+    known = [(fit.threshold, fit.threshold_se) for fit in own if fit.threshold_se]
+    if len(known) < 2:
+        return None
+    y, s2 = np.array([a for a, _ in known]), np.array([float(b or 0) ** 2 for _, b in known])
+
+    def restricted(log_tau2: float) -> float:
+        weights = 1 / (s2 + np.exp(log_tau2))
+        mu = np.sum(weights * y) / weights.sum()
+        return float(
+            0.5 * (np.log(weights.sum()) - np.sum(np.log(weights)) + np.sum(weights * (y - mu) ** 2))
+        )
+
+    span = float(np.var(y)) + float(s2.mean())
+    found = optimize.minimize_scalar(
+        restricted, bounds=(np.log(span) - 25, np.log(span) + 3), method="bounded"
+    )
+    tau2 = float(np.exp(found.x)) if found.fun < restricted(-np.inf) else 0.0
+    weights = 1 / (s2 + tau2)
+    mean = float(np.sum(weights * y) / weights.sum())
+    count = len(known)
+    se = float(np.sqrt(np.sum(weights * (y - mean) ** 2) / ((count - 1) * weights.sum())))
+    half = float(stats.t.ppf(0.975, count - 1)) * se
+    return MeanThreshold(condition, count, mean, se, mean - half, mean + half, float(np.sqrt(tau2)))
