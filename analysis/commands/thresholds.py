@@ -50,7 +50,7 @@ def thresholds(
 
       analysis thresholds trials.csv --x duration --response seen
 
-      analysis thresholds trials.csv --x duration --response correct --guess 0.5 --participant id --json out.json
+      analysis thresholds trials.csv --x duration --response correct --guess 0.5 --participant id
 
       analysis thresholds trials.csv --x contrast --function weibull --lapse fit --by eye
     """

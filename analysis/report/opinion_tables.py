@@ -21,9 +21,7 @@ def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
         for item in sorted(result.items, key=lambda one: (-one.mos, one.name))
     )
     header = ("Item", "MOS", "SD", "n", "95% CI", "Recovered", "SE")
-    notes = (
-        "Recovered: biases taken off, votes weighted by each person's consistency (alternating projection).",
-    )
+    notes = ("Recovered: biases taken off, votes weighted by consistency (alternating projection).",)
     title = f"{SYNTHETIC_MARK if synthetic else ''}Mean opinion scores, {name}"
     return Table("opinion", title, header, rows, 1, notes)
 
@@ -50,8 +48,8 @@ def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> s
     """What was computed, in words; nobody is left out by the screening."""
     rejected = [person.name for person in result.participants if person.rejected_bt500]
     said = [
-        f"{SYNTHETIC_MARK if synthetic else ''}{name}: {result.n_votes} votes on {len(result.items)} items by "
-        f"{len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
+        f"{SYNTHETIC_MARK if synthetic else ''}{name}: {result.n_votes} votes on {len(result.items)} items "
+        f"by {len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
     ]
     if rejected:
         said.append(f"BT.500 would reject {', '.join(rejected)}; nobody was left out.")

@@ -3,8 +3,8 @@
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
 from analysis.report.pairs_tables import SYNTHETIC_MARK
+from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.people import ThresholdsResult
-from analysis.thresholds.psychometric import Interval
 
 
 def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:

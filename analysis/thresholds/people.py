@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from analysis.read.text_table import TextTable, name_lines, numbers, read_text_table, texts_required
-from analysis.thresholds.psychometric import Shape, Threshold, Trials, fit_threshold
+from analysis.thresholds.likelihood import Shape, Trials
+from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -43,8 +44,8 @@ class PersonThreshold:
 class MeanThreshold:
     """Mean over people of their thresholds: a random-effects model of estimates with known errors.
 
-    tau is the SD between people (REML); the interval uses t with people - 1 degrees of freedom (Hartung & Knapp
-    2001, Statistics in Medicine 20, 3875).
+    tau is the SD between people (REML); the interval uses t with people - 1 degrees of freedom (Hartung &
+    Knapp 2001, Statistics in Medicine 20, 3875).
     """
 
     condition: str
@@ -109,8 +110,8 @@ def _binary(table: TextTable, response: str) -> Array:
     if unknown.any():
         row = int(np.argmax(unknown))
         raise InputError(
-            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}; "
-            "expected 1 or 0 (yes or no, correct or wrong)"
+            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}"
+            "; expected 1 or 0 (yes or no, correct or wrong)"
         )
     return values
 

@@ -1,0 +1,134 @@
+"""Psychometric functions against R (tests/golden/r/thresholds.R), and refusals in one line."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from analysis.cli import app
+from analysis.thresholds.likelihood import Trials
+from analysis.thresholds.people import PersonThreshold, counted, mean_threshold, read_answers
+from analysis.thresholds.psychometric import Threshold, fit_threshold
+from experiments.errors import InputError
+
+FOLDER = Path(__file__).parents[2] / "golden/r/thresholds"
+REFERENCE: dict[str, Any] = json.loads((FOLDER / "reference.json").read_text(encoding="utf-8"))
+
+
+def trials(name: str) -> Trials:
+    answers = read_answers(FOLDER / f"{name}.csv", "duration", "seen")
+    return counted(answers.x, answers.response)
+
+
+@pytest.mark.parametrize(
+    ("key", "table", "shape", "guess", "lapse"),
+    [
+        ("yes_no", "yes_no", "normal", 0.0, 0.0),
+        ("two_afc", "two_afc", "weibull", 0.5, 0.0),
+        ("two_afc_lapse", "two_afc", "weibull", 0.5, None),
+        ("logistic_lapse", "logistic", "logistic", 0.0, None),
+    ],
+)
+def test_fits_equal_r(key: str, table: str, shape: Any, guess: float, lapse: float | None) -> None:
+    fit, expected = fit_threshold(trials(table), shape, guess, lapse), REFERENCE[key]
+    assert fit.log_likelihood == pytest.approx(expected["logLik"], abs=1e-6)
+    assert fit.threshold == pytest.approx(expected["threshold"], rel=1e-5)
+    assert fit.spread == pytest.approx(expected["spread"], rel=1e-4)
+    assert fit.lapse == pytest.approx(expected["lapse"], abs=1e-5)
+    assert fit.threshold_ci.low == pytest.approx(expected["low"], rel=1e-4)
+    assert fit.threshold_ci.high == pytest.approx(expected["high"], rel=1e-4)
+
+
+def test_probit_equals_glm_with_its_standard_error() -> None:
+    fit, expected = fit_threshold(trials("yes_no")), REFERENCE["glm"]
+    assert fit.threshold == pytest.approx(expected["threshold"], rel=1e-6)
+    assert fit.spread == pytest.approx(expected["spread"], rel=1e-6)
+    # glm takes the expected information, here the observed one is taken.
+    assert fit.threshold_se == pytest.approx(expected["se"], rel=5e-4)
+    assert fit.log_likelihood == pytest.approx(expected["logLik"], abs=1e-8)
+    assert fit.x75 == pytest.approx(fit.threshold + 0.6744897501960817 * fit.spread)
+
+
+@settings(max_examples=5, deadline=None)
+@given(st.floats(-50, 50), st.floats(0.1, 100))
+def test_the_unit_of_x_does_not_matter(shift: float, scale: float) -> None:
+    data = trials("yes_no")
+    first = fit_threshold(data, intervals=False)
+    moved = fit_threshold(Trials(shift + scale * data.x, data.n, data.k), intervals=False)
+    assert moved.threshold == pytest.approx(shift + scale * first.threshold, rel=1e-5, abs=1e-4)
+    assert moved.log_likelihood == pytest.approx(first.log_likelihood, abs=1e-6)
+
+
+def test_a_falling_function_is_the_rising_one_of_the_other_answer() -> None:
+    data = trials("yes_no")
+    rising, falling = fit_threshold(data), fit_threshold(Trials(data.x, data.n, data.n - data.k))
+    assert falling.falling
+    assert falling.threshold == pytest.approx(rising.threshold, rel=1e-6)
+    assert falling.slope == pytest.approx(-rising.slope, rel=1e-5)
+
+
+def test_answers_that_switch_at_once_are_said_so() -> None:
+    fit = fit_threshold(Trials(np.array([1.0, 2.0, 3.0, 4.0]), np.full(4, 10.0), np.array([0.0, 0, 10, 10])))
+    assert 2 <= fit.threshold <= 3
+    assert any("switch between two levels" in note for note in fit.notes)
+    assert fit.spread_ci.low is None
+
+
+def test_the_mean_over_people_weighs_by_precision() -> None:
+    def person(threshold: float, se: float) -> PersonThreshold:
+        fit = fit_threshold(trials("yes_no"), intervals=False)
+        changed = {**vars(fit), "threshold": threshold, "threshold_se": se}
+        return PersonThreshold(str(threshold), "all", Threshold(**changed), "")
+
+    equal = mean_threshold([person(1.0, 0.1), person(3.0, 0.1)], "all")
+    assert equal is not None
+    assert equal.mean == pytest.approx(2.0)
+    assert equal.tau == pytest.approx(np.sqrt(2 - 0.01), rel=1e-3)  # sample variance 2 less the error's
+    same = mean_threshold([person(2.0, 0.1), person(2.001, 10.0)], "all")
+    assert same is not None
+    assert same.tau == pytest.approx(0.0, abs=1e-3)
+    assert same.mean == pytest.approx(2.0, abs=1e-4)
+
+
+def test_the_command_writes_pooled_people_and_means(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    rows = [
+        f"{person:02d},{x},{'yes' if rng.random() < 1 / (1 + np.exp(-(x - 5 - person / 5) / 0.8)) else 'no'}"
+        for person in range(4)
+        for x in (2, 4, 5, 6, 8)
+        for _ in range(12)
+    ]
+    path, out = tmp_path / "trials.csv", tmp_path / "out.json"
+    path.write_text("id,x,response\n" + "\n".join(rows) + "\n")
+    done = CliRunner().invoke(app, ["thresholds", str(path), "--participant", "id", "--json", str(out)])
+    assert done.exit_code == 0, done.output
+    told = json.loads(out.read_text())
+    assert told["pooled"]["all"]["threshold"] == pytest.approx(5.3, abs=0.6)
+    assert [one["participant"] for one in told["people"]] == ["00", "01", "02", "03"]
+    assert told["means"][0]["people"] == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "told"),
+    [
+        ("x,response\n1,1\n1,0\n", [], "two levels of x or more, got 1"),
+        ("x,response\n1,1\n2,1\n", [], "all 2 answers are alike"),
+        ("x,response\n1,maybe\n2,1\n", [], "'response' is 'maybe' in line 2; expected 1 or 0"),
+        ("x,response\nlong,0\n2,1\n", [], "'x' should be a number, got 'long'"),
+        ("x,response\n0,0\n2,1\n", ["--function", "weibull"], "Weibull function needs x above 0"),
+        ("x,response\n1,0\n2,1\n", ["--guess", "1.5"], "expected --guess from 0"),
+        ("x,response\n1,0\n2,1\n", ["--lapse", "much"], "expected --lapse as a number"),
+        ("x,response\n1,0\n", ["--x", "y"], "has no column 'y'"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path: Path, text: str, options: list[str], told: str) -> None:
+    path = tmp_path / "trials.csv"
+    path.write_text(text)
+    done = CliRunner().invoke(app, ["thresholds", str(path), *options])
+    assert isinstance(done.exception, InputError)
+    assert told in str(done.exception)
