@@ -27,7 +27,7 @@ COMMANDS = {
     ),
     "label": (
         "stimuli_builder.tracking.cli",
-        "Propose labels for frames chosen for variety, with a face landmark detector (optional extra).",
+        "Propose labels for frames chosen for variety, with the eye detector, to be corrected by hand.",
     ),
     "blinks": (
         "stimuli_builder.blinks.cli",

@@ -37,34 +37,34 @@ def accuracy(
 def label(
     video: Annotated[Path, typer.Argument(help="Recording of a face.")],
     out: Annotated[Path, typer.Option(help="Label file to write (JSON), to be corrected by hand.")],
-    bootstrap: Annotated[
-        bool, typer.Option("--bootstrap", help="Propose labels with a landmark detector.")
+    one_eye: Annotated[
+        bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points a frame.")
     ] = False,
-    weights: Annotated[
-        Path | None, typer.Option(help="Weights of the detector (face_landmarker.task); none are shipped.")
-    ] = None,
     frames: Annotated[int, typer.Option(help="Frames to label, chosen for variety.", min=3, max=200)] = 20,
     accept_variable_rate: Annotated[
         bool, typer.Option("--accept-variable-rate", help="Take a variable frame rate.")
     ] = False,
 ) -> None:
-    """Propose labels for frames chosen for variety, with a face landmark detector (optional extra).
+    """Propose labels for frames chosen for variety, with the eye detector, to be corrected by hand.
 
-    Needs MediaPipe (pip install 'mediapipe>=1.2') and a weights file of your own. A detector sets upper-lid
-    points 1 to 2 pixels low on half-closed lids: review every frame on the labelling page before training.
+    The detector's environment (270 MB) is made at first use. Upper-lid points of half-closed lids can be 1
+    to 2 pixels off: review every frame on the labelling page before training.
 
-    Example:
+    Examples:
 
-      stimuli label face.mp4 --bootstrap --weights face_landmarker.task --out face.labels.json
+      stimuli label face.mp4 --out face.labels.json
+
+      stimuli label eye.mp4 --one-eye --frames 25 --out eye.labels.json
     """
-    from experiments.errors import InputError
     from stimuli_builder.files import check_targets
-    from stimuli_builder.tracking.bootstrap import propose_labels
+    from stimuli_builder.progress import frame_progress
+    from stimuli_builder.tracking.labelfree import proposed_labels, survey
     from stimuli_builder.tracking.learn import open_video
 
-    if not bootstrap:
-        raise InputError("expected --bootstrap; to label by hand use the labelling page of the admin site")
-    check_targets([out], [video, weights])
+    check_targets([out], [video])
     info = open_video(video, accept_variable_rate)
-    labels = propose_labels(info, out, weights, frames)
+    with frame_progress() as progress:
+        task = progress.add_task("finding eyes", total=info.frame_count)
+        seen = survey(info, one_eye=one_eye, advance=lambda now: progress.update(task, completed=now))
+    labels = proposed_labels(info, seen, out, frames)
     print(f"{out}: {len(labels.frames)} frames proposed; review each one before training")

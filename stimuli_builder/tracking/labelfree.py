@@ -9,14 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.bootstrap import most_varied
 from stimuli_builder.tracking.certainty import widths
 from stimuli_builder.tracking.detector.detection import LidDetector
 from stimuli_builder.tracking.detector.mesh import open_detector
-from stimuli_builder.tracking.labels import Labels
+from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import Lesson, lesson_from
 from stimuli_builder.tracking.model import TrainingOptions
-from stimuli_builder.tracking.shapes import Points, default_markers, mean_shape, moved, similarity_between
+from stimuli_builder.tracking.shapes import (
+    EYE_POINTS,
+    Points,
+    default_markers,
+    mean_shape,
+    moved,
+    similarity_between,
+)
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
 Values = NDArray[np.float64]
@@ -133,6 +139,39 @@ def _unexplained(others: Values, row: Values) -> float:
     basis = np.linalg.svd(others - mean, full_matrices=False)[2][:MODES]
     rest = (row - mean) - (row - mean) @ basis.T @ basis
     return float(np.sqrt((rest**2).mean()))
+
+
+def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
+    """Frames whose shapes, freed of position, size and turn, lie farthest from one another; ascending."""
+    numbers = sorted(shapes)
+    first = shapes[numbers[0]]
+    rows = np.array([moved(shapes[n], similarity_between(shapes[n], first)).ravel() for n in numbers])
+    chosen = [int(((rows - np.median(rows, axis=0)) ** 2).sum(1).argmin())]
+    distance: NDArray[np.float64] = np.full(len(numbers), np.inf)
+    while len(chosen) < min(count, len(numbers)):
+        distance = np.minimum(distance, ((rows - rows[chosen[-1]]) ** 2).sum(1))
+        chosen.append(int(distance.argmax()))
+    return sorted(numbers[place] for place in chosen)
+
+
+def proposed_labels(info: VideoInfo, seen: Survey, out: Path, count: int) -> Labels:
+    """Save the most varied of the detections as a label file, to be corrected by hand.
+
+    Raises
+    ------
+    InputError
+        Fewer frames than wanted show eyes.
+    """
+    good = plausible(seen.points)
+    if len(good) < count:
+        raise InputError(
+            f"{info.path}: eyes were found on {len(good)} frames, {count} are wanted; "
+            "ask for fewer (--frames)"
+        )
+    eyes = len(next(iter(good.values()))) // EYE_POINTS
+    labels = Labels(out, info.size_px, default_markers(eyes), {n: good[n] for n in most_varied(good, count)})
+    save_labels(labels, info.path.name, "detector on single frames, not reviewed")
+    return labels
 
 
 def label_free_lesson(

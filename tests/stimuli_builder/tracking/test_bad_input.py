@@ -179,7 +179,7 @@ def test_no_output_takes_the_place_of_an_input(stimuli, recording, tmp_path):
         ("track", video, "--labels", labels, "--out", video),
         ("track", video, "--labels", labels, "--out", labels),
         ("train", video, "--labels", labels, "--out", tmp_path / "x" / ".." / "l.json"),
-        ("label", video, "--bootstrap", "--out", video),
+        ("label", video, "--out", video),
         ("actor", "--seconds", 0.1, "--out", video, "--truth", video),
     ]
     for call in calls:
@@ -231,3 +231,12 @@ def test_a_folder_takes_no_options_of_one_video(stimuli, folder, recording, tmp_
     (tmp_path / "none").mkdir()
     assert "no video in this folder" in stimuli("track", tmp_path / "none", "--out", tmp_path / "t")[2]
     assert not (tmp_path / "tracks").exists()
+
+
+def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_path):
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join(recording.truth.read_text().splitlines()[:50]) + "\n")
+    code, _, error = stimuli("accuracy", other, recording.truth)
+    assert code == 2
+    assert "compare a track with its own truth" in error
+    assert "not a track" in stimuli("accuracy", recording.labels, recording.truth)[2]

@@ -11,7 +11,14 @@ from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.tracking.certainty import lid_difference, widths
 from stimuli_builder.tracking.detector.detection import along, eye_points
-from stimuli_builder.tracking.labelfree import DETECTOR_SHARE, Survey, label_free_lesson, plausible, survey
+from stimuli_builder.tracking.labelfree import (
+    DETECTOR_SHARE,
+    Survey,
+    label_free_lesson,
+    plausible,
+    proposed_labels,
+    survey,
+)
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
@@ -145,6 +152,21 @@ def test_the_worst_frames_are_exported_and_win_when_they_come_back(free, recordi
         assert lesson.labels.frames[number] == pytest.approx(points, abs=1e-3)
 
 
+def test_labels_are_proposed_from_what_the_detector_saw(recording, detections, tmp_path):
+    info, out = scan_video(recording.video), tmp_path / "l.json"
+    proposed_labels(info, Survey(detections, 40, 0), out, 12)
+    labels = load_labels(out, info.size_px, info.frame_count)
+    assert len(labels.frames) == 12
+    for number, points in labels.frames.items():
+        assert points == pytest.approx(detections[number], abs=0.001)
+    openings = [points[7, 1] - points[2:4, 1].mean() for points in labels.frames.values()]
+    every = [points[7, 1] - points[2:4, 1].mean() for points in detections.values()]
+    assert np.ptp(openings) > 0.8 * np.ptp(every)
+    with pytest.raises(InputError, match="60 are wanted"):
+        proposed_labels(info, Survey(detections, 40, 0), tmp_path / "m.json", 60)
+    assert not (tmp_path / "m.json").exists()
+
+
 def test_an_environment_that_cannot_be_made_is_one_line_and_leaves_nothing(tmp_path):
     wrong = tmp_path / "requirements.txt"
     wrong.write_text("no such package ===\n", encoding="utf-8")
@@ -173,6 +195,14 @@ def test_eyes_of_a_real_face_are_found_without_labels(detector, shared_data):
     assert np.mean(away) < 0.045
     closed = np.argmin([points[7, 1] - points[2:4, 1].mean() for points in seen.points.values()])
     assert abs(int(closed) - 27) <= 1
+
+
+def test_labels_of_a_real_face_are_proposed_from_the_command_line(detector, shared_data, stimuli, tmp_path):
+    clip = shared_data / "face_video" / "single_face.mp4"
+    code, said, error = stimuli("label", clip, "--frames", 10, "--out", tmp_path / "l.json")
+    assert (code, error) == (0, "")
+    assert "10 frames proposed; review each one" in said
+    assert len(load_labels(tmp_path / "l.json", (640, 360), 72).frames) == 10
 
 
 def test_a_video_without_a_face_is_refused_in_one_line(detector, recording):
