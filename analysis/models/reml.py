@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
+from analysis.models.crossing import Crossing, crossing, summed_product
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -19,13 +21,13 @@ Integers = NDArray[np.int64]
 class CrossProducts:
     """Sums over trials: N participants with p coefficients, J items, f fixed effects.
 
-    `pp` (N, p, p), `pc` (N, p, J), `cc` (J,), `pb` (N, p, f + 1), `cb` (J, f + 1), `bb` (f + 1, f + 1); the
-    last column of b is y. `patterns` (m, p, p): Lp = sum of theta_k patterns_k.
+    `pp` (N, p, p), `pc` (N, p, J; dense or sparse), `cc` (J,), `pb` (N, p, f + 1), `cb` (J, f + 1) and
+    `bb` (f + 1, f + 1); the last column of b is y. `patterns` (m, p, p): Lp = sum of theta_k patterns_k.
     """
 
     n: int
     pp: Floats = field(repr=False)
-    pc: Floats = field(repr=False)
+    pc: Crossing = field(repr=False)
     cc: Floats = field(repr=False)
     pb: Floats = field(repr=False)
     cb: Floats = field(repr=False)
@@ -47,19 +49,17 @@ def cross_products(
     ones, trial = np.ones(n), np.arange(n)
     by_person = sparse.csr_matrix((ones, (participant, trial)), shape=(people, n))
     by_item = sparse.csr_matrix((ones, (item, trial)), shape=(items, n))
-    by_pair = sparse.csr_matrix((ones, (participant * items + item, trial)), shape=(people * items, n))
     p, width = z.shape[1], b.shape[1]
 
     def summed(indicator: sparse.csr_matrix, values: Floats) -> Floats:
         return np.asarray(indicator @ values, dtype=np.float64)
 
     pp = summed(by_person, (z[:, :, None] * z[:, None, :]).reshape(n, -1)).reshape(people, p, p)
-    pc = summed(by_pair, z).reshape(people, items, p).transpose(0, 2, 1).copy()
     pb = np.stack([summed(by_person, z[:, [k]] * b) for k in range(p)], axis=1).reshape(people, p, width)
     return CrossProducts(
         n,
         pp,
-        pc,
+        crossing(z, participant, item, people, items),
         np.bincount(item, minlength=items).astype(np.float64),
         pb,
         summed(by_item, b),
@@ -112,30 +112,28 @@ def criterion(c: CrossProducts, theta: Floats) -> Criterion:
     p, items = lp.shape[0], len(c.cc)
     gl = c.pp @ lp
     mp = lp.T @ gl + np.eye(p)
-    vc, vb = lp.T @ c.pc, lp.T @ c.pb
-    solved = np.linalg.solve(mp, np.concatenate([vc, vb], axis=2))
-    wc, wb = solved[:, :, :items], solved[:, :, items:]
+    vb = lp.T @ c.pb
+    wb: Floats = np.asarray(np.linalg.solve(mp, vb), dtype=np.float64)
+    out = c.pc.eliminated(lp, mp, gl)
     # kc: U_c' (I + U_p Lp Lp' U_p')^-1 U_c, the items' cross-product with participants taken out
-    kc = np.diag(c.cc) - vc.reshape(-1, items).T @ wc.reshape(-1, items)
-    kb = c.cb - vc.reshape(-1, items).T @ wb.reshape(-1, f + 1)
-    factor = linalg.cho_factor(np.eye(items) + lam**2 * kc)
-    inverse = linalg.cho_solve(factor, np.eye(items))
+    kc: Floats = np.asarray(np.diag(c.cc) - out.schur(), dtype=np.float64)
+    kb = c.cb - out.to_items(wb)
+    inverse, log_det = _inverse(np.eye(items) + lam**2 * kc)
     xc = lam * (inverse @ kb)
-    xp = wb - lam * (wc @ xc)
+    xp = wb - lam * out.from_items(xc)
     d = c.bb - vb.reshape(-1, f + 1).T @ xp.reshape(-1, f + 1) - lam * c.cb.T @ xc
     a = d[:f, :f]
     unscaled = np.asarray(np.linalg.inv(a), dtype=np.float64)
     beta = unscaled @ d[:f, f]
     r2 = float(d[f, f] - d[f, :f] @ beta)
-    log_m = np.linalg.slogdet(mp)[1].sum() + 2 * np.log(np.diag(factor[0])).sum()
+    log_m = np.linalg.slogdet(mp)[1].sum() + log_det
     h = float(log_m + np.linalg.slogdet(a)[1])
     # t: U' V^-1 [X y] of participants (N, p, f + 1) and of items (J, f + 1)
-    tp = c.pb - gl @ xp - lam * (c.pc @ xc)
+    tp = c.pb - gl @ xp - lam * out.plain(xc)
     tc = inverse @ kb
-    q = c.pc - gl @ wc
     within = c.pp - gl @ np.linalg.solve(mp, gl.transpose(0, 2, 1))
-    k = within.sum(axis=0) - lam**2 * _summed_product(q @ inverse, q)
-    k -= _summed_product(tp[:, :, :f] @ unscaled, tp[:, :, :f])
+    k = within.sum(axis=0) - lam**2 * out.quadratic(inverse)
+    k -= summed_product(tp[:, :, :f] @ unscaled, tp[:, :, :f])
     k_item = float(np.vdot(inverse, kc)) - float(np.vdot(tc[:, :f] @ unscaled, tc[:, :f]))
     up, uc = tp[:, :, f] - tp[:, :, :f] @ beta, tc[:, f] - tc[:, :f] @ beta
     grad_h = np.r_[2 * np.tensordot(c.patterns, k @ lp, 2), 2 * lam * k_item]
@@ -145,10 +143,13 @@ def criterion(c: CrossProducts, theta: Floats) -> Criterion:
     return Criterion(c.n, h, r2, grad_h, grad_r2, curve, beta, unscaled, tp[:, :, :f], tc[:, :f])
 
 
-def _summed_product(a: Floats, b: Floats) -> Floats:
-    """Sum over participants of a_i b_i', both (N, p, m)."""
-    p = a.shape[1]
-    return np.asarray(a.transpose(1, 0, 2).reshape(p, -1) @ b.transpose(1, 0, 2).reshape(p, -1).T)
+def _inverse(matrix: Floats) -> tuple[Floats, float]:
+    """Inverse and log determinant of a positive definite matrix, by Cholesky."""
+    factor, _ = linalg.cho_factor(matrix, lower=True)
+    triangle, _ = linalg.lapack.dpotri(factor, lower=True)
+    inverse = np.tril(triangle)
+    inverse += np.tril(triangle, -1).T
+    return inverse, 2 * float(np.log(np.diag(factor)).sum())
 
 
 def unscaled_gradient(c: CrossProducts, theta: Floats, at: Criterion) -> Floats:

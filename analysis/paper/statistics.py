@@ -35,7 +35,9 @@ _ETA = re.compile(
     rf" ?= ?(?P<eta>{_NUMBER})"
     rf"(?:,? ?(?P<level>\d\d) ?% ?CI:? ?[\[(] ?(?P<low>{_NUMBER}) ?[,;] ?(?P<high>{_NUMBER}) ?[\])])?"
 )
-_LOOKS_LIKE = re.compile(r"(?<![A-Za-z])(?:F ?[(\[]|t ?[(\[] ?\d|(?:χ|chi) ?-?2 ?[(\[]|[pP] ?[=<>] ?\.?\d)")
+_LOOKS_LIKE = re.compile(
+    r"(?<![A-Za-z])(?:F ?[(\[] ?\d|t ?[(\[] ?\d|(?:χ|chi) ?-?2 ?[(\[]|[pP] ?[=<>] ?\.?\d)"
+)
 
 REACH = 160
 """Characters after a statistic in which its p and its effect size are looked for."""

@@ -92,7 +92,7 @@ def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
         axes = figure.add_subplot()
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
-        bars = "Small points: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        bars = "Points and thin lines: participants. Bars: 95% CI within participants (Cousineau-Morey)."
         note = f"N = {analysis.n_participants}. {bars}"
         if analysis.synthetic:
             note = "SYNTHETIC DATA: no person gave these ratings.\n" + note
@@ -120,6 +120,9 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     for shade in range(n_shades):
         at = np.arange(n_groups) + offsets[shade]
         colour = COLOURS[shade % len(COLOURS)]
+        if n_groups > 1:
+            people = at[:, None] + jitter[None, :]
+            axes.plot(people, values[:, :, shade].T, color=colour, alpha=0.12, linewidth=0.5, zorder=1)
         for group in range(n_groups):
             axes.plot(
                 at[group] + jitter,

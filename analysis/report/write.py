@@ -42,12 +42,18 @@ class Picture:
         return "data:image/svg+xml;base64," + b64encode(self.svg).decode("ascii")
 
 
+BETWEEN_METHODS = (
+    " Groups (sum-to-zero contrasts) and covariates enter the multivariate linear model of the cell means; "
+    "sums of squares are of type {kind}. Means weigh groups equally and are those of a participant with the "
+    "mean of every covariate. Error df are participants less coefficients."
+)
+
 METHODS = (
     "Cell means are unweighted means of a participant's trials; participants with an empty cell are dropped "
     "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
     "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. Marginal means "
-    "and their errors come from participants' own marginal means. Pairs are paired t tests, never pooled. "
-    "Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
+    "and their errors come from participants' own marginal means. Pairs are t tests, paired within "
+    "participants. Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
 )
 
 
@@ -139,6 +145,11 @@ def _render(
         left_out=left_out(analysis.exclusions) if analysis.exclusions else (),
         pictures=pictures,
         sections=sections,
-        methods=METHODS,
+        methods=METHODS
+        + (
+            BETWEEN_METHODS.format(kind={2: "II", 3: "III"}[analysis.anova.sum_of_squares])
+            if analysis.anova.between.terms[1:]
+            else ""
+        ),
         version=version("palpebra"),
     )

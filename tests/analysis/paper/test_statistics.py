@@ -52,9 +52,11 @@ def test_what_does_not_fit_is_told(text, verdict, why) -> None:
 
 
 def test_each_statistic_has_its_own_p_and_what_is_unread_is_said() -> None:
-    result = check_text("F(1, 30) = 4.56, and t(28) = 2.10, p = .045. Also F (see Table 2) and p = .03.")
+    result = check_text(
+        "F(1, 30) = 4.56, and t(28) = 2.10, p = .045. Also F (see Table 2), F(3) = 2 and p = .03."
+    )
     assert [s.verdict for s in result.statistics] == ["unchecked", "consistent"]
-    assert any(fragment.startswith("p = .03") for fragment in result.unread)
+    assert [fragment[:5] for fragment in result.unread] == ["F(3) ", "p = ."]
 
 
 def test_html_and_tex_are_read_as_their_readers_see_them() -> None:
