@@ -68,7 +68,7 @@ scope: setup-test ## what reaches a virtual screen against what is recorded (hou
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python tools/load.py $(LOAD)
 
-docs: setup-test ## write docs/data-dictionary.md and docs/settings.md from the code
+docs: setup-test ## write the references in docs/ (data dictionary, settings, declaration) from the code
 	@$(BIN)/python tools/reference.py
 
 audit: setup-test ## ask the advisory databases about every locked package; says where none answered

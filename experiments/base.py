@@ -22,6 +22,14 @@ IMPLIED = "implied"
 
 
 class Declaration(BaseModel):
-    """A frozen piece of a declaration; unknown keys are refused by name."""
+    """A frozen piece of a declaration; unknown keys are refused by name.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_serialization_defaults_required=True)
+    The text under a key is its description: docs/reference/experiment.md and the API's schema are made of it.
+    """
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_serialization_defaults_required=True,
+        use_attribute_docstrings=True,
+    )

@@ -27,43 +27,50 @@ Fps = Annotated[int, Field(ge=24, le=60)]
 
 
 class RenderSettings(Declaration):
-    """Everything the clip builder needs for one cell.
-
-    Attributes
-    ----------
-    character: a shipped character (`photorealistic`, `cartoon`) or a character folder.
-    profile: one of `PROFILES`, or a CSV file of closure samples (0 open, 1 closed).
-    duration_frames: blink length in frames at 30 fps; None keeps the recorded length.
-    amplitude: `full` (FC) reaches closure 1, `natural` (NC) keeps the measured closure.
-    motion_blur: mean of the 300 fps samples of one output frame in linear light (MB), or one sample (NB).
-    lower_lid: which lower-lid signals move: both, vertical, horizontal or none.
-    eyes: `alike` drives both eyes by one signal, `separate` by the left and right recording.
-    fps: frame rate of the clip. width_px, height_px: picture size.
-    """
+    """Everything the clip builder needs for one cell."""
 
     character: str = "photorealistic"
+    """A shipped character (`photorealistic`, `cartoon`), or the path of a character folder of your own."""
     profile: ProfileName = "real"
+    """Blink profile: recorded (`real`), of the PCA model (`model`), a textbook curve (`SL`, `AL`, `SL_ease`,
+    `AL_ease`: symmetric or asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""
     duration_frames: Annotated[float, Field(ge=3, le=60)] | None = None
+    """Length of the blink, in frames at 30 per second; left out, blinks keep their recorded length."""
     amplitude: Literal["full", "natural"] = "full"
+    """`full` (FC) closes the eye fully, to closure 1; `natural` (NC) keeps the closure that was measured."""
     motion_blur: bool = True
+    """Mean of the 300 fps samples of an output frame in linear light (MB), or one sample of it (NB)."""
     lower_lid: Literal["both", "vertical", "horizontal", "none"] = "none"
+    """Which recorded signals move the lower lid."""
     eyes: Literal["alike", "separate"] = "alike"
+    """One signal drives both eyes, or the left and the right recording an eye each."""
     fps: Fps = 30
+    """Frame rate of the clip, in frames per second."""
     width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
+    """Width of the clip, in pixels."""
     height_px: Annotated[int, Field(ge=120, le=720, multiple_of=2)] = 360
+    """Height of the clip, in pixels."""
 
 
 class RenderOverrides(Declaration):
-    """What one level changes of the experiment's `RenderSettings`; None leaves it as it is."""
+    """What a level changes of [render]; a key left out stays as it is there."""
 
     character: str | None = None
+    """As [render] `character`, for clips of this level."""
     profile: ProfileName | None = None
+    """As [render] `profile`, for clips of this level."""
     duration_frames: Annotated[float, Field(ge=3, le=60)] | None = None
+    """As [render] `duration_frames`, for clips of this level."""
     amplitude: Literal["full", "natural"] | None = None
+    """As [render] `amplitude`, for clips of this level."""
     motion_blur: bool | None = None
+    """As [render] `motion_blur`, for clips of this level."""
     lower_lid: Literal["both", "vertical", "horizontal", "none"] | None = None
+    """As [render] `lower_lid`, for clips of this level."""
     eyes: Literal["alike", "separate"] | None = None
+    """As [render] `eyes`, for clips of this level."""
     fps: Fps | None = None
+    """As [render] `fps`, for clips of this level."""
 
     def applied_to(self, settings: RenderSettings) -> RenderSettings:
         """Return `settings` with this level's values in place, validated again."""

@@ -1,6 +1,7 @@
-"""Write what is declared in code as documentation: docs/data-dictionary.md, docs/settings.md.
+"""Write what is declared in code as documentation: docs/data-dictionary.md, docs/settings.md,
+docs/reference/experiment.md.
 
-python tools/reference.py           write both
+python tools/reference.py           write them
 python tools/reference.py --check   fail where they are not current
 """
 
@@ -21,6 +22,7 @@ from experiments.columns import RUN_COLUMNS, Column  # noqa: E402
 from experiments.trials import views  # noqa: E402
 from server.models import Base  # noqa: E402
 from server.settings import Settings  # noqa: E402
+from tools.experiment_reference import experiment_reference  # noqa: E402
 
 MADE = "<!-- Written by `make docs` from the code; change it there. -->"
 
@@ -93,7 +95,16 @@ def settings_reference() -> str:
     return "\n".join(lines) + "\n"
 
 
-PAGES = {"docs/data-dictionary.md": data_dictionary, "docs/settings.md": settings_reference}
+def declaration_reference() -> str:
+    """Every key of the TOML."""
+    return "\n".join(experiment_reference(MADE)).rstrip() + "\n"
+
+
+PAGES = {
+    "docs/data-dictionary.md": data_dictionary,
+    "docs/settings.md": settings_reference,
+    "docs/reference/experiment.md": declaration_reference,
+}
 
 
 def main() -> int:

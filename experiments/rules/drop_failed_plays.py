@@ -9,3 +9,4 @@ class DropFailedPlays(Declaration):
     """Leave out trials whose clip was not shown as declared (verdict failed)."""
 
     rule: Literal["failed_plays"] = "failed_plays"
+    """Names this rule."""

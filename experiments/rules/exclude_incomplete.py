@@ -9,3 +9,4 @@ class ExcludeIncomplete(Declaration):
     """Leave out participants who did not finish the run."""
 
     rule: Literal["incomplete"] = "incomplete"
+    """Names this rule."""

@@ -17,11 +17,20 @@ class PlaybackRules(Declaration):
     """
 
     flagged_missing_frames: Annotated[int, Field(ge=0)] = 0
+    """Frames of the clip never drawn, more than which flag a play."""
     failed_missing_frames: Annotated[int, Field(ge=0)] = 3
+    """Frames of the clip never drawn, more than which fail a play."""
     flagged_late_frames: Annotated[int, Field(ge=0)] = 2
+    """Frames drawn more than one refresh after their time, more than which flag a play."""
     flagged_longest_gap_ms: Annotated[float, Field(gt=0)] = 70.0
+    """Longest time between two drawn frames, in ms, over which a play is flagged."""
     failed_longest_gap_ms: Annotated[float, Field(gt=0)] = 250.0
+    """Longest time between two drawn frames, in ms, over which a play is failed."""
     uncertain_unevenness_ms: Annotated[float, Field(gt=0)] = 3.0
+    """Unevenness of the page's animation clock, in ms, over which a play is uncertain."""
     fail_on_focus_lost: bool = True
+    """Whether a play fails where the page lost focus or visibility during it; else it is flagged."""
     flag_video_fallback: bool = True
+    """Whether a play by the video element, which reports frames less exactly, is flagged."""
     max_repeats: Annotated[int, Field(ge=0, le=5)] = 1
+    """How often a clip whose play failed is offered again, at the end of the block."""

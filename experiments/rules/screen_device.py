@@ -12,3 +12,4 @@ class ScreenDevice(Declaration):
     """
 
     rule: Literal["device"] = "device"
+    """Names this rule."""

@@ -1,18 +1,13 @@
 """Screening by an answer of a form."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from experiments.base import Declaration, Name
 from experiments.errors import did_you_mean
-from experiments.forms import (
-    ChoiceField,
-    Form,
-    FormField,
-    LikertField,
-    MultipleChoiceField,
-    NumberField,
-)
+
+if TYPE_CHECKING:
+    from experiments.definition.forms import Form, Question
 
 
 class ScreenFormAnswer(Declaration):
@@ -22,11 +17,17 @@ class ScreenFormAnswer(Declaration):
     """
 
     rule: Literal["form_answer"] = "form_answer"
+    """Names this rule."""
     form: Name
+    """Name of the form."""
     field: Name
+    """Name of the question in it."""
     refused: tuple[str, ...] = ()
+    """Values of options that end the run; for questions with options."""
     below: int | None = None
+    """A number smaller than this ends the run; for numbers and ratings."""
     above: int | None = None
+    """A number larger than this ends the run; for numbers and ratings."""
 
     def screens_out(self, answer: object) -> bool:
         """True where this answer (text, number, or list of texts) ends the run."""
@@ -36,7 +37,7 @@ class ScreenFormAnswer(Declaration):
         given = answer if isinstance(answer, list) else [answer]
         return any(value in self.refused for value in given)
 
-    def fault(self, forms: Sequence[Form]) -> str | None:
+    def fault(self, forms: "Sequence[Form]") -> str | None:
         """What is wrong with this rule, given the declared forms; None where nothing is."""
         form = next((form for form in forms if form.name == self.form), None)
         if form is None:
@@ -47,15 +48,14 @@ class ScreenFormAnswer(Declaration):
             return f"form '{form.name}' has no field '{self.field}'{near}"
         return self._fault_of(field)
 
-    def _fault_of(self, field: FormField) -> str | None:
+    def _fault_of(self, field: "Question") -> str | None:
         limits = self.below is not None or self.above is not None
-        if isinstance(field, NumberField | LikertField):
+        if field.screened_by == "limits":
             fits = limits and not self.refused
             return None if fits else f"'{field.name}' is a number: give `below` or `above`, not `refused`"
-        if not isinstance(field, ChoiceField | MultipleChoiceField):
+        if field.screened_by is None:
             return f"'{field.name}' is free text; only choices and numbers can be screened"
         if limits or not self.refused:
             return f"'{field.name}' is a choice: give `refused`, not `below` or `above`"
-        values = [option.value for option in field.options]
-        wrong = next((value for value in self.refused if value not in values), None)
-        return f"'{field.name}' has no option '{wrong}'{did_you_mean(wrong, values)}" if wrong else None
+        wrong = next((value for value in self.refused if value not in field.values), None)
+        return f"'{field.name}' has no option '{wrong}'{did_you_mean(wrong, field.values)}" if wrong else None

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from experiments.definition import Experiment
+from experiments.definition.experiment import STORED, Experiment
 from experiments.errors import InputError
 from experiments.schema.upgrades import upgraded
 
@@ -14,7 +14,7 @@ def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
     """The declaration stored as JSON data of format `number`; InputError where it cannot be read."""
     data = upgraded(definition, number)
     try:
-        return Experiment.model_validate(data)
+        return Experiment.model_validate(data, context={STORED: True})
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])

@@ -20,7 +20,9 @@ class TrialDeclaration(Declaration):
     """What every kind declares; each adds its own keys, and a constant as its `kind`."""
 
     kind: str
+    """Kind of trial."""
     expected_seconds: Annotated[float, Field(gt=0)] = 6.0
+    """Seconds a trial takes on average, from which the length of a visit is reckoned."""
 
     def fault(self, experiment: "Experiment") -> str | None:
         """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from experiments.definition.forms import Form, is_empty
 from experiments.errors import did_you_mean
-from experiments.forms import Form, is_empty
 from server.participants.refusals import FormInvalid
 
 

@@ -7,7 +7,7 @@ from uuid import UUID
 from pydantic import BaseModel, Field, StringConstraints
 
 from experiments.definition import Display, Texts
-from experiments.forms import Form
+from experiments.definition.forms import Form
 from experiments.rules import PlaybackRules
 from experiments.trials.union import AnyPage
 from server.models import STAGES

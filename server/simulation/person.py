@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from experiments.forms import FormField
+from experiments.definition.forms import FormField
 from server.simulation.http import JsonClient
 
 LEVEL_SD, PERSON_SD, CLIP_SD, TRIAL_SD = 0.5, 0.6, 0.2, 1.0

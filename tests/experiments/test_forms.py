@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from experiments.forms import (
+from experiments.definition.forms import (
     ChoiceField,
     FormField,
     LikertField,

@@ -16,10 +16,15 @@ class Scale(Declaration):
     """The rating scale: whole numbers from `minimum` to `maximum` with labelled ends."""
 
     minimum: int = 1
+    """Lowest point of the scale, a whole number."""
     maximum: int = 7
+    """Highest point; with the lowest it makes 2 to 11 points."""
     question: Translated
+    """What is asked, in every language."""
     low: Translated
+    """Label of the lowest point."""
     high: Translated
+    """Label of the highest point."""
 
     @model_validator(mode="after")
     def _ascending(self) -> Self:
@@ -35,13 +40,21 @@ class ClipRating(TrialDeclaration):
     """
 
     kind: Literal["clip_rating"] = "clip_rating"
+    """Names this kind of trial."""
     scale: Scale
+    """The question and its scale."""
     views: Annotated[int, Field(ge=1, le=10)] = 1
+    """How often the clip is shown before it is rated."""
     start: Literal["key", "fixation"] = "key"
+    """A clip begins on a key press, or by itself after a fixation cross."""
     fixation_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
+    """How long the fixation cross stands before the clip, in ms; with `start = "fixation"`."""
     pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
+    """Time, in ms, for which a mouse that has not moved since its last press chooses nothing."""
     confirm: bool = False
+    """Whether a rating counts only once it is confirmed, so that it can be changed before."""
     comment: bool = False
+    """Adds a line of free text beside the rating; it stands in the column `comment`."""
 
 
 def clip_rating_of(experiment: "Experiment") -> ClipRating:

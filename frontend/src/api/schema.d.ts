@@ -1366,28 +1366,35 @@ export interface components {
         AnalysisPlan: {
             /**
              * Kind
+             * @description Analysis of variance of participants' cell means, repeated over the factors within participants.
              * @default within_anova
              * @constant
              */
             kind: "within_anova";
             /**
              * Factors
+             * @description Factors in the order of the tables; over those left out ratings are averaged. Empty takes all.
              * @default []
              */
             factors: string[];
             /**
              * Statistic
+             * @description Test that tables print: of the multivariate model (no sphericity needed), or univariate with
+             *     Greenhouse-Geisser's correction. The JSON output holds both.
              * @default multivariate
              * @enum {string}
              */
             statistic: "multivariate" | "univariate";
             /**
              * Pairs
+             * @description Factors whose levels the report compares pair by pair; empty takes every factor of the analysis.
+             *     p values are given as they are, and corrected by Bonferroni and by Holm.
              * @default []
              */
             pairs: string[];
             /**
              * Table
+             * @description Layout of the table: a row an effect, pairs beside interactions, or one factor.
              * @default two_level_factors
              * @enum {string}
              */
@@ -1400,10 +1407,14 @@ export interface components {
         AttentionChecks: {
             /**
              * Per Block
+             * @description Checks in each block, at random places but never first. They are stored with kind `attention`.
              * @default 0
              */
             per_block: number;
-            /** Text */
+            /**
+             * Text
+             * @description Markdown of the check, `{response}` standing for the answer asked for.
+             */
             text: {
                 [key: string]: string;
             };
@@ -1477,27 +1488,35 @@ export interface components {
          *     `counterbalanced` deals block orders evenly over participants, `fixed` keeps the declared order.
          */
         Blocks: {
-            /** Split By */
+            /**
+             * Split By
+             * @description Factor each level of which makes a block; without it every block holds all clips.
+             */
             split_by: string | null;
             /**
              * Repeats
+             * @description How often each block is shown. A participant's cell mean is taken over the repeats.
              * @default 1
              */
             repeats: number;
             /**
              * Order
+             * @description Order of the blocks: shuffled for each participant, cycling through the levels, orders dealt evenly
+             *     over participants (every order up to five blocks, a balanced Latin square beyond), or as declared.
              * @default random
              * @enum {string}
              */
             order: "random" | "alternating" | "counterbalanced" | "fixed";
             /**
              * Trial Order
+             * @description Order of the clips in a block: shuffled for each participant, or cell by cell as declared.
              * @default random
              * @enum {string}
              */
             trial_order: "random" | "fixed";
             /**
              * Break Seconds Min
+             * @description Seconds a break between blocks lasts at least; the participant may take longer.
              * @default 0
              */
             break_seconds_min: number;
@@ -1661,27 +1680,40 @@ export interface components {
          * @description One of several answers.
          */
         ChoiceField: {
-            /** Name */
+            /**
+             * Name
+             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description The question, in every language.
+             */
             label: {
                 [key: string]: string;
             };
-            /** Help */
+            /**
+             * Help
+             * @description Smaller text under the question.
+             */
             help: {
                 [key: string]: string;
             } | null;
             /**
              * Required
+             * @description Whether the form can be sent only once this is answered.
              * @default false
              */
             required: boolean;
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this type of field. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             type: "choice";
-            /** Options */
+            /**
+             * Options
+             * @description The answers, in the order in which they are listed.
+             */
             options: components["schemas"]["Option"][];
         };
         /**
@@ -1726,44 +1758,52 @@ export interface components {
          */
         ClipRating: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             kind: "clip_rating";
             /**
              * Expected Seconds
+             * @description Seconds a trial takes on average, from which the length of a visit is reckoned.
              * @default 6
              */
             expected_seconds: number;
+            /** @description The question and its scale. */
             scale: components["schemas"]["Scale"];
             /**
              * Views
+             * @description How often the clip is shown before it is rated.
              * @default 1
              */
             views: number;
             /**
              * Start
+             * @description A clip begins on a key press, or by itself after a fixation cross.
              * @default key
              * @enum {string}
              */
             start: "key" | "fixation";
             /**
              * Fixation Ms
+             * @description How long the fixation cross stands before the clip, in ms; with `start = "fixation"`.
              * @default 500
              */
             fixation_ms: number;
             /**
              * Pointer Delay Ms
+             * @description Time, in ms, for which a mouse that has not moved since its last press chooses nothing.
              * @default 1500
              */
             pointer_delay_ms: number;
             /**
              * Confirm
+             * @description Whether a rating counts only once it is confirmed, so that it can be changed before.
              * @default false
              */
             confirm: boolean;
             /**
              * Comment
+             * @description Adds a line of free text beside the rating; it stands in the column `comment`.
              * @default false
              */
             comment: boolean;
@@ -1833,6 +1873,8 @@ export interface components {
         /**
          * Declaration
          * @description A frozen piece of a declaration; unknown keys are refused by name.
+         *
+         *     The text under a key is its description: docs/reference/experiment.md and the API's schema are made of it.
          */
         Declaration: Record<string, never>;
         /**
@@ -1874,42 +1916,51 @@ export interface components {
         Display: {
             /**
              * Inter Ocular Mm
+             * @description Distance between the eyes' centres on the screen, in mm; calibration turns it into pixels.
              * @default 60
              */
             inter_ocular_mm: number;
             /**
              * Calibrate
+             * @description Whether the participant fits a card's outline to learn the screen's pixels per mm. Without it clips are
+             *     shown pixel by pixel and `px_per_mm` is empty in the data.
              * @default required
              * @enum {string}
              */
             calibrate: "required" | "optional" | "off";
             /**
              * Viewing Distance
+             * @description Adds the blind-spot test, which estimates `viewing_distance_mm` from where a dot vanishes.
              * @default false
              */
             viewing_distance: boolean;
             /**
              * Full Screen
+             * @description Asks for full screen before the first trial and again where it was left.
              * @default true
              */
             full_screen: boolean;
             /**
              * Background
+             * @description Colour of the page around the clip.
              * @default #808080
              */
             background: string;
             /**
              * Minimum Width Px
+             * @description Smallest window width, in CSS pixels, in which a run may begin.
              * @default 800
              */
             minimum_width_px: number;
             /**
              * Minimum Height Px
+             * @description Smallest window height, in CSS pixels, in which a run may begin.
              * @default 500
              */
             minimum_height_px: number;
             /**
              * Allow Touch
+             * @description False turns away devices that have a touch screen and no mouse: phones and tablets.
              * @default true
              */
             allow_touch: boolean;
@@ -1920,7 +1971,7 @@ export interface components {
          */
         DropFailedPlays: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "failed_plays";
@@ -1931,12 +1982,13 @@ export interface components {
          */
         DropSlowTrials: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "slow_trials";
             /**
              * Above Ms
+             * @description Response time, in ms from the clip's end, over which a trial is left out.
              * @default 60000
              */
             above_ms: number;
@@ -2020,12 +2072,13 @@ export interface components {
          */
         ExcludeAttention: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "attention_checks_failed";
             /**
              * More Than
+             * @description Failed checks that are still allowed; 0 excludes at the first.
              * @default 0
              */
             more_than: number;
@@ -2036,12 +2089,13 @@ export interface components {
          */
         ExcludeFast: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "median_response_time";
             /**
              * Below Ms
+             * @description Median response time, in ms from the clip's end, under which a run is left out.
              * @default 200
              */
             below_ms: number;
@@ -2052,7 +2106,7 @@ export interface components {
          */
         ExcludeIncomplete: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "incomplete";
@@ -2063,12 +2117,13 @@ export interface components {
          */
         ExcludePlayback: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "poor_playback_share";
             /**
              * More Than
+             * @description Share of plays, flagged or failed, from 0 to 1, over which a run is left out.
              * @default 0.2
              */
             more_than: number;
@@ -2079,12 +2134,13 @@ export interface components {
          */
         ExcludeStraightLining: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "same_response_share";
             /**
              * More Than
+             * @description Share of trials with the commonest answer, from 0 to 1, over which a run is left out.
              * @default 0.95
              */
             more_than: number;
@@ -2096,53 +2152,72 @@ export interface components {
          *     Exemplar 3 of two cells shows the same blink unless the cells differ in a factor named in `own_per`.
          */
         Exemplars: {
-            /** Per Cell */
+            /**
+             * Per Cell
+             * @description Clips (different blinks) in each cell. More of them make means less dependent on single blinks.
+             */
             per_cell: number;
             /**
              * Own Per
+             * @description Factors whose levels show different blinks; over all other factors exemplar n is the same blink.
              * @default []
              */
             own_per: string[];
             /**
              * Seed
+             * @description Seed of the draw of recorded blinks. Another seed gives other clips, and with them another study.
              * @default 2011
              */
             seed: number;
         };
         /**
          * Experiment
-         * @description A factorial clip-rating study, complete: this is what an `expN.toml` declares.
+         * @description A factorial study of clips, complete: this is what an `expN.toml` declares.
          */
         Experiment: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the experiment in manifests, exports and file names.
+             */
             name: string;
-            /** Title */
+            /**
+             * Title
+             * @description Title that experimenters and participants read.
+             */
             title: string;
             /**
              * Version
+             * @description The experimenter's own count of versions; nothing depends on it.
              * @default 1
              */
             version: number;
             /**
              * Source
+             * @description Where the design comes from, such as a reference to a paper. Stands in reports.
              * @default
              */
             source: string;
             /**
              * Participants
+             * @description Planned number of participants, for `stimuli plan`. The study's quota is set on the server.
              * @default 20
              */
             participants: number;
             /**
              * Languages
+             * @description Languages offered to participants, the first where theirs is none of them; each needs its [texts].
              * @default [
              *       "en"
              *     ]
              */
             languages: string[];
-            /** Factors */
+            /**
+             * Factors
+             * @description The factors. Their levels, every one with every other, make the cells.
+             */
             factors: components["schemas"]["Factor"][];
             /**
+             * @description How every clip is rendered, unless a level changes it.
              * @default {
              *       "character": "photorealistic",
              *       "profile": "real",
@@ -2156,8 +2231,10 @@ export interface components {
              *     }
              */
             render: components["schemas"]["RenderSettings"];
+            /** @description How many clips a cell has. */
             exemplars: components["schemas"]["Exemplars"];
             /**
+             * @description Blocks and their order.
              * @default {
              *       "repeats": 1,
              *       "order": "random",
@@ -2167,14 +2244,19 @@ export interface components {
              */
             blocks: components["schemas"]["Blocks"];
             /**
+             * @description Practice before the first block.
              * @default {
              *       "trials": 4
              *     }
              */
             practice: components["schemas"]["Practice"];
-            /** Trial */
+            /**
+             * Trial
+             * @description What one trial shows and asks, by its kind.
+             */
             trial: components["schemas"]["ClipRating"];
             /**
+             * @description Size and surround of the clip, and what the device must offer.
              * @default {
              *       "inter_ocular_mm": 60,
              *       "calibrate": "required",
@@ -2188,6 +2270,7 @@ export interface components {
              */
             display: components["schemas"]["Display"];
             /**
+             * @description Coming back, and for how long a place is kept.
              * @default {
              *       "resume": "resume",
              *       "maximum_age_hours": 72,
@@ -2196,6 +2279,7 @@ export interface components {
              */
             session: components["schemas"]["Session"];
             /**
+             * @description When a play is flagged or failed.
              * @default {
              *       "flagged_missing_frames": 0,
              *       "failed_missing_frames": 3,
@@ -2210,6 +2294,7 @@ export interface components {
              */
             playback: components["schemas"]["PlaybackRules"];
             /**
+             * @description Attention checks between the trials.
              * @default {
              *       "per_block": 0,
              *       "text": {
@@ -2221,24 +2306,31 @@ export interface components {
             attention: components["schemas"]["AttentionChecks"];
             /**
              * Screening
+             * @description Rules that end a run while it goes on. The participant is told so, and the place is free again.
              * @default []
              */
             screening: (components["schemas"]["ScreenFormAnswer"] | components["schemas"]["ScreenAttention"] | components["schemas"]["ScreenDevice"])[];
             /**
              * Exclusions
+             * @description Rules, fixed before the data, that leave out runs or trials when the study is analysed.
              * @default []
              */
             exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"])[];
             /**
              * Forms
+             * @description Questionnaires before and after the trials.
              * @default []
              */
             forms: components["schemas"]["Form"][];
-            /** Texts */
+            /**
+             * Texts
+             * @description The pages, a table a language: [texts.en].
+             */
             texts: {
                 [key: string]: components["schemas"]["Texts"];
             };
             /**
+             * @description The analysis, fixed before the data.
              * @default {
              *       "kind": "within_anova",
              *       "factors": [],
@@ -2251,14 +2343,23 @@ export interface components {
         };
         /**
          * Factor
-         * @description A within-participant factor.
+         * @description A factor of the design. The clips are every combination of the factors' levels.
          */
         Factor: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the factor's column in the ratings CSV and in the analysis; no other column may have it.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description What tables, figures and reports call the factor.
+             */
             label: string;
-            /** Levels */
+            /**
+             * Levels
+             * @description In the order of tables and contrasts. In the list of cells the last factor's change fastest.
+             */
             levels: components["schemas"]["Level"][];
         };
         /**
@@ -2278,19 +2379,29 @@ export interface components {
          * @description One page of questions, shown before the first or after the last block.
          */
         Form: {
-            /** Name */
+            /**
+             * Name
+             * @description Key of the form's answers in the runs CSV; [[screening]] names it as `form`.
+             */
             name: string;
             /**
              * When
+             * @description Shown after the consent, before the trials, or after the last trial.
              * @default before
              * @enum {string}
              */
             when: "before" | "after";
-            /** Title */
+            /**
+             * Title
+             * @description Heading of the page.
+             */
             title: {
                 [key: string]: string;
             };
-            /** Fields */
+            /**
+             * Fields
+             * @description The questions, in order.
+             */
             fields: (components["schemas"]["TextField"] | components["schemas"]["NumberField"] | components["schemas"]["ChoiceField"] | components["schemas"]["MultipleChoiceField"] | components["schemas"]["LikertField"])[];
         };
         /**
@@ -2395,14 +2506,23 @@ export interface components {
         };
         /**
          * Level
-         * @description One level of a within factor, with the label that participants never see but tables show.
+         * @description One level of a factor: its name in the data, its label in tables, and what it changes in clips.
          */
         Level: {
-            /** Name */
+            /**
+             * Name
+             * @description Value in the factor's column of every export and part of the cell's name. Participants never see it.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description What tables and figures call the level. Participants never see it.
+             */
             label: string;
-            /** @default {} */
+            /**
+             * @description What clips of this level change of [render]. Levels that change nothing give the same clips.
+             * @default {}
+             */
             render: components["schemas"]["RenderOverrides"];
         };
         /**
@@ -2436,36 +2556,53 @@ export interface components {
          * @description A rating from 1 to `points` with labelled ends.
          */
         LikertField: {
-            /** Name */
+            /**
+             * Name
+             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description The question, in every language.
+             */
             label: {
                 [key: string]: string;
             };
-            /** Help */
+            /**
+             * Help
+             * @description Smaller text under the question.
+             */
             help: {
                 [key: string]: string;
             } | null;
             /**
              * Required
+             * @description Whether the form can be sent only once this is answered.
              * @default false
              */
             required: boolean;
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this type of field. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             type: "likert";
             /**
              * Points
+             * @description Number of points; the answer is a whole number from 1.
              * @default 7
              */
             points: number;
-            /** Low */
+            /**
+             * Low
+             * @description Label of the lowest point.
+             */
             low: {
                 [key: string]: string;
             };
-            /** High */
+            /**
+             * High
+             * @description Label of the highest point.
+             */
             high: {
                 [key: string]: string;
             };
@@ -2707,27 +2844,40 @@ export interface components {
          * @description Any of several answers.
          */
         MultipleChoiceField: {
-            /** Name */
+            /**
+             * Name
+             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description The question, in every language.
+             */
             label: {
                 [key: string]: string;
             };
-            /** Help */
+            /**
+             * Help
+             * @description Smaller text under the question.
+             */
             help: {
                 [key: string]: string;
             } | null;
             /**
              * Required
+             * @description Whether the form can be sent only once this is answered.
              * @default false
              */
             required: boolean;
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this type of field. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             type: "multiple_choice";
-            /** Options */
+            /**
+             * Options
+             * @description The answers, in the order in which they are listed; any number of them may be chosen.
+             */
             options: components["schemas"]["Option"][];
         };
         /**
@@ -2914,33 +3064,45 @@ export interface components {
          * @description A whole number within limits, such as an age in years.
          */
         NumberField: {
-            /** Name */
+            /**
+             * Name
+             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description The question, in every language.
+             */
             label: {
                 [key: string]: string;
             };
-            /** Help */
+            /**
+             * Help
+             * @description Smaller text under the question.
+             */
             help: {
                 [key: string]: string;
             } | null;
             /**
              * Required
+             * @description Whether the form can be sent only once this is answered.
              * @default false
              */
             required: boolean;
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this type of field. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             type: "number";
             /**
              * Minimum
+             * @description Smallest answer taken.
              * @default 0
              */
             minimum: number;
             /**
              * Maximum
+             * @description Largest answer taken.
              * @default 1000000
              */
             maximum: number;
@@ -2950,9 +3112,15 @@ export interface components {
          * @description One answer of a choice field; `value` is what is stored.
          */
         Option: {
-            /** Value */
+            /**
+             * Value
+             * @description What is stored and exported, whatever language was read.
+             */
             value: string;
-            /** Label */
+            /**
+             * Label
+             * @description What the participant reads.
+             */
             label: {
                 [key: string]: string;
             };
@@ -3067,46 +3235,55 @@ export interface components {
         PlaybackRules: {
             /**
              * Flagged Missing Frames
+             * @description Frames of the clip never drawn, more than which flag a play.
              * @default 0
              */
             flagged_missing_frames: number;
             /**
              * Failed Missing Frames
+             * @description Frames of the clip never drawn, more than which fail a play.
              * @default 3
              */
             failed_missing_frames: number;
             /**
              * Flagged Late Frames
+             * @description Frames drawn more than one refresh after their time, more than which flag a play.
              * @default 2
              */
             flagged_late_frames: number;
             /**
              * Flagged Longest Gap Ms
+             * @description Longest time between two drawn frames, in ms, over which a play is flagged.
              * @default 70
              */
             flagged_longest_gap_ms: number;
             /**
              * Failed Longest Gap Ms
+             * @description Longest time between two drawn frames, in ms, over which a play is failed.
              * @default 250
              */
             failed_longest_gap_ms: number;
             /**
              * Uncertain Unevenness Ms
+             * @description Unevenness of the page's animation clock, in ms, over which a play is uncertain.
              * @default 3
              */
             uncertain_unevenness_ms: number;
             /**
              * Fail On Focus Lost
+             * @description Whether a play fails where the page lost focus or visibility during it; else it is flagged.
              * @default true
              */
             fail_on_focus_lost: boolean;
             /**
              * Flag Video Fallback
+             * @description Whether a play by the video element, which reports frames less exactly, is flagged.
              * @default true
              */
             flag_video_fallback: boolean;
             /**
              * Max Repeats
+             * @description How often a clip whose play failed is offered again, at the end of the block.
              * @default 1
              */
             max_repeats: number;
@@ -3118,6 +3295,7 @@ export interface components {
         Practice: {
             /**
              * Trials
+             * @description How many practice trials there are. They are stored with kind `practice` and never analysed.
              * @default 4
              */
             trials: number;
@@ -3316,89 +3494,115 @@ export interface components {
         };
         /**
          * RenderOverrides
-         * @description What one level changes of the experiment's `RenderSettings`; None leaves it as it is.
+         * @description What a level changes of [render]; a key left out stays as it is there.
          */
         RenderOverrides: {
-            /** Character */
+            /**
+             * Character
+             * @description As [render] `character`, for clips of this level.
+             */
             character: string | null;
-            /** Profile */
+            /**
+             * Profile
+             * @description As [render] `profile`, for clips of this level.
+             */
             profile: string | null;
-            /** Duration Frames */
+            /**
+             * Duration Frames
+             * @description As [render] `duration_frames`, for clips of this level.
+             */
             duration_frames: number | null;
-            /** Amplitude */
+            /**
+             * Amplitude
+             * @description As [render] `amplitude`, for clips of this level.
+             */
             amplitude: ("full" | "natural") | null;
-            /** Motion Blur */
+            /**
+             * Motion Blur
+             * @description As [render] `motion_blur`, for clips of this level.
+             */
             motion_blur: boolean | null;
-            /** Lower Lid */
+            /**
+             * Lower Lid
+             * @description As [render] `lower_lid`, for clips of this level.
+             */
             lower_lid: ("both" | "vertical" | "horizontal" | "none") | null;
-            /** Eyes */
+            /**
+             * Eyes
+             * @description As [render] `eyes`, for clips of this level.
+             */
             eyes: ("alike" | "separate") | null;
-            /** Fps */
+            /**
+             * Fps
+             * @description As [render] `fps`, for clips of this level.
+             */
             fps: number | null;
         };
         /**
          * RenderSettings
          * @description Everything the clip builder needs for one cell.
-         *
-         *     Attributes
-         *     ----------
-         *     character: a shipped character (`photorealistic`, `cartoon`) or a character folder.
-         *     profile: one of `PROFILES`, or a CSV file of closure samples (0 open, 1 closed).
-         *     duration_frames: blink length in frames at 30 fps; None keeps the recorded length.
-         *     amplitude: `full` (FC) reaches closure 1, `natural` (NC) keeps the measured closure.
-         *     motion_blur: mean of the 300 fps samples of one output frame in linear light (MB), or one sample (NB).
-         *     lower_lid: which lower-lid signals move: both, vertical, horizontal or none.
-         *     eyes: `alike` drives both eyes by one signal, `separate` by the left and right recording.
-         *     fps: frame rate of the clip. width_px, height_px: picture size.
          */
         RenderSettings: {
             /**
              * Character
+             * @description A shipped character (`photorealistic`, `cartoon`), or the path of a character folder of your own.
              * @default photorealistic
              */
             character: string;
             /**
              * Profile
+             * @description Blink profile: recorded (`real`), of the PCA model (`model`), a textbook curve (`SL`, `AL`, `SL_ease`,
+             *     `AL_ease`: symmetric or asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed).
              * @default real
              */
             profile: string;
-            /** Duration Frames */
+            /**
+             * Duration Frames
+             * @description Length of the blink, in frames at 30 per second; left out, blinks keep their recorded length.
+             */
             duration_frames: number | null;
             /**
              * Amplitude
+             * @description `full` (FC) closes the eye fully, to closure 1; `natural` (NC) keeps the closure that was measured.
              * @default full
              * @enum {string}
              */
             amplitude: "full" | "natural";
             /**
              * Motion Blur
+             * @description Mean of the 300 fps samples of an output frame in linear light (MB), or one sample of it (NB).
              * @default true
              */
             motion_blur: boolean;
             /**
              * Lower Lid
+             * @description Which recorded signals move the lower lid.
              * @default none
              * @enum {string}
              */
             lower_lid: "both" | "vertical" | "horizontal" | "none";
             /**
              * Eyes
+             * @description One signal drives both eyes, or the left and the right recording an eye each.
              * @default alike
              * @enum {string}
              */
             eyes: "alike" | "separate";
             /**
              * Fps
+             * @description Frame rate of the clip, in frames per second.
              * @default 30
              */
             fps: number;
             /**
              * Width Px
+             * @description Width of the clip, in pixels.
              * @default 960
              */
             width_px: number;
             /**
              * Height Px
+             * @description Height of the clip, in pixels.
              * @default 360
              */
             height_px: number;
@@ -3666,23 +3870,34 @@ export interface components {
         Scale: {
             /**
              * Minimum
+             * @description Lowest point of the scale, a whole number.
              * @default 1
              */
             minimum: number;
             /**
              * Maximum
+             * @description Highest point; with the lowest it makes 2 to 11 points.
              * @default 7
              */
             maximum: number;
-            /** Question */
+            /**
+             * Question
+             * @description What is asked, in every language.
+             */
             question: {
                 [key: string]: string;
             };
-            /** Low */
+            /**
+             * Low
+             * @description Label of the lowest point.
+             */
             low: {
                 [key: string]: string;
             };
-            /** High */
+            /**
+             * High
+             * @description Label of the highest point.
+             */
             high: {
                 [key: string]: string;
             };
@@ -3693,12 +3908,13 @@ export interface components {
          */
         ScreenAttention: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "attention_checks_failed";
             /**
              * More Than
+             * @description Failed checks that are still allowed; 0 ends the run at the first.
              * @default 0
              */
             more_than: number;
@@ -3711,7 +3927,7 @@ export interface components {
          */
         ScreenDevice: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "device";
@@ -3724,22 +3940,35 @@ export interface components {
          */
         ScreenFormAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this rule. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             rule: "form_answer";
-            /** Form */
+            /**
+             * Form
+             * @description Name of the form.
+             */
             form: string;
-            /** Field */
+            /**
+             * Field
+             * @description Name of the question in it.
+             */
             field: string;
             /**
              * Refused
+             * @description Values of options that end the run; for questions with options.
              * @default []
              */
             refused: string[];
-            /** Below */
+            /**
+             * Below
+             * @description A number smaller than this ends the run; for numbers and ratings.
+             */
             below: number | null;
-            /** Above */
+            /**
+             * Above
+             * @description A number larger than this ends the run; for numbers and ratings.
+             */
             above: number | null;
         };
         /**
@@ -3813,17 +4042,21 @@ export interface components {
         Session: {
             /**
              * Resume
+             * @description Coming back goes on at the next trial, begins a new run (the old one is withdrawn), or is refused.
              * @default resume
              * @enum {string}
              */
             resume: "resume" | "restart" | "block";
             /**
              * Maximum Age Hours
+             * @description Hours after its start at which a run can no longer be taken up again.
              * @default 72
              */
             maximum_age_hours: number;
             /**
              * Lease Minutes
+             * @description Minutes without a sign of life after which an unfinished run's place (quota, counterbalancing slot)
+             *     goes to somebody else. What it answered stays.
              * @default 120
              */
             lease_minutes: number;
@@ -4002,28 +4235,39 @@ export interface components {
          * @description Free text.
          */
         TextField: {
-            /** Name */
+            /**
+             * Name
+             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
+             */
             name: string;
-            /** Label */
+            /**
+             * Label
+             * @description The question, in every language.
+             */
             label: {
                 [key: string]: string;
             };
-            /** Help */
+            /**
+             * Help
+             * @description Smaller text under the question.
+             */
             help: {
                 [key: string]: string;
             } | null;
             /**
              * Required
+             * @description Whether the form can be sent only once this is answered.
              * @default false
              */
             required: boolean;
             /**
-             * @description discriminator enum property added by openapi-typescript
+             * @description Names this type of field. (enum property replaced by openapi-typescript)
              * @enum {string}
              */
             type: "text";
             /**
              * Max Length
+             * @description Longest answer, in characters.
              * @default 500
              */
             max_length: number;
@@ -4033,24 +4277,36 @@ export interface components {
          * @description The pages of one language, in Markdown. `screened_out` stands in for a few words of the page's own.
          */
         Texts: {
-            /** Consent */
+            /**
+             * Consent
+             * @description First page. Nothing is stored of the participant before they agree to it.
+             */
             consent: string;
-            /** Instructions */
+            /**
+             * Instructions
+             * @description Page before practice: what is seen, what is asked, which keys answer.
+             */
             instructions: string;
-            /** Debrief */
+            /**
+             * Debrief
+             * @description Last page: what the study is about. Shown after the last answer only.
+             */
             debrief: string;
             /**
              * Practice
+             * @description Page before the practice trials; empty shows a title of the page's own.
              * @default
              */
             practice: string;
             /**
              * Block Break
+             * @description Page between blocks; empty shows a few words of the page's own.
              * @default
              */
             block_break: string;
             /**
              * Screened Out
+             * @description Page of a participant whom a [[screening]] rule ends; empty shows a few words of the page's own.
              * @default
              */
             screened_out: string;
@@ -4224,10 +4480,14 @@ export interface components {
          * @description What every kind declares; each adds its own keys, and a constant as its `kind`.
          */
         TrialDeclaration: {
-            /** Kind */
+            /**
+             * Kind
+             * @description Kind of trial.
+             */
             kind: string;
             /**
              * Expected Seconds
+             * @description Seconds a trial takes on average, from which the length of a visit is reckoned.
              * @default 6
              */
             expected_seconds: number;

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from experiments.base import IMPLIED, Declaration
 from experiments.errors import InputError
-from experiments.load import DefinitionError, load_experiment, parse_experiment
+from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
 from experiments.schema.canonical import canonical, definition_sha256
 from experiments.schema.keys import keys
 from experiments.schema.stored import load_stored
@@ -132,3 +132,12 @@ def test_a_stored_definition_that_cannot_be_read_is_one_line() -> None:
     with pytest.raises(InputError, match=r"stored definition exp1 .* unheard_of") as raised:
         load_stored(stored)
     assert "\n" not in str(raised.value)
+
+
+def test_a_name_that_has_become_a_column_since_still_loads_but_is_refused_in_a_new_declaration() -> None:
+    text = locate("exp1").read_text(encoding="utf-8")
+    stored = json.loads(parse_experiment(text).model_dump_json())
+    taken = json.loads(json.dumps(stored).replace('"blur"', '"run_origin"'))
+    assert "run_origin" in load_stored(taken).factor_names
+    with pytest.raises(DefinitionError, match="'run_origin' has the name of a ratings column"):
+        parse_experiment(text.replace('"blur"', '"run_origin"'))

@@ -1,0 +1,29 @@
+"""How a clip must appear, and what the device must offer."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.base import Declaration
+
+
+class Display(Declaration):
+    """How the clip must appear: size on the screen, surround, and what the device must offer."""
+
+    inter_ocular_mm: Annotated[float, Field(gt=0, le=500)] = 60.0
+    """Distance between the eyes' centres on the screen, in mm; calibration turns it into pixels."""
+    calibrate: Literal["required", "optional", "off"] = "required"
+    """Whether the participant fits a card's outline to learn the screen's pixels per mm. Without it clips are
+    shown pixel by pixel and `px_per_mm` is empty in the data."""
+    viewing_distance: bool = False
+    """Adds the blind-spot test, which estimates `viewing_distance_mm` from where a dot vanishes."""
+    full_screen: bool = True
+    """Asks for full screen before the first trial and again where it was left."""
+    background: Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")] = "#808080"
+    """Colour of the page around the clip."""
+    minimum_width_px: Annotated[int, Field(ge=0)] = 800
+    """Smallest window width, in CSS pixels, in which a run may begin."""
+    minimum_height_px: Annotated[int, Field(ge=0)] = 500
+    """Smallest window height, in CSS pixels, in which a run may begin."""
+    allow_touch: bool = True
+    """False turns away devices that have a touch screen and no mouse: phones and tablets."""

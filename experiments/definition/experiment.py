@@ -1,0 +1,118 @@
+"""An experiment as a declaration: factors, exemplars, blocks, scale, texts, rules and analysis plan."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from experiments.base import Declaration, Language, Name
+from experiments.definition.analysis_plan import AnalysisPlan
+from experiments.definition.blocks import Blocks, Practice
+from experiments.definition.display import Display
+from experiments.definition.factors import Exemplars, Factor
+from experiments.definition.forms import Form
+from experiments.definition.names import refuse_repeats, refuse_reserved
+from experiments.definition.session import Session
+from experiments.definition.texts import Texts
+from experiments.errors import did_you_mean
+from experiments.rendering import RenderSettings
+from experiments.rules import (
+    AttentionChecks,
+    ExclusionRule,
+    PlaybackRules,
+    ScreenFormAnswer,
+    ScreeningRule,
+)
+from experiments.trials import reserved_names
+from experiments.trials.union import AnyTrial
+
+STORED = "stored"
+"""Context of the validation of a declaration that a database holds: names taken since then stay allowed."""
+
+
+class Experiment(Declaration):
+    """A factorial study of clips, complete: this is what an `expN.toml` declares."""
+
+    name: Name
+    """Name of the experiment in manifests, exports and file names."""
+    title: str
+    """Title that experimenters and participants read."""
+    version: Annotated[int, Field(ge=1)] = 1
+    """The experimenter's own count of versions; nothing depends on it."""
+    source: str = ""
+    """Where the design comes from, such as a reference to a paper. Stands in reports."""
+    participants: Annotated[int, Field(ge=1)] = 20
+    """Planned number of participants, for `stimuli plan`. The study's quota is set on the server."""
+    languages: Annotated[tuple[Language, ...], Field(min_length=1)] = ("en",)
+    """Languages offered to participants, the first where theirs is none of them; each needs its [texts]."""
+    factors: Annotated[tuple[Factor, ...], Field(min_length=1)]
+    """The factors. Their levels, every one with every other, make the cells."""
+    render: RenderSettings = RenderSettings()
+    """How every clip is rendered, unless a level changes it."""
+    exemplars: Exemplars
+    """How many clips a cell has."""
+    blocks: Blocks = Blocks()
+    """Blocks and their order."""
+    practice: Practice = Practice()
+    """Practice before the first block."""
+    trial: AnyTrial
+    """What one trial shows and asks, by its kind."""
+    display: Display = Display()
+    """Size and surround of the clip, and what the device must offer."""
+    session: Session = Session()
+    """Coming back, and for how long a place is kept."""
+    playback: PlaybackRules = PlaybackRules()
+    """When a play is flagged or failed."""
+    attention: AttentionChecks = AttentionChecks()
+    """Attention checks between the trials."""
+    screening: tuple[ScreeningRule, ...] = ()
+    """Rules that end a run while it goes on. The participant is told so, and the place is free again."""
+    exclusions: tuple[ExclusionRule, ...] = ()
+    """Rules, fixed before the data, that leave out runs or trials when the study is analysed."""
+    forms: tuple[Form, ...] = ()
+    """Questionnaires before and after the trials."""
+    texts: dict[Language, Texts]
+    """The pages, a table a language: [texts.en]."""
+    analysis: AnalysisPlan = AnalysisPlan()
+    """The analysis, fixed before the data."""
+
+    @property
+    def factor_names(self) -> tuple[str, ...]:
+        """Factor names in declared order."""
+        return tuple(factor.name for factor in self.factors)
+
+    def factor(self, name: str) -> Factor:
+        """Return the factor called `name`."""
+        return next(factor for factor in self.factors if factor.name == name)
+
+    @model_validator(mode="after")
+    def _consistent(self, info: ValidationInfo) -> Self:
+        names = list(self.factor_names)
+        refuse_repeats(names, "factor")
+        if not (info.context or {}).get(STORED):
+            refuse_reserved(names, reserved_names())
+        refuse_repeats([form.name for form in self.forms], "form")
+        used = {"exemplars.own_per": self.exemplars.own_per, "analysis.factors": self.analysis.factors}
+        used |= {"analysis.pairs": self.analysis.pairs}
+        used |= {"blocks.split_by": (self.blocks.split_by,) if self.blocks.split_by else ()}
+        for key, mentioned in used.items():
+            for name in mentioned:
+                if name not in names:
+                    raise ValueError(f"{key}: no factor is called '{name}'{did_you_mean(name, names)}")
+        for language in self.languages:
+            if language not in self.texts:
+                raise ValueError(f"texts.{language} is missing: languages lists '{language}'")
+        return self
+
+    @model_validator(mode="after")
+    def _trial_fits(self) -> Self:
+        if fault := self.trial.fault(self):
+            raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
+    def _screening_fits_the_forms(self) -> Self:
+        for number, rule in enumerate(self.screening, start=1):
+            fault = rule.fault(self.forms) if isinstance(rule, ScreenFormAnswer) else None
+            if fault:
+                raise ValueError(f"screening: rule {number}: {fault}")
+        return self

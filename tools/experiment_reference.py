@@ -1,0 +1,237 @@
+"""docs/reference/experiment.md: every key of a declaration, from the models that read it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import types
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Len, Lt, MaxLen, MinLen, MultipleOf
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from experiments.base import Language, LevelName, Name
+from experiments.definition import Experiment
+from experiments.load import parse_experiment
+from experiments.rendering import ProfileName
+from experiments.schema.keys import Key, is_tag, keys
+from experiments.trials import KINDS
+from experiments.trials.kind import TrialDeclaration
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "docs" / "reference" / "every-key.toml"
+HEADER = ("key", "type", "default", "range", "meaning", "example")
+LONGEST_EXAMPLE = 70
+
+INTRODUCTION = """\
+A study is declared in one TOML file. `stimuli plan FILE` says what it expands to, and names mistakes
+with their line. `experiments/exp1.toml` is a whole study to start from; [every-key.toml](every-key.toml)
+sets every key, and the examples below are taken from it. A key that may be left out has a default;
+times, sizes and counts carry their unit in the name or in the meaning. A text in several languages is a
+table: `{ en = "...", de = "..." }`.
+"""
+
+
+def experiment_reference(made: str) -> Iterator[str]:
+    """The page's lines: a section a table of the TOML, with one row a key."""
+    yield from (made, "# The declaration of a study", "", INTRODUCTION)
+    examples = Examples()
+    for heading, model, path in tables():
+        yield f"## {heading}"
+        yield ""
+        yield " ".join((model.__doc__ or "").split())
+        yield ""
+        yield "| " + " | ".join(HEADER) + " |"
+        yield "|" + "---|" * len(HEADER)
+        for name, field in model.model_fields.items():
+            cells = row(Key(f"{path}{name}", model, field), examples)
+            yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        yield ""
+
+
+def tables() -> Iterator[tuple[str, type[BaseModel], str]]:
+    """Heading, model and path (with its last dot) of every table; the members of a union are one each."""
+    yield "The top of the file", Experiment, ""
+    seen = set()
+    for key in keys():
+        for model in key.tables:
+            if (model, key.path) not in seen:
+                seen.add((model, key.path))
+                yield heading(key, model), model, f"{key.path}."
+
+
+def heading(key: Key, model: type[BaseModel]) -> str:
+    """As the TOML writes the table: in two brackets where it may stand several times."""
+    path = f"{key.path}.en" if get_origin(key.field.annotation) is dict else key.path
+    written = f"[[{path}]]" if get_origin(key.field.annotation) is tuple else f"[{path}]"
+    tag = next((name for name, field in model.model_fields.items() if _tells_apart(key, field)), None)
+    return f"`{written}`" + (f" with `{tag} = {toml(model.model_fields[tag].default)}`" if tag else "")
+
+
+def _tells_apart(key: Key, field: FieldInfo) -> bool:
+    return is_tag(field) and (
+        len(key.tables) > 1 or (issubclass(key.model, Experiment) and key.name == "trial")
+    )
+
+
+def row(key: Key, examples: Examples) -> tuple[str, ...]:
+    """One key."""
+    return (
+        f"`{key.name}`",
+        type_of(key),
+        default_of(key.field),
+        range_of(key.field),
+        " ".join((key.field.description or "").split()),
+        examples.of(key),
+    )
+
+
+def type_of(key: Key) -> str:
+    """The type as one says it."""
+    if key.tables and issubclass(key.tables[0], TrialDeclaration):
+        return "table"
+    return spoken(key.field.annotation, list(key.field.metadata))
+
+
+NAMED = {Name: "name", LevelName: "level name", Language: "language tag", ProfileName: "profile or file"}
+
+
+def spoken(annotation: Any, marks: list[Any] | None = None) -> str:
+    """An annotation in words."""
+    for alias, word in NAMED.items():
+        if annotation == alias or (marks and annotation is str and set(map(repr, marks)) & _marks_of(alias)):
+            return word
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return spoken(arguments[0])
+    if origin is Literal:
+        return "one of" if len(arguments) > 1 else "constant"
+    if origin in (types.UnionType, Union):
+        inner = [argument for argument in arguments if argument is not type(None)]
+        return "table" if _is_model(inner[0]) else spoken(inner[0])
+    if origin is tuple:
+        return "tables" if spoken(arguments[0]) == "table" else f"list of {spoken(arguments[0])}s"
+    if origin is dict:
+        return "tables by language" if _is_model(arguments[1]) else "text by language"
+    if _is_model(annotation):
+        return "table"
+    return {str: "text", int: "whole number", float: "number", bool: "true or false"}[annotation]
+
+
+def _marks_of(alias: Any) -> set[str]:
+    return set(map(repr, get_args(alias)[1:]))
+
+
+def _is_model(annotation: Any) -> bool:
+    if get_origin(annotation) is Annotated:
+        return _is_model(get_args(annotation)[0])
+    if get_origin(annotation) in (types.UnionType, Union):
+        return _is_model(get_args(annotation)[0])
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def default_of(field: FieldInfo) -> str:
+    """The default as TOML; what has to be given says so."""
+    if field.is_required():
+        return "required"
+    value = field.get_default(call_default_factory=True)
+    if value is None or value is PydanticUndefined:
+        return "left out"
+    if isinstance(value, BaseModel):
+        return "its keys' defaults"
+    return f"`{toml(value)}`" if value != "" else "empty"
+
+
+def range_of(field: FieldInfo) -> str:
+    """The values that are taken, empty where any of the type are."""
+    literal = _literals(field.annotation)
+    if literal:
+        return ", ".join(f"`{toml(value)}`" for value in literal)
+    marks = [*field.metadata, *_marks_inside(field.annotation)]
+    return ", ".join(filter(None, map(limit, marks)))
+
+
+def limit(mark: Any) -> str:
+    """One limit in words."""
+    match mark:
+        case Ge(ge=low):
+            return f"{low} or more"
+        case Gt(gt=low):
+            return f"more than {low}"
+        case Le(le=high):
+            return f"at most {high}"
+        case Lt(lt=high):
+            return f"less than {high}"
+        case MultipleOf(multiple_of=step):
+            return f"in steps of {step}"
+        case MinLen(min_length=least) | Len(min_length=least):
+            return f"{least} or more of them"
+        case MaxLen(max_length=longest):
+            return f"at most {longest} of them"
+    pattern = getattr(mark, "pattern", None)
+    return f"matches `{pattern}`" if pattern else ""
+
+
+def _literals(annotation: Any) -> tuple[Any, ...]:
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    if get_origin(annotation) in (types.UnionType, Union):
+        return next(filter(None, map(_literals, get_args(annotation))), ())
+    return ()
+
+
+def _marks_inside(annotation: Any) -> Iterator[Any]:
+    """The limits of an optional value."""
+    if get_origin(annotation) in (types.UnionType, Union):
+        for argument in get_args(annotation):
+            if get_origin(argument) is Annotated:
+                for mark in get_args(argument)[1:]:
+                    yield from getattr(mark, "metadata", [mark])
+
+
+class Examples:
+    """What each key is set to in the example files: the first table of its model that sets it."""
+
+    def __init__(self) -> None:
+        self._set: dict[tuple[str, type[BaseModel]], Any] = {}
+        self._collect(parse_experiment(EXAMPLES.read_text(encoding="utf-8"), EXAMPLES.name), "")
+        for kind in KINDS.values():
+            self._collect(kind.declaration.model_validate(tomllib.loads(kind.example)["trial"]), "trial.")
+
+    def _collect(self, value: Any, path: str) -> None:
+        if isinstance(value, BaseModel):
+            for name in value.model_fields_set:
+                inner = getattr(value, name)
+                self._set.setdefault((f"{path}{name}", type(value)), inner)
+                self._collect(inner, f"{path}{name}.")
+        elif isinstance(value, Mapping):
+            for item in value.values():
+                self._collect(item, path)
+        elif isinstance(value, tuple | list):
+            for item in value:
+                self._collect(item, path)
+
+    def has(self, key: Key) -> bool:
+        """True where an example sets the key."""
+        return (key.path, key.model) in self._set
+
+    def of(self, key: Key) -> str:
+        """The key's example as TOML, shortened where it is long; tables have a section of their own."""
+        if not self.has(key) or key.tables:
+            return ""
+        written = toml(self._set[key.path, key.model])
+        if len(written) > LONGEST_EXAMPLE:
+            written = f"{written[:LONGEST_EXAMPLE]}..."
+        return f"`{written}`"
+
+
+def toml(value: Any) -> str:
+    """A value as one line of TOML."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
