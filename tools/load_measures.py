@@ -7,8 +7,9 @@ import time
 from dataclasses import dataclass
 
 import psutil
-from sqlalchemy import text
+from sqlalchemy import select, text
 
+from server.models import Rating
 from tools.load_client import Tally, percentile
 from tools.load_server import LoadServer
 
@@ -63,7 +64,8 @@ class Clocks:
 def stored(server: LoadServer, tally: Tally) -> tuple[int, int]:
     """Acknowledged ratings that are not in the database as sent, and ratings stored twice."""
     with server.services.database.read() as session:
-        found = dict(map(tuple, session.execute(text("SELECT rating_id, response FROM trial_ratings"))))
+        answers = session.execute(select(Rating.rating_id, Rating.payload))
+        found = {rating_id: payload["response"] for rating_id, payload in answers}
         plays = session.execute(
             text(
                 "SELECT count(*) FROM (SELECT 1 FROM trial_ratings "

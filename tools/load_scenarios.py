@@ -117,7 +117,8 @@ def burst(kind: str, count: int, workers: int) -> list[Row]:
         with server.services.database.read() as session:
             rows = session.execute(
                 text(
-                    "SELECT study_run_id, version_clip_id, block_label FROM assigned_trials "
+                    "SELECT study_run_id, version_clip_id, block_label "
+                    "FROM assigned_trials JOIN trial_clips USING (study_run_id, trial_index) "
                     "WHERE kind = 'main' ORDER BY study_run_id, trial_index"
                 )
             ).all()

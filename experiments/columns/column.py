@@ -19,6 +19,8 @@ class Column:
     source: the SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the
     column is of no view.
     json: True where the source is a JSON column, exported as text.
+    member: path of the value in the JSON object that the source is (`choice`, `left.frames_drawn`); empty
+    where the source is the value.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Column:
     maximum: float | None = None
     source: str = ""
     json: bool = False
+    member: str = ""
 
     @property
     def expression(self) -> str:

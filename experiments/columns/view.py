@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 from experiments.columns.base import LEVELS
-from experiments.columns.column import Column, names_of
+from experiments.columns.column import Column, ColumnType, names_of
 
 Dialect = Literal["sqlite", "postgresql"]
 
@@ -16,6 +16,7 @@ _TIME: dict[Dialect, str] = {
     "postgresql": """to_char({} AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
 }
 _JSON: dict[Dialect, str] = {"sqlite": "{}", "postgresql": "CAST({} AS text)"}
+_CAST: dict[ColumnType, str] = {"integer": "integer", "number": "double precision", "boolean": "boolean"}
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,21 @@ class View:
 
 
 def _spelled(column: Column, dialect: Dialect) -> str:
+    if column.member:
+        return _member(column, dialect)
     if column.type == "time":
         return _TIME[dialect].format(column.expression)
     return _JSON[dialect].format(column.expression) if column.json else column.expression
+
+
+def _member(column: Column, dialect: Dialect) -> str:
+    """The value at a path of a JSON object; SQLite types it by itself, PostgreSQL is told its type."""
+    if dialect == "sqlite":
+        return f"json_extract({column.source}, '$.{column.member}')"
+    *outer, last = column.member.split(".")
+    path = "".join(f" -> '{name}'" for name in outer)
+    value = f"{column.source}{path} ->> '{last}'"
+    return f"CAST({value} AS {_CAST[column.type]})" if column.type in _CAST else value
 
 
 # A study has few cells but many rows: their JSON is parsed once each.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
@@ -52,6 +52,7 @@ class Kind:
     block_size: trials of one participant in a block, attention checks not counted.
     example: a [trial] as TOML, for the reference; it is what a newcomer copies.
     plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
+    check_response: the number that an answer, as stored, is to an attention check, which asks for one.
     """
 
     declaration: type[TrialDeclaration]
@@ -65,6 +66,7 @@ class Kind:
     block_size: "Callable[[Experiment, BlockSpec], int]"
     example: str
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
+    check_response: Callable[[Mapping[str, Any]], int | None] = lambda payload: payload.get("response")
 
     @property
     def name(self) -> str:

@@ -19,6 +19,7 @@ from server.models.runs import (
     Rating,
     RunEvent,
     StudyRun,
+    TrialClip,
     View,
     ViewClip,
 )
@@ -45,6 +46,7 @@ __all__ = [
     "Study",
     "StudyRun",
     "StudyVersion",
+    "TrialClip",
     "UtcDateTime",
     "VersionClip",
     "View",

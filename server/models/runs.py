@@ -8,7 +8,7 @@ from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from server.clock import now
 from server.models.base import Base, one_of
-from server.models.studies import Link, Study, StudyVersion, VersionClip
+from server.models.studies import Link, Study, StudyVersion
 
 STAGES = (
     "consent",
@@ -87,7 +87,7 @@ class StudyRun(Base):
 
 
 class AssignedTrial(Base):
-    """One trial of a run in its stored order. Attention checks have no clip, but an expected response."""
+    """One trial of a run in its stored order. Attention checks have no clips, but an expected response."""
 
     __tablename__ = "assigned_trials"
     __table_args__ = (one_of("kind", "practice", "main", "attention"),)
@@ -99,17 +99,37 @@ class AssignedTrial(Base):
     kind: Mapped[str] = mapped_column(String(10))
     block: Mapped[int]
     block_label: Mapped[str] = mapped_column(String(60))
-    version_clip_id: Mapped[int | None] = mapped_column(ForeignKey("version_clips.id"))
     expected_response: Mapped[int | None]
 
-    version_clip: Mapped[VersionClip | None] = relationship()
+
+class TrialClip(Base):
+    """A clip of a trial and the role it is shown in. position: in the order of the trial's clips, from 0."""
+
+    __tablename__ = "trial_clips"
+    __table_args__ = (
+        one_of("role", *CLIP_ROLES),
+        ForeignKeyConstraint(
+            ["study_run_id", "trial_index"],
+            ["assigned_trials.study_run_id", "assigned_trials.trial_index"],
+            ondelete="CASCADE",
+        ),
+        {"sqlite_with_rowid": False},
+    )
+
+    study_run_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    trial_index: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    role: Mapped[str] = mapped_column(String(10), primary_key=True)
+    position: Mapped[int]
+    version_clip_id: Mapped[int] = mapped_column(ForeignKey("version_clips.id"))
 
 
 class Rating(Base):
-    """One play of one trial with its answer. The view `ratings` shows it with everything around it.
+    """One play of one trial with its answer. The view of its kind shows it with everything around it.
 
-    rating_id: made by the client, so that sending it again stores it once. drawn: [frame index, time in ms]
-    of every drawn frame. response is None where the clip failed and could not be rated.
+    rating_id: made by the client, so that sending it again stores it once.
+    kind: of the trial, as declared. payload: the kind's answer (`experiments.trials.<kind>.answer`).
+    playback: of each clip by its role, where a trial shows several; the columns then sum it up.
+    drawn: [frame index, time in ms] of every drawn frame of a trial's one clip.
     """
 
     __tablename__ = "trial_ratings"
@@ -130,7 +150,9 @@ class Rating(Base):
     study_run_id: Mapped[int]
     trial_index: Mapped[int]
     play: Mapped[int]
-    response: Mapped[int | None]
+    kind: Mapped[str] = mapped_column(String(40), default="clip_rating")
+    payload: Mapped[dict[str, Any]]
+    playback: Mapped[dict[str, Any] | None]
     rt: Mapped[float | None]
     rt_from_first_frame: Mapped[float | None]
     time_elapsed: Mapped[float | None]

@@ -14,6 +14,7 @@ from server.participants.links import recruiter_of
 from server.participants.lookup import find_run
 from server.participants.refusals import FormsMissing, RatingsMissing, RunClosed
 from server.participants.schemas import Completion
+from server.participants.screening import failed_checks
 from server.participants.trial_list import trial_list
 from server.text import visible
 from server.versions import LoadedVersion
@@ -59,7 +60,8 @@ def completion_code(session: Session, run: StudyRun, loaded: LoadedVersion) -> s
     """The code of a complete run: another one where it failed too many attention checks."""
     rules = [rule for rule in loaded.experiment.exclusions if isinstance(rule, ExcludeAttention)]
     outcome: Literal["complete", "failed_check"] = "complete"
-    if rules and repository.failed_checks(session, run) > rules[0].more_than:
+    failed = failed_checks(session.connection(), run.id, loaded.experiment) if rules else 0
+    if rules and failed > rules[0].more_than:
         outcome = "failed_check"
     return recruiter_of(run.link).code(outcome, run.completion_code)
 

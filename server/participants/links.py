@@ -248,11 +248,11 @@ def _new_run(
         device=checked_device(start.device),
     )
     repository.add_all(session, [run])
-    repository.add_trials(session, _trial_rows(run, loaded, trials))
+    repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
     return run, token
 
 
-def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
+def _trial_rows(run: StudyRun, trials: list[Trial]) -> list[dict[str, Any]]:
     return [
         {
             "study_run_id": run.id,
@@ -260,8 +260,21 @@ def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> li
             "kind": trial.kind,
             "block": trial.block,
             "block_label": trial.block_label,
-            "version_clip_id": loaded.places[trial.clip.cell, trial.clip.exemplar] if trial.clip else None,
             "expected_response": trial.expected_response,
         }
         for index, trial in enumerate(trials)
+    ]
+
+
+def _clip_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
+    return [
+        {
+            "study_run_id": run.id,
+            "trial_index": index,
+            "role": shown.role,
+            "position": position,
+            "version_clip_id": loaded.places[shown.clip.cell, shown.clip.exemplar],
+        }
+        for index, trial in enumerate(trials)
+        for position, shown in enumerate(trial.shown)
     ]

@@ -18,17 +18,22 @@ from server.models import (
     Study,
     StudyRun,
     StudyVersion,
+    TrialClip,
 )
 from server.tokens import hash_token
 
 # A table instead of the class: with its hundred rows a run the ORM would take most of the time of a start.
 _trials = cast(Table, AssignedTrial.__table__)
-_ADD_TRIALS = insert(_trials)
-# PostgreSQL takes all rows as one statement of columns; sent row by row they would take four times as long.
-_ADD_TRIALS_POSTGRES = insert(_trials).from_select(
-    list(_trials.columns.keys()),
-    select(*(func.unnest(bindparam(column.name, type_=ARRAY(column.type))) for column in _trials.columns)),
-)
+_clips = cast(Table, TrialClip.__table__)
+
+
+def _unnested(table: Table) -> Any:
+    """All rows as one statement of columns (PostgreSQL): row by row they would take four times as long."""
+    columns = (func.unnest(bindparam(column.name, type_=ARRAY(column.type))) for column in table.columns)
+    return insert(table).from_select(list(table.columns.keys()), select(*columns))
+
+
+_ADD = {table: (insert(table), _unnested(table)) for table in (_trials, _clips)}
 
 
 def link_by_token(session: Session, token: str) -> Link | None:
@@ -131,27 +136,39 @@ def _free_slot_statement() -> Any:
 _FREE_SLOT = _free_slot_statement()
 
 
-def add_trials(session: Session, rows: list[dict[str, Any]]) -> None:
-    """Store a run's trials in one statement."""
+def add_trials(session: Session, trials: list[dict[str, Any]], clips: list[dict[str, Any]]) -> None:
+    """Store a run's trials and their clips, in one statement each."""
     connection = session.connection()
-    if connection.dialect.name == "postgresql":
-        columns = {name: [row[name] for row in rows] for name in rows[0]}
-        connection.execute(_ADD_TRIALS_POSTGRES, columns)
-    else:
-        connection.execute(_ADD_TRIALS, rows)
+    for table, rows in ((_trials, trials), (_clips, clips)):
+        one_by_one, at_once = _ADD[table]
+        if not rows:
+            continue
+        if connection.dialect.name == "postgresql":
+            connection.execute(at_once, {name: [row[name] for row in rows] for name in rows[0]})
+        else:
+            connection.execute(one_by_one, rows)
 
 
 def trials(session: Session, run: StudyRun) -> Sequence[Any]:
-    """The run's trials in order: trial_index, kind, block, version_clip_id, expected_response."""
+    """The run's trials in order: trial_index, kind, block, expected_response."""
     columns = (
         AssignedTrial.trial_index,
         AssignedTrial.kind,
         AssignedTrial.block,
-        AssignedTrial.version_clip_id,
         AssignedTrial.expected_response,
     )
     query = select(*columns).where(AssignedTrial.study_run_id == run.id)
     return session.execute(query.order_by(AssignedTrial.trial_index)).all()
+
+
+def trial_clips(session: Session, run: StudyRun) -> dict[int, dict[str, int]]:
+    """Of each trial that has clips, their ids by role, in the order of their places."""
+    columns = (TrialClip.trial_index, TrialClip.role, TrialClip.version_clip_id)
+    query = select(*columns).where(TrialClip.study_run_id == run.id)
+    clips: dict[int, dict[str, int]] = {}
+    for trial_index, role, clip in session.execute(query.order_by(TrialClip.trial_index, TrialClip.position)):
+        clips.setdefault(trial_index, {})[role] = clip
+    return clips
 
 
 def plays(session: Session, run: StudyRun) -> dict[int, list[tuple[int, str]]]:
@@ -161,22 +178,6 @@ def plays(session: Session, run: StudyRun) -> dict[int, list[tuple[int, str]]]:
     for trial_index, play, verdict in session.execute(query):
         found.setdefault(trial_index, []).append((play, verdict))
     return found
-
-
-def failed_checks(session: Session, run: StudyRun) -> int:
-    """Attention checks answered otherwise than asked."""
-    query = (
-        select(func.count())
-        .select_from(Rating)
-        .join(
-            AssignedTrial,
-            (AssignedTrial.study_run_id == Rating.study_run_id)
-            & (AssignedTrial.trial_index == Rating.trial_index),
-        )
-        .where(Rating.study_run_id == run.id, AssignedTrial.kind == "attention")
-        .where(Rating.response.is_distinct_from(AssignedTrial.expected_response))
-    )
-    return session.scalar(query) or 0
 
 
 def latest_calibration(session: Session, run: StudyRun) -> Calibration | None:

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.rules import ScreenAttention, ScreenDevice, ScreenFormAnswer
+from experiments.trials import KINDS
 from server.clock import now
 from server.models import RunEvent, StudyRun
 from server.participants.bounds import checked_data
@@ -65,10 +66,16 @@ def _end(session: Session, run: StudyRun, data: dict[str, Any]) -> None:
     session.add(RunEvent(event_id=new_public_id(), study_run_id=run.id, type=EVENT, data=data))
 
 
+def failed_checks(connection: Connection, run_id: int, experiment: Experiment) -> int:
+    """Attention checks of a run answered otherwise than asked."""
+    given = KINDS[experiment.trial.kind].check_response
+    return sum(given(payload) != expected for payload, expected in trials.checks(connection, run_id))
+
+
 def by_attention(connection: Connection, run_id: int, experiment: Experiment) -> bool:
     """End the run where too many attention checks have failed; True where it did."""
     limits = [rule.more_than for rule in _declared(experiment).attention]
-    failed = trials.failed_checks(connection, run_id) if limits else 0
+    failed = failed_checks(connection, run_id, experiment) if limits else 0
     if not limits or failed <= min(limits):
         return False
     trials.end_run(connection, run_id, "screened_out")

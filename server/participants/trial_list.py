@@ -11,11 +11,12 @@ from server.versions import LoadedVersion
 
 def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[TrialInfo]:
     """Every trial of a run; nothing in it tells the participant which cell a clip is of."""
-    done = repository.plays(session, run)
+    done, clips = repository.plays(session, run), repository.trial_clips(session, run)
     most = loaded.experiment.playback.max_repeats
     trials = []
     for row in repository.trials(session, run):
-        clip = loaded.clips[row.version_clip_id] if row.version_clip_id is not None else None
+        first = next(iter(clips.get(row.trial_index, {}).values()), None)
+        clip = loaded.clips[first] if first is not None else None
         plays = done.get(row.trial_index, [])
         settled = any(is_settled(row.kind, play, verdict, most) for play, verdict in plays)
         trials.append(

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, and_, func, select
 from sqlalchemy.orm import Session
 
-from server.models import AssignedTrial, Rating, Study, StudyRun, StudyVersion, VersionClip
+from server.models import AssignedTrial, Rating, Study, StudyRun, StudyVersion, TrialClip, VersionClip
 from server.results.cache import Revision
 
 
@@ -16,6 +16,10 @@ class ClipCount(NamedTuple):
     version_clip_id: int
     response: int
     times: int
+
+
+RESPONSE = Rating.payload["response"].as_integer()
+"""The answer on the scale."""
 
 
 class Pool(NamedTuple):
@@ -43,7 +47,7 @@ def usable(of: Pool) -> ColumnElement[bool]:
         of.runs(),
         StudyRun.excluded.is_(False),
         AssignedTrial.kind == "main",
-        Rating.response.is_not(None),
+        RESPONSE.is_not(None),
         Rating.verdict != "failed",
     )
 
@@ -80,11 +84,23 @@ def _joined(query: Any) -> Any:
     )
 
 
+def _with_clip(query: Any) -> Any:
+    return query.join(
+        TrialClip,
+        and_(
+            TrialClip.study_run_id == Rating.study_run_id,
+            TrialClip.trial_index == Rating.trial_index,
+            TrialClip.role == "shown",
+        ),
+    )
+
+
 def cell_means(session: Session, of: Pool, factors: list[str]) -> dict[str, dict[tuple[str, ...], float]]:
     """Participant (run number as text) -> levels in factor order -> mean rating."""
     query = _joined(
-        select(Rating.study_run_id, VersionClip.cell, func.avg(Rating.response), func.min(VersionClip.id))
-    ).join(VersionClip, VersionClip.id == AssignedTrial.version_clip_id)
+        select(Rating.study_run_id, VersionClip.cell, func.avg(RESPONSE), func.min(VersionClip.id))
+    )
+    query = _with_clip(query).join(VersionClip, VersionClip.id == TrialClip.version_clip_id)
     query = query.where(usable(of)).group_by(Rating.study_run_id, VersionClip.cell)
     rows = session.execute(query).all()
     levels = _levels(session, {row[3] for row in rows}, factors)
@@ -101,8 +117,9 @@ def _levels(session: Session, clips: set[int], factors: list[str]) -> dict[int, 
 
 def clip_counts(session: Session, of: Pool) -> list[ClipCount]:
     """How often each clip got each answer."""
-    query = _joined(select(AssignedTrial.version_clip_id, Rating.response, func.count()))
-    query = query.where(usable(of)).group_by(AssignedTrial.version_clip_id, Rating.response)
+    # Grouped by name: with a parameter each, PostgreSQL would take the two expressions as different.
+    query = _with_clip(_joined(select(TrialClip.version_clip_id, RESPONSE.label("response"), func.count())))
+    query = query.where(usable(of)).group_by(TrialClip.version_clip_id, "response")
     return [ClipCount(*row) for row in session.execute(query)]
 
 

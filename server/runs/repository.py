@@ -15,6 +15,7 @@ from server.models import (
     Study,
     StudyRun,
     StudyVersion,
+    TrialClip,
     VersionClip,
     View,
 )
@@ -74,7 +75,7 @@ def answered(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]
 
 
 def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, VersionClip | None]]:
-    """Every stored play of a run with its trial and its clip, in the order they were stored."""
+    """Every stored play of a run with its trial and its first clip, in the order they were stored."""
     query = (
         select(Rating, AssignedTrial, VersionClip)
         .join(
@@ -82,7 +83,13 @@ def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, 
             (AssignedTrial.study_run_id == Rating.study_run_id)
             & (AssignedTrial.trial_index == Rating.trial_index),
         )
-        .outerjoin(VersionClip, VersionClip.id == AssignedTrial.version_clip_id)
+        .outerjoin(
+            TrialClip,
+            (TrialClip.study_run_id == Rating.study_run_id)
+            & (TrialClip.trial_index == Rating.trial_index)
+            & (TrialClip.position == 0),
+        )
+        .outerjoin(VersionClip, VersionClip.id == TrialClip.version_clip_id)
         .where(Rating.study_run_id == run.id)
         .order_by(Rating.id)
     )

@@ -1,7 +1,7 @@
 """One participant's visit as the experimenter sees it."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
@@ -67,7 +67,8 @@ class TimelineTrial(BaseModel):
     exemplar: int | None
     clip_sha256: str | None
     play: int
-    response: int | None
+    answer: dict[str, Any] = Field(description="As its kind of trial stores it.")
+    response: int | None = Field(description="The answer on the scale, of kinds that have one.")
     expected_response: int | None
     rt: float | None
     comment: str | None

@@ -90,7 +90,7 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
 
 
 _FROM_RATING = (
-    "trial_index", "play", "response", "rt", "comment", "method", "verdict", "verdict_rule",
+    "trial_index", "play", "rt", "comment", "method", "verdict", "verdict_rule",
     "key_to_first_frame_ms", "frames_drawn", "frames_late", "frames_missing", "longest_gap_ms", "focus_lost",
     "drawn", "saved_at",
 )  # fmt: skip
@@ -98,6 +98,7 @@ _FROM_RATING = (
 
 def _trial(rating: Rating, trial: AssignedTrial, clip: VersionClip | None) -> TimelineTrial:
     values = {name: getattr(rating, name) for name in _FROM_RATING}
+    values |= {"answer": rating.payload, "response": rating.payload.get("response")}
     values |= {"kind": trial.kind, "block": trial.block, "expected_response": trial.expected_response}
     values |= {
         "cell": clip.cell if clip else None,

@@ -1,15 +1,17 @@
 """Reads and writes of one rating, in as few statements as it takes."""
 
 from datetime import datetime
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
-from sqlalchemy import Connection, Table, bindparam, func, insert, or_, select, update
+from sqlalchemy import Connection, Table, bindparam, insert, or_, select, update
 
-from server.models import AssignedTrial, Rating, RunEvent, StudyRun
+from server.models import AssignedTrial, Rating, RunEvent, StudyRun, TrialClip
+from server.trials.kinds import Part
 
 # Tables instead of classes, and statements built once: the ORM would take twice the time of all the rest.
 _runs = cast(Table, StudyRun.__table__)
 _trials = cast(Table, AssignedTrial.__table__)
+_clips = cast(Table, TrialClip.__table__)
 _ratings = cast(Table, Rating.__table__)
 
 _RUN = (
@@ -27,14 +29,17 @@ _RUN = (
     .where(_runs.c.token_hash == bindparam("token_hash"))
     .with_for_update()
 )
-_TRIAL = select(_trials.c.kind, _trials.c.version_clip_id).where(
-    _trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial_index")
+_TRIAL = (
+    select(_trials.c.kind, _clips.c.role, _clips.c.version_clip_id)
+    .select_from(_trials.outerjoin(_clips))
+    .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial_index"))
 )
 _STORED = select(
     _ratings.c.rating_id,
     _ratings.c.trial_index,
     _ratings.c.play,
-    _ratings.c.response,
+    _ratings.c.kind,
+    _ratings.c.payload,
     _ratings.c.verdict,
     _ratings.c.verdict_rule,
     _ratings.c.saved_at,
@@ -43,14 +48,10 @@ _STORED = select(
     or_(_ratings.c.trial_index == bindparam("trial_index"), _ratings.c.rating_id == bindparam("rating_id")),
 )
 _INSERT = insert(_ratings).inline()
-_FAILED_CHECKS = (
-    select(func.count())
+_CHECKS = (
+    select(_ratings.c.payload, _trials.c.expected_response)
     .select_from(_ratings.join(_trials))
-    .where(
-        _ratings.c.study_run_id == bindparam("run"),
-        _trials.c.kind == "attention",
-        _ratings.c.response.is_distinct_from(_trials.c.expected_response),
-    )
+    .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "attention")
 )
 _SEEN = (
     update(_runs)
@@ -68,9 +69,19 @@ def run_for_rating(connection: Connection, token_hash: str) -> Any:
     return connection.execute(_RUN, {"token_hash": token_hash}).one_or_none()
 
 
-def trial(connection: Connection, run: int, trial_index: int) -> Any:
-    """Kind and clip of a trial; None where the run has no such trial."""
-    return connection.execute(_TRIAL, {"run": run, "trial_index": trial_index}).one_or_none()
+class StoredTrial(NamedTuple):
+    """A trial as assigned: its part of the run, and its clips' ids by role."""
+
+    kind: Part
+    clips: dict[str, int]
+
+
+def trial(connection: Connection, run: int, trial_index: int) -> StoredTrial | None:
+    """Part and clips of a trial; None where the run has no such trial."""
+    rows = connection.execute(_TRIAL, {"run": run, "trial_index": trial_index}).all()
+    if not rows:
+        return None
+    return StoredTrial(rows[0].kind, {role: clip for _, role, clip in rows if role is not None})
 
 
 def stored_ratings(connection: Connection, run: int, trial_index: int, rating_id: str) -> list[Any]:
@@ -89,9 +100,9 @@ def mark_seen(connection: Connection, run: int, seen: datetime, elapsed_ms: floa
     connection.execute(_SEEN, {"run": run, "seen": seen, "elapsed": elapsed_ms, "answered": answered})
 
 
-def failed_checks(connection: Connection, run: int) -> int:
-    """Attention checks of a run answered otherwise than asked."""
-    return connection.scalar(_FAILED_CHECKS, {"run": run}) or 0
+def checks(connection: Connection, run: int) -> list[tuple[dict[str, Any], int | None]]:
+    """What was answered to each attention check of a run, and what it asked for."""
+    return [(row.payload, row.expected_response) for row in connection.execute(_CHECKS, {"run": run})]
 
 
 def end_run(connection: Connection, run: int, status: str) -> None:

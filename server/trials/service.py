@@ -59,10 +59,10 @@ def save_rating(
         ruling = (known.verdict, known.verdict_rule)
         return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
     _check(run, loaded.experiment, trial.kind, rating)
-    clips = () if trial.version_clip_id is None else (trial.version_clip_id,)
-    ruling = served(loaded.experiment.trial.kind).judge(loaded, clips, rating)
+    kind = loaded.experiment.trial.kind
+    ruling = served(kind).judge(loaded, trial.clips, rating)
     saved_at = now()
-    repository.add_rating(connection, _row(run, rating_id, rating, ruling, saved_at))
+    repository.add_rating(connection, _row(run, rating_id, kind, rating, ruling, saved_at))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
     before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
     answered = int(settles and not before)
@@ -80,12 +80,12 @@ def _known(stored: list[Any], rating_id: str, rating: RatingIn) -> Any:
         same_play = (row.trial_index, row.play) == (rating.trial_index, rating.play)
         if row.rating_id != rating_id and not same_play:
             continue
-        if same_play and row.response == rating.response:
+        if same_play and row.payload["response"] == rating.response:
             return row
         raise RatingDiffers(
-            f"Trial {row.trial_index}, play {row.play} is stored with the answer {row.response}; "
+            f"Trial {row.trial_index}, play {row.play} is stored with the answer {row.payload['response']}; "
             f"got {rating.response} for trial {rating.trial_index}, play {rating.play}. The first is kept.",
-            stored={"trial_index": row.trial_index, "play": row.play, "response": row.response},
+            stored={"trial_index": row.trial_index, "play": row.play, "answer": row.payload},
         )
     return None
 
@@ -101,7 +101,9 @@ def _check(run: Any, experiment: Experiment, part: Part, rating: RatingIn) -> No
         raise PlayOutOfRange(f"A clip is shown at most {most} times, got play {rating.play}.")
 
 
-def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: datetime) -> dict[str, Any]:
+def _row(
+    run: Any, rating_id: str, kind: str, rating: RatingIn, ruling: Ruling, saved_at: datetime
+) -> dict[str, Any]:
     answered = rating.answered_at_client
     if answered is not None and answered.tzinfo is None:
         answered = answered.replace(tzinfo=UTC)
@@ -110,7 +112,8 @@ def _row(run: Any, rating_id: str, rating: RatingIn, ruling: Ruling, saved_at: d
         "study_run_id": run.id,
         "trial_index": rating.trial_index,
         "play": rating.play,
-        "response": rating.response,
+        "kind": kind,
+        "payload": {"response": rating.response},
         "rt": rating.rt,
         "rt_from_first_frame": rating.rt_from_first_frame,
         "time_elapsed": rating.time_elapsed,

@@ -33,11 +33,16 @@ def make_database(
     )
     trials = (
         {"study_run_id": run, "trial_index": t, "kind": "main", "block": 1, "block_label": "all"}
-        | {"version_clip_id": t + 1}
         for run in range(1, len(participants) + 1)
         for t in range(flat.shape[1])
     )
     _insert(connection, "assigned_trials", trials)
+    clips = (
+        {"study_run_id": run, "trial_index": t, "role": "shown", "position": 0, "version_clip_id": t + 1}
+        for run in range(1, len(participants) + 1)
+        for t in range(flat.shape[1])
+    )
+    _insert(connection, "trial_clips", clips)
     _insert(connection, "trial_ratings", _ratings(flat))
     connection.commit()
     connection.close()
@@ -88,7 +93,8 @@ def _ratings(flat: np.ndarray):
                 "study_run_id": run,
                 "trial_index": trial,
                 "play": 1,
-                "response": response,
+                "kind": "clip_rating",
+                "payload": f'{{"response": {json.dumps(response)}}}',
                 "rt": 900.0,
                 "changes": 0,
                 "method": "webcodecs",

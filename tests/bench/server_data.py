@@ -9,7 +9,7 @@ from sqlalchemy.orm import DeclarativeBase
 
 from server.clock import now
 from server.context import Services
-from server.models import AssignedTrial, Link, Rating, Study, StudyRun, StudyVersion, VersionClip
+from server.models import AssignedTrial, Link, Rating, Study, StudyRun, StudyVersion, TrialClip, VersionClip
 from tests.helpers.studies import StudyInDatabase
 
 
@@ -27,9 +27,11 @@ def add_runs(services: Services, study: StudyInDatabase, runs: int, trials: int)
     place = {"study_id": version.study_id, "version_id": version.id, "link_id": link}
     with services.database.write() as session:
         session.execute(insert(StudyRun), [_run(first + more, trials) | place for more in range(runs)])
-        session.execute(insert(AssignedTrial), [_assigned(first, trial, clips) for trial in range(trials)])
+        session.execute(insert(AssignedTrial), [_assigned(first, trial) for trial in range(trials)])
+        session.execute(insert(TrialClip), [_clip(first, trial, clips) for trial in range(trials)])
         session.execute(insert(Rating), [_rating(first, trial, clips) for trial in range(trials)])
         session.execute(_copied(AssignedTrial, first))
+        session.execute(_copied(TrialClip, first))
         session.execute(_copied(Rating, first))
 
 
@@ -64,15 +66,25 @@ def _run(number: int, trials: int) -> dict[str, Any]:
     }
 
 
-def _assigned(run: int, trial: int, clips: list[Any]) -> dict[str, Any]:
+def _assigned(run: int, trial: int) -> dict[str, Any]:
     return {
         "study_run_id": run,
         "trial_index": trial,
         "kind": "main",
         "block": 1,
         "block_label": "all",
-        "version_clip_id": clips[trial % len(clips)].id,
         "expected_response": None,
+    }
+
+
+def _clip(run: int, trial: int, clips: list[Any]) -> dict[str, Any]:
+    clip = clips[trial % len(clips)].id
+    return {
+        "study_run_id": run,
+        "trial_index": trial,
+        "role": "shown",
+        "position": 0,
+        "version_clip_id": clip,
     }
 
 
@@ -83,7 +95,8 @@ def _rating(run: int, trial: int, clips: list[Any]) -> dict[str, Any]:
         "study_run_id": run,
         "trial_index": trial,
         "play": 1,
-        "response": 1 + trial % 7,
+        "kind": "clip_rating",
+        "payload": {"response": 1 + trial % 7},
         "rt": 640.5 + trial,
         "rt_from_first_frame": 2100.25 + trial,
         "time_elapsed": 6000.0 * (trial + 1),

@@ -1,5 +1,6 @@
 """A real server process is killed without warning while ratings arrive: what was acknowledged is there."""
 
+import json
 import os
 import random
 import signal
@@ -81,8 +82,9 @@ def test_no_acknowledged_rating_is_lost_or_doubled(
         os.killpg(process.pid, signal.SIGTERM)
         assert process.wait(30) in (0, -signal.SIGTERM)
     with services.database.read() as session:
-        stored = dict(map(tuple, session.execute(text("SELECT rating_id, response FROM trial_ratings"))))
+        stored = dict(map(tuple, session.execute(text("SELECT rating_id, payload FROM trial_ratings"))))
         if services.database.is_sqlite:
             assert session.scalar(text("PRAGMA integrity_check")) == "ok"
-    assert stored == acknowledged
+    answers = {ident: json.loads(text) if isinstance(text, str) else text for ident, text in stored.items()}
+    assert answers == {ident: {"response": response} for ident, response in acknowledged.items()}
     assert len(stored) == sent == KILLS * 12

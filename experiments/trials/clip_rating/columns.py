@@ -2,10 +2,13 @@
 
 from experiments.columns import base
 from experiments.columns.column import Column
+from experiments.columns.tables import rows_of
 from experiments.columns.view import View
 
 ANSWER: tuple[Column, ...] = (
-    Column("response", "integer", "The rating, on the declared scale.", source="t"),
+    Column(
+        "response", "integer", "The rating, on the declared scale.", source="t.payload", member="response"
+    ),
     Column("expected_response", "integer", "The answer asked for in an attention check.", source="a"),
 )
 
@@ -26,12 +29,5 @@ RATINGS = View(
         *base.ORIGIN,
         *base.CLOCK,
     ),
-    rows="""FROM trial_ratings t
-JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
-JOIN study_runs r ON r.id = t.study_run_id
-JOIN study_versions v ON v.id = r.version_id
-JOIN studies s ON s.id = r.study_id
-LEFT JOIN version_clips c ON c.id = a.version_clip_id
-WHERE r.origin <> 'preview' AND r.erased_at IS NULL
-""",
+    rows=rows_of("clip_rating", {"shown": "c"}),
 )

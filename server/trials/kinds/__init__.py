@@ -3,7 +3,7 @@
 Nothing else joins them: the name in the declaration finds the file.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Literal
@@ -25,12 +25,12 @@ class Served:
     Attributes
     ----------
     validate: refuses (by an `Invalid`) an answer that the declaration does not allow in this part.
-    judge: the verdict on the views of the clips with these ids (none for an attention check), by the
-        declared playback rules.
+    judge: the verdict on the views of the clips with these ids by role (none for an attention check), by
+        the declared playback rules.
     """
 
     validate: Callable[[Experiment, Part, RatingIn], None]
-    judge: "Callable[[LoadedVersion, tuple[int, ...], RatingIn], Ruling]"
+    judge: "Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]"
 
 
 _SERVED: dict[str, Served] = {}

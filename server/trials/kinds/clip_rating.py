@@ -1,5 +1,6 @@
 """The single-clip rating: a whole number on the scale, and one play of one clip."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from experiments.definition import Experiment
@@ -37,12 +38,12 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
         raise RatingMissing("Expected an answer, got none; only a clip that failed may go without.")
 
 
-def judge(loaded: "LoadedVersion", clips: tuple[int, ...], rating: RatingIn) -> Ruling:
+def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on one play over all its views, and the rule that gave it."""
     rules, rated = loaded.experiment.playback, rating.response is not None
     if not clips:
         return judge_play(rules, _playback(rating.playback), None, 0, 0.0, rated=rated)
-    clip = loaded.clips[clips[0]]
+    clip = loaded.clips[clips["shown"]]
     frames = clip.frames * clip_rating_of(loaded.experiment).views
     return judge_play(rules, _playback(rating.playback), clip.sha256, frames, clip.fps, rated=rated)
 

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from server.clock import now
 from server.context import Services
-from server.models import AssignedTrial, RunEvent, StudyRun
+from server.models import AssignedTrial, RunEvent, StudyRun, TrialClip
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
 
@@ -205,9 +205,7 @@ def test_a_burst_of_starts_is_balanced_and_each_order_is_its_own(
         )
         assert first_blocks == {"a": 12, "b": 12}
         orders = {
-            tuple(
-                trial.version_clip_id for trial in session.query(AssignedTrial).filter_by(study_run_id=run.id)
-            )
+            tuple(clip.version_clip_id for clip in session.query(TrialClip).filter_by(study_run_id=run.id))
             for run in runs
         }
     assert len(orders) == 24

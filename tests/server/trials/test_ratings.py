@@ -64,7 +64,7 @@ def test_another_value_is_refused_and_the_first_kept(participant: Participant, s
     assert error_code(participant.rate(first, 5)) == (409, "rating_differs")
     assert error_code(participant.rate(second, 6, rating_id)) == (409, "rating_differs")
     with services.database.read() as session:
-        assert [rating.response for rating in session.query(Rating)] == [6]
+        assert [rating.payload for rating in session.query(Rating)] == [{"response": 6}]
 
 
 @pytest.mark.parametrize("response", [0, 8, -1, 2**40])

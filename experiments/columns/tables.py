@@ -1,0 +1,25 @@
+"""The tables behind a view: those of every answer, and a clip for each role in which a trial shows one."""
+
+from collections.abc import Mapping
+
+
+def rows_of(kind: str, clips: Mapping[str, str]) -> str:
+    """The SQL after SELECT of a view of the answers of one kind of trial.
+
+    Parameters
+    ----------
+    kind: as the declaration names it. clips: alias of `version_clips` for each role.
+    """
+    joins = "".join(
+        f"LEFT JOIN trial_clips {role}_clip ON {role}_clip.study_run_id = t.study_run_id "
+        f"AND {role}_clip.trial_index = t.trial_index AND {role}_clip.role = '{role}'\n"
+        f"LEFT JOIN version_clips {alias} ON {alias}.id = {role}_clip.version_clip_id\n"
+        for role, alias in clips.items()
+    )
+    return f"""FROM trial_ratings t
+JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
+JOIN study_runs r ON r.id = t.study_run_id
+JOIN study_versions v ON v.id = r.version_id
+JOIN studies s ON s.id = r.study_id
+{joins}WHERE t.kind = '{kind}' AND r.origin <> 'preview' AND r.erased_at IS NULL
+"""
