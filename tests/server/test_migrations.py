@@ -1,14 +1,17 @@
+import json
+
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
-from sqlalchemy import Connection, inspect, text
+from sqlalchemy import Connection, inspect, select, text
 
 from experiments.columns import Dialect
 from experiments.trials import views
 from server.db import Database
 from server.migrate import current_revision, downgrade, newest_revision, upgrade
-from server.models import Base
+from server.models import Base, StudyVersion
 from tests.helpers.databases import BACKENDS
+from tests.helpers.older_databases import load_older_database
 
 both = pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
 
@@ -63,4 +66,28 @@ def test_sqlite_writes_ahead_and_waits_for_the_disk(tmp_path) -> None:
         assert session.scalar(text("PRAGMA journal_mode")) == "wal"
         assert session.scalar(text("PRAGMA synchronous")) == 2
         assert session.scalar(text("PRAGMA foreign_keys")) == 1
+    database.close()
+
+
+@both
+def test_another_kind_of_trial_is_not_taken_down_to_a_revision_that_does_not_know_it(
+    empty_database_url: str,
+) -> None:
+    database = load_older_database(empty_database_url)
+    upgrade(database)
+    with database.write() as session:
+        version = session.scalars(select(StudyVersion).limit(1)).one()
+        version.definition = {**version.definition, "trial": {"kind": "paired_comparison"}}
+    with pytest.raises(
+        RuntimeError, match="and 1 stored versions of studies have another; keep this"
+    ) as raised:
+        downgrade(database, "0005")
+    assert "\n" not in str(raised.value)
+    assert current_revision(database) == newest_revision()
+    with database.read() as session:
+        stored = set(session.execute(text("SELECT kind, CAST(payload AS text) FROM trial_ratings")).all())
+        clips = session.scalar(text("SELECT count(*) FROM trial_clips WHERE role = 'shown'"))
+    assert {kind for kind, _ in stored} == {"clip_rating"}
+    assert {tuple(json.loads(payload)) for _, payload in stored} == {("response",)}
+    assert clips > 20
     database.close()

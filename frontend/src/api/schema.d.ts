@@ -4420,7 +4420,17 @@ export interface components {
             clip_sha256: string | null;
             /** Play */
             play: number;
-            /** Response */
+            /**
+             * Answer
+             * @description As its kind of trial stores it.
+             */
+            answer: {
+                [key: string]: unknown;
+            };
+            /**
+             * Response
+             * @description The answer on the scale, of kinds that have one.
+             */
             response: number | null;
             /** Expected Response */
             expected_response: number | null;
