@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
 Values = NDArray[np.float64]
 
+NOTHING: Picture = np.empty((0, 0, 3), np.uint8)
 LOOKED_AT = 400
 TRAINED_ON = 26
 ENOUGH_BY_HAND = 12
@@ -73,8 +75,9 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     several = looked = 0
     first = _first(info, step) if one_eye else ()
     with open_detector(one_eye=one_eye, first=first) as detector:
-        for number, picture in enumerate(islice(frames(info.path, read=rgb), info.frame_count)):
-            if number % step:
+        pictures = frames(info.path, read=_every(step))
+        for number, picture in enumerate(islice(pictures, info.frame_count)):
+            if not picture.size:
                 continue
             looked += 1
             several += _look(detector, number, picture, info, found)
@@ -87,7 +90,18 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
 def _first(info: VideoInfo, step: int) -> list[Picture]:
     """Pictures across the first minute or so, to find a close-up's eye in."""
     every = max(step, 8)
-    return list(islice(frames(info.path, read=rgb), 0, min(info.frame_count, 40 * every), every))
+    pictures = frames(info.path, read=_every(every))
+    return list(islice(pictures, 0, min(info.frame_count, 40 * every), every))
+
+
+def _every(step: int) -> Callable[[Any], Picture]:
+    """Read every step-th frame's colours and nothing of the others: turning a frame into RGB costs most."""
+    counter = count()
+
+    def read(frame: Any) -> Picture:
+        return rgb(frame) if next(counter) % step == 0 else NOTHING
+
+    return read
 
 
 def _look(
@@ -154,7 +168,7 @@ def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
     return sorted(numbers[place] for place in chosen)
 
 
-def proposed_labels(info: VideoInfo, seen: Survey, out: Path, count: int) -> Labels:
+def proposed_labels(info: VideoInfo, seen: Survey, out: Path, wanted_frames: int) -> Labels:
     """Save the most varied of the detections as a label file, to be corrected by hand.
 
     Raises
@@ -163,13 +177,15 @@ def proposed_labels(info: VideoInfo, seen: Survey, out: Path, count: int) -> Lab
         Fewer frames than wanted show eyes.
     """
     good = plausible(seen.points)
-    if len(good) < count:
+    if len(good) < wanted_frames:
         raise InputError(
-            f"{info.path}: eyes were found on {len(good)} frames, {count} are wanted; "
+            f"{info.path}: eyes were found on {len(good)} frames, {wanted_frames} are wanted; "
             "ask for fewer (--frames)"
         )
     eyes = len(next(iter(good.values()))) // EYE_POINTS
-    labels = Labels(out, info.size_px, default_markers(eyes), {n: good[n] for n in most_varied(good, count)})
+    labels = Labels(
+        out, info.size_px, default_markers(eyes), {n: good[n] for n in most_varied(good, wanted_frames)}
+    )
     save_labels(labels, info.path.name, "detector on single frames, not reviewed")
     return labels
 

@@ -197,6 +197,17 @@ def test_eyes_of_a_real_face_are_found_without_labels(detector, shared_data):
     assert abs(int(closed) - 27) <= 1
 
 
+def test_of_a_long_video_every_nth_frame_is_looked_at(detector, shared_data, monkeypatch):
+    info = scan_video(shared_data / "face_video" / "single_face.mp4")
+    every = survey(info, one_eye=False).points
+    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    seen = survey(info, one_eye=False)
+    assert seen.looked_at == 12
+    assert sorted(seen.points) == list(range(0, 72, 6))
+    for number, points in seen.points.items():
+        assert points == pytest.approx(every[number], abs=1e-6)
+
+
 def test_labels_of_a_real_face_are_proposed_from_the_command_line(detector, shared_data, stimuli, tmp_path):
     clip = shared_data / "face_video" / "single_face.mp4"
     code, said, error = stimuli("label", clip, "--frames", 10, "--out", tmp_path / "l.json")
