@@ -37,10 +37,10 @@ def ensure_environment(folder: Path, python: str, requirements: Path, what: str,
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     try:
-        _run([*uv(), "venv", "-q", str(folder), "--python", python], f"make the environment of {what}")
+        run_step([*uv(), "venv", "-q", str(folder), "--python", python], f"make the environment of {what}")
         install = ["pip", "install", "-q", "--no-deps", "--require-hashes", "-r", str(requirements)]
-        _run([*uv(), *install, "--python", str(interpreter)], f"install {what}")
-        _run([str(interpreter), "-c", probe], f"start {what}")
+        run_step([*uv(), *install, "--python", str(interpreter)], f"install {what}")
+        run_step([str(interpreter), "-c", probe], f"start {what}")
     except InputError:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -59,7 +59,8 @@ def uv() -> list[str]:
     return [found]
 
 
-def _run(command: list[str], what: str) -> None:
+def run_step(command: list[str], what: str) -> None:
+    """Run one step of making an environment; its last line of complaint becomes the error."""
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - fixed program
     if done.returncode != 0:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1].strip()
