@@ -58,6 +58,8 @@ class Visit:
         ):
             page.wait_for_selector(selector)
             self.look(name)
+            if selector == ".card":
+                touch_card(page)
             page.click(press)
         return self
 
@@ -123,6 +125,12 @@ class Visit:
 
     def code(self) -> str:
         return self.page.inner_text(".code output")
+
+
+def touch_card(page: Page) -> None:
+    """Make the drawn card larger and smaller again: one that nobody has touched is refused."""
+    page.click("text=Larger")
+    page.click("text=Smaller")
 
 
 def _gone(element: ElementHandle | None) -> None:

@@ -4,7 +4,7 @@ import { luminance } from "../../src/participant/flow/appearance";
 import { findings, type Abilities } from "../../src/participant/flow/gates";
 import { owed, Replays } from "../../src/participant/flow/replays";
 import { refreshRate } from "../../src/participant/screen/refresh-rate";
-import { clipHeight, clipWidth, screenChange, zoomed, type ScreenShape } from "../../src/participant/screen/size";
+import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
 import { distanceFrom } from "../../src/participant/screens/distance";
 import { keyFor, valueOf } from "../../src/participant/trials/clip_rating/scale-keys";
 
@@ -139,4 +139,16 @@ describe("keys of the scale", () => {
 it("ink on the surround is chosen by luminance", () => {
   expect(luminance("#808080")).toBeCloseTo(0.2159, 3);
   expect(luminance("#ffffff")).toBeCloseTo(1);
+});
+
+describe("plausible sizes", () => {
+  it.each([
+    [1_280 / 1_030, false],
+    [1_920 / 1_030, false],
+    [96 / 25.4, true],
+    [160 / 25.4, true],
+    [1_920 / 24, false],
+  ])("%f px/mm: %s", (px_per_mm, plausible) => {
+    expect(isPlausible(px_per_mm)).toBe(plausible);
+  });
 });

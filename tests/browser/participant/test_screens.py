@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page
 
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, STUDY, without
-from tests.browser.visit import Visit, axe_violations
+from tests.browser.visit import Visit, axe_violations, touch_card
 
 pytestmark = pytest.mark.browser
 PICTURES_OF = {"width": 1280, "height": 800}
@@ -24,6 +24,7 @@ CARD_PX_PER_MM = 96 / 25.4
 
 def to_the_blind_spot(visit: Visit) -> Page:
     page = visit.begin().page
+    touch_card(page)
     page.click("text=It fits")
     page.click("text=It is, within")
     page.wait_for_selector(".blind-field")

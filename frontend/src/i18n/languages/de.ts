@@ -40,6 +40,8 @@ export const messages: Messages = {
   card_slider: "Größe der Karte auf dem Bildschirm",
   card_smaller: "Kleiner",
   card_larger: "Größer",
+  card_untouched: "Halten Sie eine Karte an den Bildschirm und ändern Sie die gezeichnete, bis beide gleich groß sind.",
+  size_implausible: "Nach dieser Größe wäre Ihr Bildschirm {width} cm breit. Bitte messen Sie noch einmal.",
   card_fits: "Es passt",
   card_none: "Ich habe keine Karte: mit dem Lineal messen",
   card_hint: "Ziehen Sie den Regler, nehmen Sie die Pfeiltasten oder ziehen Sie an der Ecke der Karte.",

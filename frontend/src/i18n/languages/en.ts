@@ -39,6 +39,8 @@ export const messages = {
   card_slider: "Size of the card on the screen",
   card_smaller: "Smaller",
   card_larger: "Larger",
+  card_untouched: "Hold a card against the screen and change the drawn one until both are as large.",
+  size_implausible: "By this size your screen would be {width} cm wide. Please measure once more.",
   card_fits: "It fits",
   card_none: "I have no card: use a ruler",
   card_hint: "Drag the slider, use the arrow keys, or pull the card's corner.",

@@ -62,3 +62,11 @@ export function calibrationBody(
     zoom: window.outerWidth ? Math.round((window.outerWidth / window.innerWidth) * 100) / 100 : 1,
   };
 }
+
+/** CSS pixels per millimetre that screens have: 48 to 254 an inch, from a large television to a telephone. */
+const PLAUSIBLE_PX_PER_MM = [1.9, 10] as const;
+
+/** False where a card or ruler cannot have been held against the screen: it would be a metre wide, or as small as a stamp. */
+export function isPlausible(px_per_mm: number): boolean {
+  return px_per_mm >= PLAUSIBLE_PX_PER_MM[0] && px_per_mm <= PLAUSIBLE_PX_PER_MM[1];
+}

@@ -3,7 +3,7 @@ import type { CalibrationState, TrialInfo } from "../../api/schema";
 import { h } from "../../ui/element";
 import { showPage, statusLine, alertLine } from "../../ui/page";
 import { plugin, BOOL, FLOAT, STRING, type PluginClass } from "../jspsych";
-import { calibrationBody, clipWidth } from "../screen/size";
+import { calibrationBody, clipWidth, isPlausible } from "../screen/size";
 import type { Session } from "../session";
 import { cardView } from "./card";
 import { measureDistance } from "./distance";
@@ -53,6 +53,7 @@ function pressPrimary(display: HTMLElement): void {
     // Nobody sits there whose blind spot could be found, so the distance is typed in.
     const typed = display.querySelector(".blind-field") && display.querySelector<HTMLButtonElement>(".actions .plain");
     const primary = typed || display.querySelector<HTMLButtonElement>(".calibration .primary");
+    display.querySelector<HTMLInputElement>(".card-area input")?.dispatchEvent(new Event("input"));
     if (primary) primary.click();
     else clearInterval(timer);
   }, 200);
@@ -94,12 +95,18 @@ async function byCard(session: Session, display: HTMLElement, eyebrow: string): 
   const { t, run } = session;
   const card = cardView(t, session.screen.px_per_mm);
   const footer = h("footer", { class: "actions" });
-  page(session, display, eyebrow, "card_title", [h("p", {}, t("card_text")), card.element, footer]);
+  const alert = alertLine();
+  page(session, display, eyebrow, "card_title", [h("p", {}, t("card_text")), card.element, alert, footer]);
   const skip = run.display.calibrate === "optional" ? [{ label: t("skip"), value: "skip" as const, kind: "plain" as const }] : [];
   const other = { label: t("card_none"), value: "other" as const };
-  const step = await choose<"fits" | "other" | "skip">(session, footer, [{ label: t("card_fits"), value: "fits" }, other, ...skip]);
-  if (step !== "fits") return step;
-  return checked(session, display, eyebrow, { px_per_mm: card.px_per_mm(), method: "card" });
+  for (;;) {
+    footer.replaceChildren();
+    const step = await choose<"fits" | "other" | "skip">(session, footer, [{ label: t("card_fits"), value: "fits" }, other, ...skip]);
+    if (step !== "fits") return step;
+    if (!card.touched()) alert.textContent = t("card_untouched");
+    else if (!isPlausible(card.px_per_mm())) alert.textContent = implausible(session, card.px_per_mm());
+    else return checked(session, display, eyebrow, { px_per_mm: card.px_per_mm(), method: "card" });
+  }
 }
 
 /** A second look with a ruler, for who has one. */
@@ -121,8 +128,9 @@ async function byRuler(session: Session, display: HTMLElement, eyebrow: string):
   const { t } = session;
   const field = lengthField(t);
   const line_px = measuredLinePx();
+  const alert = alertLine();
   const footer = h("footer", { class: "actions" });
-  page(session, display, eyebrow, "ruler_title", [h("p", {}, t("ruler_text")), rulerLine(line_px), field.element, footer]);
+  page(session, display, eyebrow, "ruler_title", [h("p", {}, t("ruler_text")), rulerLine(line_px), field.element, alert, footer]);
   for (;;) {
     footer.replaceChildren();
     const step = await choose(session, footer, [
@@ -131,8 +139,14 @@ async function byRuler(session: Session, display: HTMLElement, eyebrow: string):
     ]);
     if (step === "other") return "other";
     const length_mm = field.value();
-    if (length_mm !== null) return { px_per_mm: line_px / length_mm, method: "ruler" };
+    if (length_mm === null) continue;
+    if (isPlausible(line_px / length_mm)) return { px_per_mm: line_px / length_mm, method: "ruler" };
+    alert.textContent = implausible(session, line_px / length_mm);
   }
+}
+
+function implausible({ t }: Session, px_per_mm: number): string {
+  return t("size_implausible", { width: Math.round(window.screen.width / px_per_mm / 10) });
 }
 
 /** The widest clip must fit the window at its real size; says so and offers ways out where it does not. */

@@ -16,6 +16,8 @@ const UPRIGHT_BELOW_PX = 600;
 export interface CardView {
   element: HTMLElement;
   px_per_mm: () => number;
+  /** False while it has the size that it was first shown in: nobody has held a card against it. */
+  touched: () => boolean;
 }
 
 export function cardView(t: Translate, start_px_per_mm: number | null): CardView {
@@ -23,6 +25,7 @@ export function cardView(t: Translate, start_px_per_mm: number | null): CardView
   const largest = upright ? (window.innerWidth - 60) / SHAPE : Math.min(LARGEST_PX, window.innerWidth - 110);
   /** Of the long side. */
   let length = start_px_per_mm ? start_px_per_mm * CARD_WIDTH_MM : START_PX;
+  let touched = false;
   const id = uniqueId("card");
   const slider = h("input", { type: "range", id, min: SMALLEST_PX, max: Math.round(largest), step: 1 });
   const corner = h("span", { class: "card-corner", "aria-hidden": "true" });
@@ -40,15 +43,19 @@ export function cardView(t: Translate, start_px_per_mm: number | null): CardView
     Object.assign(card.style, { width: `${width}px`, height: `${height}px` });
     slider.value = String(Math.round(length));
   };
-  slider.addEventListener("input", () => set(Number(slider.value)));
-  dragCorner(corner, card, (width) => set(upright ? width / SHAPE : width));
+  const change = (next: number): void => {
+    touched = true;
+    set(next);
+  };
+  slider.addEventListener("input", () => change(Number(slider.value)));
+  dragCorner(corner, card, (width) => change(upright ? width / SHAPE : width));
   set(length);
   const row = h(
     "div",
     { class: "row" },
-    button(t("card_smaller"), () => set(length - 1), "quiet"),
+    button(t("card_smaller"), () => change(length - 1), "quiet"),
     slider,
-    button(t("card_larger"), () => set(length + 1), "quiet"),
+    button(t("card_larger"), () => change(length + 1), "quiet"),
   );
   const element = h(
     "div",
@@ -58,7 +65,7 @@ export function cardView(t: Translate, start_px_per_mm: number | null): CardView
     row,
     h("p", { class: "help" }, t("card_hint")),
   );
-  return { element, px_per_mm: () => length / CARD_WIDTH_MM };
+  return { element, px_per_mm: () => length / CARD_WIDTH_MM, touched: () => touched };
 }
 
 function dragCorner(corner: HTMLElement, card: HTMLElement, set: (width: number) => void): void {
