@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from analysis.files import json_text
 from analysis.plans.result import Analysis
 from analysis.within.effect_tests import Effect
+from analysis.within.homogeneity import levene_tests
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
@@ -59,6 +60,7 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in analysis.anova.effects],
         "marginal_means": [asdict(mean) for mean in analysis.means],
         "pairwise": [asdict(pair) for pair in analysis.pairs],
+        "levene": [asdict(test) for test in levene_tests(analysis.anova)],
         "simple_effects": [
             {
                 "interaction": simple.interaction,

@@ -15,6 +15,7 @@ from analysis.report.numbers import (
     sum_text,
 )
 from analysis.within.effect_tests import Effect, UnivariateTest
+from analysis.within.homogeneity import levene_tests
 from analysis.within.simple_effects import SIGNIFICANCE
 
 TIMES = " × "
@@ -24,7 +25,8 @@ SYNTHETIC_MARK = " [SYNTHETIC DATA]"
 def all_tables(analysis: Analysis) -> tuple[Table, ...]:
     """Every table of the report, in its order."""
     tables = [paper_table(analysis), univariate_table(analysis), sphericity_table(analysis)]
-    tables += [multivariate_table(analysis), effect_size_table(analysis), means_table(analysis)]
+    tables += [levene_table(analysis), multivariate_table(analysis), effect_size_table(analysis)]
+    tables.append(means_table(analysis))
     tables += [pairs_table(analysis), simple_effects_table(analysis), contrasts_table(analysis)]
     tables += [equivalence_table(analysis), counts_table(analysis)]
     return tuple(table for table in tables if table.rows)
@@ -172,6 +174,17 @@ def sphericity_table(analysis: Analysis) -> Table:
         *_reasons(analysis, "mauchly_reason", skip="one contrast"),
     )
     return Table("sphericity", _title(analysis, "Sphericity and corrections"), header, rows, 1, notes)
+
+
+def levene_table(analysis: Analysis) -> Table:
+    """Levene's test of participants' means and of every cell; empty without groups."""
+    tests = levene_tests(analysis.anova)
+    rows = tuple(
+        (t.where, f_text(t.f_value), f"{t.df_effect}, {t.df_error}", p_value(t.p_value)) for t in tests
+    )
+    notes = ("Distances from the median of the group (Brown-Forsythe). means: over all cells.",)
+    title = _title(analysis, "Levene's test of equal spread")
+    return Table("levene", title, ("Scores", "F", "df", "p"), rows, 1, notes, folded=len(rows) > 12)
 
 
 def multivariate_table(analysis: Analysis) -> Table:
