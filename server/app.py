@@ -60,15 +60,19 @@ def _operation_id(route: APIRoute) -> str:
     return route.name
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
-    """The server with these settings (from the environment where None); the database must be migrated."""
-    services = open_services(settings or Settings())
+def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> FastAPI:
+    """The server with these settings (from the environment where None); the database must be migrated.
+
+    rehearses: as in `open_services`.
+    """
+    services = open_services(settings or Settings(), rehearses=rehearses)
 
     @asynccontextmanager
     async def lifespan(served: FastAPI) -> AsyncIterator[None]:
         served.state.services.stopping.listen()
         yield
         served.state.services.passwords.close()
+        served.state.services.intake.clips.close()
         served.state.services.group_commit.close()
         served.state.services.database.close()
 

@@ -1,6 +1,7 @@
 """What endpoints need of the running server, as FastAPI dependencies."""
 
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -9,13 +10,18 @@ from server.accounts.passwords import PasswordWork
 from server.accounts.throttle import SignInThrottle
 from server.clips.s3 import open_s3
 from server.clips.store import ClipStore, FolderStore
+from server.clock import now
 from server.db import Database, open_database
+from server.evidence.clip_bytes import ClipBytes
+from server.evidence.intake import Intake
 from server.group_commit import GroupCommit
 from server.rate_limit import RateLimit
 from server.results.cache import ResultsCache
 from server.settings import Settings
 from server.stopping import Stopping
 from server.versions import Versions
+
+SIMULATED_TIME = "x-palpebra-simulated-time"
 
 
 @dataclass(frozen=True)
@@ -33,15 +39,25 @@ class Services:
     passwords: PasswordWork
     stopping: Stopping
     results: ResultsCache
+    intake: Intake
+
+    def time_of(self, request: Request) -> datetime:
+        """When a participant's request came in: now, but where simulated people say when they act."""
+        said = request.headers.get(SIMULATED_TIME) if self.intake.rehearses else None
+        return datetime.fromisoformat(said) if said else now()
 
 
-def open_services(settings: Settings) -> Services:
-    """Open database and clip store; nothing is migrated or started."""
+def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
+    """Open database and clip store; nothing is migrated or started.
+
+    rehearses: simulated runs are held to what people are held to, and say what time it is.
+    """
     database = open_database(settings)
+    clips = open_s3(settings) if settings.s3_bucket else FolderStore(settings.clip_folder)
     return Services(
         settings=settings,
         database=database,
-        clips=open_s3(settings) if settings.s3_bucket else FolderStore(settings.clip_folder),
+        clips=clips,
         run_starts=RateLimit(settings.run_starts_per_minute),
         unsupported=RateLimit(settings.unsupported_per_minute),
         versions=Versions(),
@@ -50,6 +66,7 @@ def open_services(settings: Settings) -> Services:
         passwords=PasswordWork(),
         stopping=Stopping(),
         results=ResultsCache(),
+        intake=Intake(settings, ClipBytes(clips), rehearses=rehearses),
     )
 
 

@@ -52,6 +52,10 @@ class Settings(BaseSettings):
     run_starts_per_minute: int = Field(
         default=3000, ge=1, description="Runs that may be started by one link a minute, per worker."
     )
+    evidence: Literal["refuse", "record"] = Field(
+        default="refuse",
+        description="Answers that cannot have been given as they say: refuse them, or record and judge.",
+    )
     unsupported_per_minute: int = Field(
         default=300, ge=1, description="Reports of unsupported browsers accepted for one link a minute."
     )

@@ -1,8 +1,12 @@
 """What every test may use: the folder of real recordings, where it lies beside the checkout."""
 
+import os
 from pathlib import Path
 
 import pytest
+
+# Most tests answer at once and without clips; those of evidence ask for refusals by their settings.
+os.environ.setdefault("PALPEBRA_EVIDENCE", "record")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 

@@ -3,6 +3,33 @@
 from experiments.columns.base import ORIGINS
 from experiments.columns.column import Column
 
+
+def _share(signal: str, description: str) -> Column:
+    return Column(f"evidence_{signal}", "number", description, minimum=0, maximum=1)
+
+
+def _amount(signal: str, description: str, unit: str | None = None) -> Column:
+    return Column(f"evidence_{signal}", "number", description, unit=unit, minimum=0)
+
+
+EVIDENCE_COLUMNS = (
+    _share("tickets", "Share of answers with a good ticket of the server."),
+    _share("digests", "Share of rated clips shown to have been fetched, of those that could be checked."),
+    _amount("clip_time", "Length of the clips over the server's time from first ticket to last answer."),
+    _share("order", "Share of trials that came in their order."),
+    _share("late", "Share of answers delivered late; says nothing against a run."),
+    _share("interaction", "Share of answers with a key or pointer press reported."),
+    _share("trusted", "Share of presses made by input and not by a script in the page."),
+    _amount("press_ms", "Median time from a press's down to its up.", "ms"),
+    _amount("press_spread", "Standard deviation of the presses' lengths.", "ms"),
+    _amount("rt_median", "Median response time of main trials.", "ms"),
+    _amount("rt_spread", "Standard deviation of the natural logarithm of response times in ms."),
+    _share("same_answer", "Share of the most frequent answer."),
+    _share("cycle", "Share of answers equal to the one two to four trials before, at the best distance."),
+    _share("checks", "Share of attention checks answered as asked."),
+)
+"""One column a signal, named as `Signals` of the server names it."""
+
 RUN_COLUMNS: tuple[Column, ...] = (
     Column("study", "text", "Name of the study, unique on this server."),
     Column("run", "text", "Public identifier of the participant's visit (study run)."),
@@ -28,4 +55,12 @@ RUN_COLUMNS: tuple[Column, ...] = (
     Column("recruiter_parameters", "text", "JSON object of the parameters of the recruiter's address."),
     Column("run_origin", "text", "Where the run came from, fixed at its start.", values=ORIGINS),
     Column("data_series", "integer", "Data series of the run's version of the study."),
+    Column(
+        "evidence_verdict",
+        "text",
+        "Whether the answers are likely a person's; not_judged where the page brought no evidence.",
+        values=("likely", "unclear", "unlikely", "not_judged"),
+    ),
+    Column("evidence_points", "number", "Points of all signals together, on which the verdict rests."),
+    *EVIDENCE_COLUMNS,
 )

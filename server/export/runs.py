@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -10,6 +11,7 @@ from sqlalchemy.orm import Session
 
 from experiments.columns import RUN_COLUMNS
 from server.clock import iso
+from server.evidence.service import judge_run
 from server.models import FormAnswer, Study, StudyRun
 from server.runs import service
 
@@ -73,7 +75,18 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "recruiter_parameters": _json(run.recruiter_parameters),
         "run_origin": run.origin,
         "data_series": run.version.series,
-    }
+    } | _evidence(session, run)
+
+
+def _evidence(session: Session, run: StudyRun) -> dict[str, Any]:
+    judged = judge_run(session, run)
+    values = {f"evidence_{name}": _rounded(value) for name, value in asdict(judged.signals).items()}
+    points = "" if judged.verdict == "not_judged" else judged.points
+    return values | {"evidence_verdict": judged.verdict, "evidence_points": points}
+
+
+def _rounded(value: float | None) -> float | str:
+    return "" if value is None else round(value, 4)
 
 
 def _time(moment: datetime | None) -> str:

@@ -10,6 +10,7 @@ from server.models.accounts import (
     Job,
 )
 from server.models.base import Base, UtcDateTime
+from server.models.evidence import AnswerEvidence
 from server.models.runs import (
     RUN_STATUSES,
     STAGES,
@@ -31,6 +32,7 @@ __all__ = [
     "STAGES",
     "Account",
     "AdminSession",
+    "AnswerEvidence",
     "ApiToken",
     "AssignedTrial",
     "AuditEntry",

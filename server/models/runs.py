@@ -34,6 +34,8 @@ class StudyRun(Base):
     seed: of the trial order. trials_answered: trials that need no further play, practice and checks included.
     elapsed_ms: latest `time_elapsed`, from which the clock goes on after a reload.
     px_per_mm, viewing_distance_mm: of the latest calibration, copied to each rating.
+    evidence: asked where the page brings evidence with each answer, older where it was open before pages did,
+    none where the run is older itself or not a person's. evidence_verdict: judged at completion.
     erased_at: the person's data were deleted on request; the row stays so that counts stay right.
     """
 
@@ -43,6 +45,7 @@ class StudyRun(Base):
         one_of("origin", *ORIGINS),
         one_of("status", *RUN_STATUSES),
         one_of("stage", *STAGES),
+        one_of("evidence", "none", "older", "asked"),
         UniqueConstraint("link_id", "client_id"),
         Index("ix_study_runs_study_id_status", "study_id", "status"),
         Index("ix_study_runs_version_id_slot", "version_id", "slot"),
@@ -80,6 +83,8 @@ class StudyRun(Base):
     excluded_at: Mapped[datetime | None]
     excluded_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     erased_at: Mapped[datetime | None]
+    evidence: Mapped[str] = mapped_column(String(5), default="none")
+    evidence_verdict: Mapped[str | None] = mapped_column(String(10))
 
     study: Mapped[Study] = relationship()
     version: Mapped[StudyVersion] = relationship()

@@ -5,6 +5,8 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
+from server.evidence.verdict import Verdict
+
 
 class MonitoredRun(BaseModel):
     """One visit in the monitor's table."""
@@ -26,6 +28,9 @@ class MonitoredRun(BaseModel):
     flagged: int
     failed: int
     excluded: bool
+    evidence_verdict: Verdict | None = Field(
+        description="Whether the answers are likely a person's; null while the run goes on."
+    )
     heat: str = Field(description="One letter a trial: . open, g good, u uncertain, f flagged, x failed.")
 
 

@@ -30,6 +30,7 @@ SHOWN = (
     StudyRun.trials_total,
     StudyRun.excluded,
     StudyRun.erased_at,
+    StudyRun.evidence_verdict,
 )
 
 
@@ -93,6 +94,7 @@ def monitored(run: Any, heat: HeatMap, moment: datetime, lease: timedelta) -> Mo
             "flagged": letters.count("f"),
             "failed": letters.count("x"),
             "excluded": run.excluded,
+            "evidence_verdict": run.evidence_verdict,
             "heat": letters,
         }
     )

@@ -8,6 +8,7 @@ from experiments.definition import Experiment
 from experiments.rules import ExcludeAttention
 from server.clock import now
 from server.context import Services
+from server.evidence.service import judge_run
 from server.models import Study, StudyRun
 from server.participants import repository
 from server.participants.links import recruiter_of
@@ -30,6 +31,7 @@ def complete_run(services: Services, session: Session, token: str) -> Completion
         _need_everything(session, run, loaded)
         run.status, run.stage, run.completed_at = "complete", "debrief", now()
         run.last_seen_at = run.completed_at
+        run.evidence_verdict = judge_run(session, run).verdict
         _close_when_full(session, study, run)
     if run.status == "screened_out":
         return _screened_out(run)

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Depends, Response
+from fastapi import APIRouter, Body, Depends, Request, Response
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
@@ -84,10 +84,10 @@ def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
 
 
 @router.get("/run")
-def get_run(services: ServicesDep, token: RunToken) -> RunState:
+def get_run(services: ServicesDep, request: Request, token: RunToken) -> RunState:
     """Everything the page needs to begin or to go on."""
     with services.database.read() as session:
-        return runs.run_state(services, session, token)
+        return runs.run_state(services, session, token, services.time_of(request))
 
 
 @router.put("/run/consent")

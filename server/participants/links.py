@@ -14,6 +14,8 @@ from experiments.trials import KINDS
 from experiments.trials.counts import expected_minutes
 from server.clock import now
 from server.context import Services
+from server.evidence.intake import ENFORCED_ORIGINS
+from server.evidence.repository import has_older_runs
 from server.models import Link, Study, StudyRun
 from server.participants import repository
 from server.participants.bounds import checked_device
@@ -34,6 +36,8 @@ from server.tokens import derived_token, hash_token, new_public_id, new_token
 from server.versions import LoadedVersion
 
 RUN_PURPOSE = "run"
+OLD_PAGES_ACCEPTED = timedelta(hours=48)
+"""How long after the last run of before there was evidence a page of that time may begin another."""
 SEED_BITS = 53  # so that a seed survives JSON in every program
 _REFUSALS = {
     "expired": (LinkExpired, "This link has expired; please ask the person who invited you for a new one."),
@@ -246,10 +250,22 @@ def _new_run(
         completion_code=new_token()[:10],
         recruiter_parameters=start.query,
         device=checked_device(start.device),
+        evidence=_evidence(services, session, origin, start),
     )
     repository.add_all(session, [run])
     repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
     return run, token
+
+
+def _evidence(
+    services: Services, session: Session, origin: Origin, start: RunStart
+) -> Literal["none", "older", "asked"]:
+    """Whether evidence is asked for: not from a page that was open when this server learned to ask."""
+    if start.evidence:
+        return "asked"
+    if origin not in ENFORCED_ORIGINS and not services.intake.rehearses:
+        return "none"
+    return "older" if has_older_runs(session, now() - OLD_PAGES_ACCEPTED) else "asked"
 
 
 def _trial_rows(run: StudyRun, trials: list[Trial]) -> list[dict[str, Any]]:

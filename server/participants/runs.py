@@ -1,15 +1,19 @@
 """A run from consent to completion: what the page gets and what it reports."""
 
+from datetime import datetime
 from itertools import groupby
 from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.trials import KINDS
 from server.clock import now
 from server.context import Services
 from server.db import insert_once
+from server.evidence.schemas import Tickets
+from server.evidence.tickets import issue, tickets
 from server.models import Calibration, FormAnswer, RunEvent, StudyRun
 from server.participants import bounds, repository, screening
 from server.participants.completion import completion_code
@@ -39,7 +43,7 @@ from server.tokens import new_public_id
 BEFORE_CONSENT = ("consent",)
 
 
-def run_state(services: Services, session: Session, token: str) -> RunState:
+def run_state(services: Services, session: Session, token: str, moment: datetime) -> RunState:
     """Everything the page needs to begin or to go on; refused where this run may not be taken up again."""
     run = find_run(session, token)
     loaded = services.versions.get(session, run.version_id)
@@ -74,8 +78,17 @@ def run_state(services: Services, session: Session, token: str) -> RunState:
         elapsed_ms_before=run.elapsed_ms,
         completion_code=completion_code(session, run, loaded) if run.status == "complete" else None,
         resumable_until=resumable_until(experiment, run),
-        server_time=now(),
+        server_time=moment,
+        tickets=_tickets(services, run, experiment, moment),
     )
+
+
+def _tickets(services: Services, run: StudyRun, experiment: Experiment, moment: datetime) -> Tickets | None:
+    if run.evidence != "asked" or run.status != "active":
+        return None
+    batch = issue(services.intake.key, run.public_id, moment)
+    plays = [1 + experiment.playback.max_repeats] * run.trials_total
+    return Tickets(batch=batch.text, by_trial=tickets(services.intake.key, batch, plays))
 
 
 def _saved(run: StudyRun) -> Saved:

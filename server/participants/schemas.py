@@ -10,6 +10,7 @@ from experiments.definition import Display, Texts
 from experiments.definition.forms import Form
 from experiments.rules import PlaybackRules
 from experiments.trials.union import AnyPage
+from server.evidence.schemas import Tickets
 from server.models import STAGES
 
 Stage = Literal[
@@ -74,6 +75,7 @@ class RunStart(BaseModel):
 
     language: LanguageTag
     client_id: UUID
+    evidence: bool = Field(default=False, description="The page brings evidence with each answer.")
     query: dict[Key, Text] = Field(
         default_factory=dict, max_length=20, description="Parameters of the address, such as PROLIFIC_PID."
     )
@@ -156,6 +158,7 @@ class RunState(BaseModel):
         description="Until when a reloaded page may go on without asking; null where it must ask."
     )
     server_time: datetime
+    tickets: Tickets | None = Field(description="Leave to answer, a ticket for each play of each trial.")
 
 
 class Consent(BaseModel):

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -17,7 +18,9 @@ from server.cli_common import migrated_services, out
 from server.context import Services
 from server.models import VersionClip
 from server.settings import Settings
+from server.simulation.adversaries import act, manner_called, summary, write
 from server.simulation.http import JsonClient, Refused, running_server
+from server.simulation.manners import MANNERS
 from server.simulation.person import Person, Rater
 from server.studies.links import PURPOSE, create_link
 from server.studies.lookup import active_version, find_study
@@ -37,6 +40,13 @@ def simulate(
     url: Annotated[
         str, typer.Option(help="Address of a running server; one is started where not given.")
     ] = "",
+    manner: Annotated[
+        str,
+        typer.Option("--as", help=f"Manner of taking part, to try the evidence by: {', '.join(MANNERS)}."),
+    ] = "",
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="With --as: file for the verdict and signals of each run.")
+    ] = None,
 ) -> None:
     """Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.
 
@@ -44,9 +54,29 @@ def simulate(
 
     Each goes through consent, forms, calibration and every trial. Answers follow a rater model with effects
     drawn by the seed, so that an analysis has something to find; they say nothing about people.
-    Example: server simulate exp3 --participants 20
+    With --as they are held to what people are held to, and the verdict on each run is told.
+
+    Examples:
+
+      server simulate exp3 --participants 20
+
+      server simulate exp3 --as http --participants 5 --json http.json
     """
     settings = Settings()
+    if manner:
+        if url:
+            raise InputError("--as starts a server of its own, whose time it can tell; leave --url out")
+        _as(
+            settings,
+            study,
+            manner,
+            range(seed * 1_000_000, seed * 1_000_000 + participants),
+            at_once,
+            json_file,
+        )
+        return
+    if json_file is not None:
+        raise InputError("--json goes with --as, which gives the verdicts to write")
     with migrated_services(settings) as services:
         token, levels = _prepare(services, study)
     people = range(seed * 1_000_000, seed * 1_000_000 + participants)
@@ -65,6 +95,20 @@ def simulate(
                 raise InputError(f"the server refused a simulated participant: {error}") from error
             advance()
     out.print(f"study {study}: {participants} simulated participants, {ratings} ratings")
+
+
+def _as(
+    settings: Settings, study: str, name: str, people: range, at_once: int, json_file: Path | None
+) -> None:
+    """Simulated people in a manner, with the verdict on each."""
+    manner = manner_called(name)
+    with migrated_services(settings) as services:
+        token, levels = _prepare(services, study)
+    raters = [Rater(number, people.start, levels) for number in people]
+    runs = act(settings, token, raters, manner, at_once)
+    if json_file is not None:
+        write(json_file, study, name, runs)
+    out.print(f"study {study}, {len(runs)} as {name}: {summary(runs)}")
 
 
 def _prepare(services: Services, name: str) -> tuple[str, dict[str, dict[str, str]]]:

@@ -40,6 +40,7 @@ class JsonClient:
             raise InputError(f"expected an address such as http://localhost:8000, got '{url}'")
         self._connection = kind(parts.hostname, parts.port, timeout=TIMEOUT_S)
         self.token: str | None = None
+        self.headers: dict[str, str] = {}
 
     def call(self, method: str, path: str, body: Any = None) -> tuple[int, Any]:
         """Status and decoded answer; Refused for a status of 400 or above."""
@@ -51,9 +52,18 @@ class JsonClient:
             raise Refused(answer.status, decoded)
         return answer.status, decoded
 
+    def fetch(self, path: str) -> bytes:
+        """The bytes of a file; Refused for a status of 400 or above."""
+        self._connection.request("GET", path)
+        answer = self._connection.getresponse()
+        content = answer.read()
+        if answer.status >= 400:
+            raise Refused(answer.status, None)
+        return content
+
     def send(self, method: str, path: str, body: Any = None) -> None:
         """Send a request without waiting for the answer."""
-        headers = {"content-type": "application/json"}
+        headers = {"content-type": "application/json", **self.headers}
         if self.token:
             headers["authorization"] = f"Bearer {self.token}"
         text = json.dumps(body) if body is not None else None

@@ -53,6 +53,7 @@ class Person:
         self.client, self.rater, self.language = client, rater, language
         self.elapsed_ms = 0.0
         self.ratings = 0
+        self.brings_evidence = False
 
     def take_part(
         self, link_token: str, *, stop_after: int | None = None, progress: Callable[[], None] = lambda: None
@@ -84,6 +85,7 @@ class Person:
             "language": self.language or link["study"]["languages"][0],
             "client_id": str(client_id),
             "device": {"simulated": True},
+            "evidence": self.brings_evidence,
         }
         self.client.token = self.client.post(f"/api/links/{link_token}/runs", start)["run_token"]
 

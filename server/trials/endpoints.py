@@ -2,7 +2,7 @@
 
 from uuid import UUID
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from sqlalchemy import Connection
 
 from server.context import ServicesDep
@@ -16,12 +16,14 @@ router = APIRouter(prefix="/api", tags=["ratings"], responses=ERROR_RESPONSES)
 
 @router.put("/run/ratings/{rating_id}", status_code=201, responses={200: {"model": RatingSaved}})
 async def put_rating(
-    services: ServicesDep, token: RunToken, rating_id: UUID, rating: RatingIn
+    services: ServicesDep, request: Request, token: RunToken, rating_id: UUID, rating: RatingIn
 ) -> RatingSaved:
     """Store one rating (201); the same again is answered with the same receipt (200)."""
+    received_at = services.time_of(request)
 
     def save(connection: Connection) -> tuple[Receipt, bool]:
-        return service.save_rating(services.versions, connection, token, str(rating_id), rating)
+        work = (services.versions, services.intake, connection, token, str(rating_id), rating)
+        return service.save_rating(*work, received_at)
 
     receipt, is_new = await services.group_commit.run(token, save)
     content = RatingSaved(receipt=receipt).model_dump_json()

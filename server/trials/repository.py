@@ -17,6 +17,9 @@ _ratings = cast(Table, Rating.__table__)
 _RUN = (
     select(
         _runs.c.id,
+        _runs.c.public_id,
+        _runs.c.origin,
+        _runs.c.evidence,
         _runs.c.version_id,
         _runs.c.status,
         _runs.c.consented_at,

@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field, StrictInt, StringConstraints
 
+from server.evidence.schemas import RatingEvidence
+
 Milliseconds = Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=1_000_000)]
 FrameTime = tuple[
@@ -53,6 +55,7 @@ class RatingIn(BaseModel):
     comment: Annotated[str, StringConstraints(max_length=5000)] | None = None
     answered_at_client: datetime | None = None
     playback: PlaybackLog
+    evidence: RatingEvidence | None = None
 
 
 class Receipt(BaseModel):

@@ -6,8 +6,8 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.definition import Experiment
-from server.clock import now
 from server.errors import Conflict, Invalid, NotFound
+from server.evidence.intake import Answer, Intake
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
 from server.participants.schemas import RunStatus
 from server.participants.screening import by_attention
@@ -16,7 +16,7 @@ from server.trials import repository
 from server.trials.kinds import Part, served
 from server.trials.schemas import RatingIn, Receipt
 from server.trials.verdict import Ruling, is_settled
-from server.versions import Versions
+from server.versions import LoadedVersion, Versions
 
 
 class TrialNotInRun(NotFound):
@@ -38,9 +38,15 @@ class RatingDiffers(Conflict):
 
 
 def save_rating(
-    versions: Versions, connection: Connection, token: str, rating_id: str, rating: RatingIn
+    versions: Versions,
+    intake: Intake,
+    connection: Connection,
+    token: str,
+    rating_id: str,
+    rating: RatingIn,
+    saved_at: datetime,
 ) -> tuple[Receipt, bool]:
-    """Store a rating, or find it stored; return the receipt and whether it is new."""
+    """Store a rating with its evidence, or find it stored; return the receipt and whether it is new."""
     run = repository.run_for_rating(connection, hash_token(token))
     if run is None:
         raise RunUnknown("This visit is not known; please open the link you were given again.")
@@ -59,9 +65,10 @@ def save_rating(
         ruling = (known.verdict, known.verdict_rule)
         return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
     _check(run, loaded.experiment, trial.kind, rating)
+    if run.evidence == "asked":
+        intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at))
     kind = loaded.experiment.trial.kind
     ruling = served(kind).judge(loaded, trial.clips, rating)
-    saved_at = now()
     repository.add_rating(connection, _row(run, rating_id, kind, rating, ruling, saved_at))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
     before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
@@ -101,12 +108,34 @@ def _check(run: Any, experiment: Experiment, part: Part, rating: RatingIn) -> No
         raise PlayOutOfRange(f"A clip is shown at most {most} times, got play {rating.play}.")
 
 
+def _answer(
+    run: Any, loaded: LoadedVersion, roles: dict[str, int], rating: RatingIn, received_at: datetime
+) -> Answer:
+    clips = [loaded.clips[ident] for ident in roles.values()]
+    rated = rating.response is not None
+    views = getattr(loaded.experiment.trial, "views", 1)
+    return Answer(
+        run=run.id,
+        run_id=run.public_id,
+        origin=run.origin,
+        trial_index=rating.trial_index,
+        play=rating.play,
+        rated=rated,
+        clips=tuple((clip.sha256, clip.bytes) for clip in clips),
+        clip_ms=max((1000 * views * clip.frames / clip.fps for clip in clips), default=0.0) * rated,
+        received_at=received_at,
+        answered_at=_with_zone(rating.answered_at_client),
+        evidence=rating.evidence,
+    )
+
+
+def _with_zone(moment: datetime | None) -> datetime | None:
+    return moment if moment is None or moment.tzinfo else moment.replace(tzinfo=UTC)
+
+
 def _row(
     run: Any, rating_id: str, kind: str, rating: RatingIn, ruling: Ruling, saved_at: datetime
 ) -> dict[str, Any]:
-    answered = rating.answered_at_client
-    if answered is not None and answered.tzinfo is None:
-        answered = answered.replace(tzinfo=UTC)
     return {
         "rating_id": rating_id,
         "study_run_id": run.id,
@@ -119,7 +148,7 @@ def _row(
         "time_elapsed": rating.time_elapsed,
         "changes": rating.changes,
         "comment": rating.comment,
-        "answered_at_client": answered,
+        "answered_at_client": _with_zone(rating.answered_at_client),
         **rating.playback.model_dump(),
         "focus_lost": None if rating.playback.focus_lost is None else rating.playback.focus_lost > 0,
         "px_per_mm": run.px_per_mm,

@@ -2456,6 +2456,32 @@ export interface components {
             status: string;
         };
         /**
+         * Interaction
+         * @description How the participant acted between two answers, summed up on the page; no trace is sent.
+         *
+         *     A press is a key or pointer button going down and up again, or an activation without one.
+         */
+        Interaction: {
+            /** Presses */
+            presses: number;
+            /**
+             * Trusted
+             * @description Presses that the browser made from input, not a script.
+             */
+            trusted: number;
+            /**
+             * Press Ms
+             * @description Median time from down to up; null where no press had both.
+             */
+            press_ms?: number | null;
+            /**
+             * Moves
+             * @description Pointer movements.
+             * @default 0
+             */
+            moves?: number;
+        };
+        /**
          * InvitationOut
          * @description An invitation that has not been used.
          */
@@ -2833,6 +2859,11 @@ export interface components {
             failed: number;
             /** Excluded */
             excluded: boolean;
+            /**
+             * Evidence Verdict
+             * @description Whether the answers are likely a person's; null while the run goes on.
+             */
+            evidence_verdict: ("likely" | "unclear" | "unlikely" | "not_judged") | null;
             /**
              * Heat
              * @description One letter a trial: . open, g good, u uncertain, f flagged, x failed.
@@ -3313,6 +3344,22 @@ export interface components {
             message: string;
         };
         /**
+         * RatingEvidence
+         * @description What a rating brings along to show how it came about.
+         */
+        RatingEvidence: {
+            /** Batch */
+            batch: string;
+            /** Ticket */
+            ticket: string;
+            /**
+             * Digest
+             * @description HMAC-SHA-256 of the bytes of the trial's clips, joined, with the ticket as key.
+             */
+            digest?: string | null;
+            interaction?: components["schemas"]["Interaction"] | null;
+        };
+        /**
          * RatingIn
          * @description One play of one trial with its answer; `response` is null where the clip could not be rated.
          */
@@ -3348,6 +3395,7 @@ export interface components {
             /** Answered At Client */
             answered_at_client?: string | null;
             playback: components["schemas"]["PlaybackLog"];
+            evidence?: components["schemas"]["RatingEvidence"] | null;
         };
         /**
          * RatingSaved
@@ -3702,6 +3750,12 @@ export interface components {
              */
             client_id: string;
             /**
+             * Evidence
+             * @description The page brings evidence with each answer.
+             * @default false
+             */
+            evidence?: boolean;
+            /**
              * Query
              * @description Parameters of the address, such as PROLIFIC_PID.
              */
@@ -3785,6 +3839,8 @@ export interface components {
              * Format: date-time
              */
             server_time: string;
+            /** @description Leave to answer, a ticket for each play of each trial. */
+            tickets: components["schemas"]["Tickets"] | null;
         };
         /**
          * RunSummary
@@ -4312,6 +4368,16 @@ export interface components {
             screened_out: string;
         };
         /**
+         * Tickets
+         * @description A sealed batch of tickets, with every trial's tickets: by trial index, then by play from 1 on.
+         */
+        Tickets: {
+            /** Batch */
+            batch: string;
+            /** By Trial */
+            by_trial: string[][];
+        };
+        /**
          * TimeBin
          * @description Answers within 250 ms from `start_ms` after the clip's end.
          */
@@ -4743,6 +4809,7 @@ export type FormAnswers = components['schemas']['FormAnswers'];
 export type FunnelStep = components['schemas']['FunnelStep'];
 export type Gates = components['schemas']['Gates'];
 export type Health = components['schemas']['Health'];
+export type Interaction = components['schemas']['Interaction'];
 export type InvitationOut = components['schemas']['InvitationOut'];
 export type InvitationState = components['schemas']['InvitationState'];
 export type LanguageChange = components['schemas']['LanguageChange'];
@@ -4778,6 +4845,7 @@ export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
 export type Practice = components['schemas']['Practice'];
 export type ProblemOut = components['schemas']['ProblemOut'];
+export type RatingEvidence = components['schemas']['RatingEvidence'];
 export type RatingIn = components['schemas']['RatingIn'];
 export type RatingSaved = components['schemas']['RatingSaved'];
 export type Receipt = components['schemas']['Receipt'];
@@ -4814,6 +4882,7 @@ export type StudyDetail = components['schemas']['StudyDetail'];
 export type StudySummary = components['schemas']['StudySummary'];
 export type TextField = components['schemas']['TextField'];
 export type Texts = components['schemas']['Texts'];
+export type Tickets = components['schemas']['Tickets'];
 export type TimeBin = components['schemas']['TimeBin'];
 export type Timeline = components['schemas']['Timeline'];
 export type TimelineCalibration = components['schemas']['TimelineCalibration'];

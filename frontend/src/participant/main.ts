@@ -83,7 +83,13 @@ async function visit(entry: Entry): Promise<void> {
 /** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
 function begun({ root, t, link_token }: Entry, identity: Identity, language: string): Promise<RunStarted> {
   const client_id = identity.client_id();
-  const start = { language, client_id, query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent } };
+  const start = {
+    language,
+    client_id,
+    query: recruiterQuery(location.search),
+    device: { user_agent: navigator.userAgent },
+    evidence: true,
+  };
   return persistently(root, t, () => startRun(link_token, start));
 }
 

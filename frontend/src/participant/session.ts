@@ -1,6 +1,7 @@
 /** All that the screens of one visit share. */
 import type { CalibrationState, Completion, LinkState, Receipt, RunState, StageChange, TrialInfo } from "../api/schema";
 import type { Translate } from "../i18n";
+import type { InteractionLog } from "./evidence/interaction";
 import type { EventLog } from "./outbox/events";
 import type { Outbox, Outcome } from "./outbox/outbox";
 import type { ClipPlayer } from "./playback/player";
@@ -25,6 +26,7 @@ export interface Session {
   screen: ScreenState;
   clock: RunClock;
   replays: Replays;
+  interaction: InteractionLog;
   /** The screens of the declared kind of trial. */
   kind: TrialKind;
   /** Aborted when this page must do nothing more: another tab took over, or the participant stopped. */

@@ -20,7 +20,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         settings = Settings(
-            data_folder=folder, database_url=f"sqlite:///{folder / 'x.sqlite'}", secret_key="golden"
+            data_folder=folder,
+            database_url=f"sqlite:///{folder / 'x.sqlite'}",
+            secret_key="golden",
+            evidence="record",
         )
         services = open_services(settings)
         upgrade(services.database)

@@ -38,6 +38,7 @@ export function RunTable({ study, snapshot }: { study: string; snapshot: Schemas
               <th>Presence</th>
               <th className="only-wide">Stage</th>
               <th className="only-wide one-line">Last seen</th>
+              <th className="only-wide one-line">A person</th>
               <th className="only-wide">Trials</th>
               <th className="trials">Each trial</th>
             </tr>
@@ -68,6 +69,7 @@ const Row = memo(function Row({ study, run, seen }: { study: string; run: Run; s
       </td>
       <td className="only-wide">{words(run.stage)}</td>
       <td className="only-wide one-line">{seen}</td>
+      <td className="only-wide one-line">{run.evidence_verdict ? words(run.evidence_verdict) : ""}</td>
       <td className="number only-wide one-line">
         {run.answered} of {run.trials}
       </td>

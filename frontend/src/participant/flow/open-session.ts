@@ -1,6 +1,7 @@
 /** From a started run to everything its screens share. */
 import type { LinkState, RunStarted, RunState } from "../../api/schema";
 import { translator } from "../../i18n";
+import { InteractionLog } from "../evidence/interaction";
 import { EventLog } from "../outbox/events";
 import type { Outbox } from "../outbox/outbox";
 import type { OutboxItem } from "../outbox/store";
@@ -39,6 +40,7 @@ export function openSession({ root, link, run, kind, outbox, unsent }: Opening):
   const screen = new ScreenState();
   unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);
+  const over = new AbortController();
   const session: Session = {
     link,
     run,
@@ -53,7 +55,8 @@ export function openSession({ root, link, run, kind, outbox, unsent }: Opening):
     clock: new RunClock(run.elapsed_ms_before),
     replays: new Replays(),
     kind,
-    over: new AbortController(),
+    interaction: new InteractionLog(window, over.signal),
+    over,
     api: new RunApi(outbox),
     completion: null,
     answered: counted(run).filter((trial) => trial.answered).length,

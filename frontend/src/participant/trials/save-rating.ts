@@ -1,12 +1,14 @@
 /** Keeps a rating, and acts on its receipt whenever that comes: a failed clip joins the repetitions. */
 import type { TrialInfo } from "../../api/schema";
+import { evidenceFor } from "../evidence/evidence";
 import type { RatingBody } from "./rating";
 import { receiptOf, type Session } from "../session";
 
 /** Resolves when the rating is on disk; where nothing is kept there, when the server has it. */
 export async function saveRating(session: Session, trial: TrialInfo, body: RatingBody): Promise<void> {
   const id = crypto.randomUUID();
-  const { receipt } = await session.outbox.put("PUT", `/api/run/ratings/${id}`, body, id);
+  const evidence = await evidenceFor(session, trial, body.play);
+  const { receipt } = await session.outbox.put("PUT", `/api/run/ratings/${id}`, { ...body, evidence }, id);
   trial.plays_done = body.play;
   if (trial.kind !== "practice" && !trial.answered) session.answered += 1;
   trial.answered = true;

@@ -1,0 +1,88 @@
+"""Clips in memory, to check digests against: from a folder at once, from an object store when they come."""
+
+import hashlib
+import hmac
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
+
+from server.clips.store import ClipStore, FolderStore
+
+MAX_KEPT_BYTES = 64 << 20
+MAX_CLIP_BYTES = 32 << 20
+"""Digests of larger clips stay unchecked: a rating does not wait so long."""
+
+
+def clip_digest(ticket: str, clip: bytes) -> str:
+    """The digest that shows that `clip` was there when the ticket was used: 64 hexadecimal digits."""
+    return hmac.digest(ticket.encode(), clip, hashlib.sha256).hex()
+
+
+class ClipBytes:
+    """The clips last asked for, up to `MAX_KEPT_BYTES`; safe to use from several threads."""
+
+    def __init__(self, store: ClipStore) -> None:
+        self._store = store
+        self._local = isinstance(store, FolderStore)
+        self._kept: OrderedDict[str, bytes] = OrderedDict()
+        self._bytes = 0
+        self._lock = Lock()
+        self._fetching: set[str] = set()
+        self._pool: ThreadPoolExecutor | None = None
+
+    def at_once(self, sha256: str, size: int) -> bytes | None:
+        """The clip where it can be had without waiting; None: it is on its way, or too large."""
+        kept = self._in_memory(sha256)
+        if kept is not None or size > MAX_CLIP_BYTES:
+            return kept
+        if self._local:
+            return self._read(sha256, size)
+        self._fetch(sha256, size)
+        return None
+
+    def _in_memory(self, sha256: str) -> bytes | None:
+        with self._lock:
+            kept = self._kept.get(sha256)
+            if kept is not None:
+                self._kept.move_to_end(sha256)
+            return kept
+
+    def _read(self, sha256: str, size: int) -> bytes | None:
+        try:
+            clip = b"".join(self._store.read(sha256, 0, size))
+        except Exception:
+            return None
+        if len(clip) != size:
+            return None
+        self._keep(sha256, clip)
+        return clip
+
+    def _keep(self, sha256: str, clip: bytes) -> None:
+        with self._lock:
+            if sha256 not in self._kept:
+                self._kept[sha256] = clip
+                self._bytes += len(clip)
+            while self._bytes > MAX_KEPT_BYTES:
+                self._bytes -= len(self._kept.popitem(last=False)[1])
+
+    def _fetch(self, sha256: str, size: int) -> None:
+        with self._lock:
+            if sha256 in self._fetching:
+                return
+            self._fetching.add(sha256)
+            if self._pool is None:
+                self._pool = ThreadPoolExecutor(1, "palpebra-clips")
+
+        def fetch() -> None:
+            try:
+                self._read(sha256, size)
+            finally:
+                with self._lock:
+                    self._fetching.discard(sha256)
+
+        self._pool.submit(fetch)
+
+    def close(self) -> None:
+        """Fetch nothing more."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,79 @@
+"""Reads and writes of evidence, in as few statements as it takes."""
+
+from datetime import datetime
+from typing import Any, NamedTuple, cast
+
+from sqlalchemy import Connection, Table, bindparam, case, func, insert, select
+from sqlalchemy.orm import Session
+
+from server.models import AnswerEvidence, AssignedTrial, Rating, StudyRun, TrialClip
+
+_evidence = cast(Table, AnswerEvidence.__table__)
+_INSERT = insert(_evidence).inline()
+_since = case((_evidence.c.issued_at >= bindparam("issued_at"), _evidence.c.clip_ms), else_=0.0)
+_SPENT = select(
+    func.coalesce(func.sum(_evidence.c.clip_ms), 0.0).label("run_ms"),
+    func.coalesce(func.sum(_since), 0.0).label("batch_ms"),
+    func.min(_evidence.c.issued_at).label("first_issued_at"),
+    func.max(_evidence.c.received_at).label("last_received_at"),
+).where(_evidence.c.study_run_id == bindparam("run"))
+
+
+def spent(connection: Connection, run: int, issued_at: datetime) -> Any:
+    """Clip time of the run's answers, of those by tickets of `issued_at` or later; first and last times.
+
+    The row has run_ms, batch_ms, first_issued_at, last_received_at.
+    """
+    return connection.execute(_SPENT, {"run": run, "issued_at": issued_at}).one()
+
+
+def add(connection: Connection, values: dict[str, Any]) -> None:
+    """Store the evidence of one answer."""
+    connection.execute(_INSERT, values)
+
+
+def has_older_runs(session: Session, since: datetime) -> bool:
+    """Whether people's runs of before there was evidence began after `since`."""
+    people = StudyRun.origin.in_(("participant", "pilot"))
+    query = select(StudyRun.id).where(StudyRun.evidence == "none", StudyRun.started_at > since, people)
+    return session.scalar(query.limit(1)) is not None
+
+
+class StoredAnswer(NamedTuple):
+    """An answer with its trial, whether that has a clip, and its evidence, None where it brought none."""
+
+    rating: Any
+    trial: Any
+    has_clip: bool
+    evidence: AnswerEvidence | None
+
+
+def answers(session: Session, run: StudyRun) -> list[StoredAnswer]:
+    """The answers of a run; of a rating only what is judged, since its frame log is large."""
+    rated = (Rating.trial_index, Rating.play, Rating.payload, Rating.rt, Rating.saved_at)
+    query = select(*rated).where(Rating.study_run_id == run.id).order_by(Rating.id)
+    trials, shown, evidence = _trials(session, run), _with_clips(session, run), _stored(session, run)
+    return [
+        StoredAnswer(
+            row,
+            trials[row.trial_index],
+            row.trial_index in shown,
+            evidence.get((row.trial_index, row.play)),
+        )
+        for row in session.execute(query)
+    ]
+
+
+def _trials(session: Session, run: StudyRun) -> dict[int, Any]:
+    columns = (AssignedTrial.trial_index, AssignedTrial.kind, AssignedTrial.expected_response)
+    rows = session.execute(select(*columns).where(AssignedTrial.study_run_id == run.id))
+    return {row.trial_index: row for row in rows}
+
+
+def _with_clips(session: Session, run: StudyRun) -> set[int]:
+    return set(session.scalars(select(TrialClip.trial_index).where(TrialClip.study_run_id == run.id)))
+
+
+def _stored(session: Session, run: StudyRun) -> dict[tuple[int, int], AnswerEvidence]:
+    rows = session.scalars(select(AnswerEvidence).where(AnswerEvidence.study_run_id == run.id))
+    return {(row.trial_index, row.play): row for row in rows}

@@ -1,0 +1,130 @@
+"""What a run's answers say about how they were given: one number a signal, None where it cannot be had."""
+
+import itertools
+import math
+import statistics
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from datetime import datetime, timedelta
+from operator import eq
+
+LONGEST_CYCLE = 4
+MIN_FOR_SPREAD = 8
+"""Answers from which on a spread or a pattern is told."""
+
+
+@dataclass(frozen=True)
+class JudgedAnswer:
+    """One answer with its evidence, as far as it brought any.
+
+    part: practice, main or attention. expected: what an attention check asked for. needs_digest: it rated a
+    clip. issued_at: of its ticket, None where it had none. press_ms: median length of its presses.
+    """
+
+    trial_index: int
+    play: int
+    part: str
+    response: int | str | None
+    expected: int | None
+    rt: float | None
+    clip_ms: float
+    needs_digest: bool
+    received_at: datetime
+    issued_at: datetime | None = None
+    digest_right: bool | None = None
+    late: bool = False
+    presses: int | None = None
+    trusted: int | None = None
+    press_ms: float | None = None
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The signals of one run. Shares are from 0 to 1, times in milliseconds.
+
+    tickets: share of answers with a good ticket. digests: share of rated clips, of those that could be
+    checked, whose digest was right.
+    clip_time: length of the clips over the server's time from the first ticket to the last answer.
+    order: share of first plays that came in the order of the trials. late: share of late deliveries.
+    interaction: share of answers with a press reported. trusted: share of presses made by input, not by
+    scripts.
+    press_ms, press_spread: median and standard deviation of the presses' lengths.
+    rt_median, rt_spread: median response time, standard deviation of its natural logarithm.
+    same_answer: share of the most frequent answer. cycle: share of answers equal to the one some trials
+    before, at the best distance from two to four. checks: share of attention checks answered as asked.
+    """
+
+    tickets: float | None = None
+    digests: float | None = None
+    clip_time: float | None = None
+    order: float | None = None
+    late: float | None = None
+    interaction: float | None = None
+    trusted: float | None = None
+    press_ms: float | None = None
+    press_spread: float | None = None
+    rt_median: float | None = None
+    rt_spread: float | None = None
+    same_answer: float | None = None
+    cycle: float | None = None
+    checks: float | None = None
+
+
+SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
+
+
+def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
+    """The signals of a run's answers, in any order."""
+    if not answers:
+        return Signals()
+    came = sorted(answers, key=lambda one: (one.received_at, one.trial_index))
+    main = sorted((one for one in answers if one.part == "main"), key=lambda one: one.trial_index)
+    responses = [one.response for one in main if one.response is not None]
+    times = [one.rt for one in main if one.rt is not None and one.rt > 0]
+    lengths = [one.press_ms for one in answers if one.press_ms is not None]
+    checks = [one for one in answers if one.part == "attention"]
+    clips = [one for one in answers if one.needs_digest]
+    presses = sum(one.presses or 0 for one in answers)
+    spread = len(times) >= MIN_FOR_SPREAD
+    return Signals(
+        tickets=_share([one.issued_at is not None for one in answers]),
+        digests=_share([one.digest_right is True for one in clips]),
+        clip_time=_clip_time(came),
+        order=_order([one.trial_index for one in came if one.play == 1]),
+        late=_share([one.late for one in answers]),
+        interaction=_share([(one.presses or 0) > 0 for one in answers]),
+        trusted=sum(one.trusted or 0 for one in answers) / presses if presses else None,
+        press_ms=statistics.median(lengths) if lengths else None,
+        press_spread=statistics.stdev(lengths) if len(lengths) >= MIN_FOR_SPREAD else None,
+        rt_median=statistics.median(times) if times else None,
+        rt_spread=statistics.stdev(map(math.log, times)) if spread else None,
+        same_answer=_same(responses) if len(responses) >= MIN_FOR_SPREAD else None,
+        cycle=_cycle(responses) if len(responses) >= 2 * MIN_FOR_SPREAD else None,
+        checks=_share([one.response == one.expected for one in checks]),
+    )
+
+
+def _share(facts: Sequence[bool]) -> float | None:
+    return sum(facts) / len(facts) if facts else None
+
+
+def _clip_time(came: Sequence[JudgedAnswer]) -> float | None:
+    issued = [one.issued_at for one in came if one.issued_at is not None]
+    there_was = (came[-1].received_at - min(issued)) / timedelta(milliseconds=1) if issued else 0.0
+    return sum(one.clip_ms for one in came) / there_was if there_was > 0 else None
+
+
+def _order(indices: Sequence[int]) -> float | None:
+    return _share([before < after for before, after in itertools.pairwise(indices)])
+
+
+def _same(responses: Sequence[int | str]) -> float:
+    return Counter(responses).most_common(1)[0][1] / len(responses)
+
+
+def _cycle(responses: Sequence[int | str]) -> float:
+    return max(
+        float(sum(map(eq, responses, responses[lag:]))) / (len(responses) - lag)
+        for lag in range(2, LONGEST_CYCLE + 1)
+    )

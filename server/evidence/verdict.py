@@ -1,0 +1,76 @@
+"""From signals to one verdict a run, by a table of points; docs/evidence.md says how they were set.
+
+Points of all signals are added. From `LIKELY` on a run is `likely` a person's, up to `UNLIKELY` it is
+`unlikely`, between them `unclear`. A signal that cannot be had adds nothing, unless the table says so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from server.evidence.signals import JudgedAnswer, Signals, signals_of
+
+Verdict = Literal["likely", "unclear", "unlikely", "not_judged"]
+VERDICTS: tuple[Verdict, ...] = ("likely", "unclear", "unlikely", "not_judged")
+LIKELY, UNLIKELY = 8.0, 0.0
+MIN_ANSWERS = 6
+"""Runs with fewer answers are unclear: there is not enough to judge by."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Points of one signal within a range: `low` <= value < `high`."""
+
+    low: float
+    high: float
+    points: float
+
+
+INFINITE = float("inf")
+BANDS: dict[str, tuple[Band, ...]] = {
+    "tickets": (Band(0, 1, -3), Band(1, INFINITE, 1)),
+    "digests": (Band(0, 1, -4), Band(1, INFINITE, 1)),
+    "clip_time": (Band(1.05, INFINITE, -4),),
+    "order": (Band(0, 0.8, -2),),
+    "interaction": (Band(0, 0.5, -3), Band(0.9, INFINITE, 1)),
+    "trusted": (Band(0, 0.5, -2), Band(0.9, INFINITE, 2)),
+    "press_ms": (Band(0, 15, -2), Band(25, 1000, 1)),
+    "press_spread": (Band(0, 2, -3), Band(4, INFINITE, 1)),
+    "rt_median": (Band(0, 200, -2), Band(300, INFINITE, 1)),
+    "rt_spread": (Band(0, 0.1, -3), Band(0.12, INFINITE, 1)),
+    "same_answer": (Band(0.95, INFINITE, -1.5),),
+    "cycle": (Band(0.9, INFINITE, -2),),
+    "checks": (Band(0, 0.5, -2), Band(1, INFINITE, 1)),
+}
+"""Points of each signal; a value in none of its bands adds nothing. `late` is shown and adds nothing."""
+WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -1}
+"""Points where a signal cannot be had that every page reports."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict on a run, the points it rests on, and the signals."""
+
+    verdict: Verdict
+    points: float
+    signals: Signals
+
+
+NOT_JUDGED = Judgement("not_judged", 0.0, Signals())
+
+
+def points_of(name: str, value: float | None) -> float:
+    """Points that this value of a signal adds."""
+    if value is None:
+        return WITHOUT.get(name, 0.0)
+    return next((band.points for band in BANDS.get(name, ()) if band.low <= value < band.high), 0.0)
+
+
+def judge(answers: Sequence[JudgedAnswer]) -> Judgement:
+    """The verdict on a run whose page was asked for evidence."""
+    signals = signals_of(answers)
+    points = sum(points_of(name, getattr(signals, name)) for name in BANDS)
+    if len(answers) < MIN_ANSWERS:
+        return Judgement("unclear", points, signals)
+    verdict: Verdict = "likely" if points >= LIKELY else "unlikely" if points <= UNLIKELY else "unclear"
+    return Judgement(verdict, points, signals)

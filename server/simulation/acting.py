@@ -1,0 +1,141 @@
+"""A simulated person with a manner: sends evidence, at times of a clock of its own."""
+
+import random
+import uuid
+from datetime import datetime, timedelta
+from typing import Any
+
+from server.clock import now
+from server.context import SIMULATED_TIME
+from server.evidence.clip_bytes import clip_digest
+from server.simulation.http import JsonClient, Refused
+from server.simulation.manners import Manner, person
+from server.simulation.person import Person, Rater
+
+MAX_HELD = 12
+"""Answers kept while the network is away."""
+OFFLINE_S, READY_S = 600.0, 0.8
+MAX_ROUNDS = 8
+
+
+class Actor(Person):
+    """One participant who takes part in a declared manner; `refused` holds the codes of refusals."""
+
+    def __init__(self, client: JsonClient, rater: Rater, manner: Manner, clips: dict[str, bytes]) -> None:
+        super().__init__(client, rater)
+        self.manner, self.clips = manner, clips
+        self.rng = random.Random(f"{rater.effects_seed}/manner/{rater.seed}")
+        self.who = person(self.rng)
+        self.moment: datetime = now()
+        self.clock_off = timedelta()
+        self.refused: list[str] = []
+        self.run_id = ""
+        self.tickets: dict[str, Any] | None = None
+        self._held: list[dict[str, Any]] = []
+        self._holds = 0
+
+    def visit(self, link_token: str) -> str | None:
+        """Go through the whole run; return the code, None where an answer ended it or some were refused."""
+        self.brings_evidence = self.manner.tickets
+        self.begin(link_token)
+        state = self._state()
+        self.run_id = state["run_id"]
+        if not self._before(state):
+            return None
+        for _ in range(MAX_ROUNDS):
+            due = [trial for trial in state["trials"] if not trial["answered"]]
+            if not due or self.refused:
+                break
+            for trial in due:
+                self.rate(trial, state["trial"]["scale"])
+            self._deliver()
+            state = self._state()
+        if self.refused or not self._forms(state, "after"):
+            return None
+        self.client.put("/api/run/stage", {"stage": "debrief"})
+        return str(self.client.post("/api/run/complete")["completion_code"])
+
+    def _state(self) -> dict[str, Any]:
+        self._tell_time()
+        state: dict[str, Any] = self.client.get("/api/run")
+        self.tickets = state["tickets"]
+        return state
+
+    def rate(self, trial: dict[str, Any], scale: dict[str, Any]) -> bool:
+        """Watch and answer one trial; whether it is asked again shows when the run is read anew."""
+        manner, clip = self.manner, trial["clip_sha256"]
+        self._mishaps()
+        rt = manner.rt_ms(self.rng, self.who)
+        if manner.waits:
+            clip_s = trial["frames"] / trial["fps"] if clip else 0.0
+            self.moment += timedelta(seconds=clip_s + rt / 1000 + READY_S)
+        body = self.rating(trial, scale) | {"rt": round(rt, 2)}
+        body["response"] = self._response(trial, scale, body["response"])
+        body["answered_at_client"] = (self.moment + self.clock_off).isoformat()
+        if manner.tickets:
+            body["evidence"] = self._evidence(trial)
+        self._held.append(body)
+        if self._holds == 0 or len(self._held) >= MAX_HELD:
+            self._deliver()
+        else:
+            self._holds -= 1
+        return False
+
+    def _mishaps(self) -> None:
+        rng, manner = self.rng, self.manner
+        if rng.random() < manner.offline:
+            self._holds = rng.randint(2, MAX_HELD)
+        if rng.random() < manner.clock_jumps:
+            self.clock_off = timedelta(hours=rng.uniform(-30, 30))
+        if rng.random() < manner.reloads and not self._holds:
+            self._deliver()
+            self._state()
+
+    def _response(self, trial: dict[str, Any], scale: dict[str, Any], modelled: int) -> int:
+        minimum, maximum = int(scale["minimum"]), int(scale["maximum"])
+        if trial["kind"] == "attention" and self.manner.reads:
+            return modelled
+        if self.manner.answers == "same":
+            return (minimum + maximum) // 2
+        if self.manner.answers == "any" or trial["kind"] == "attention":
+            return self.rng.randint(minimum, maximum)
+        return modelled
+
+    def _evidence(self, trial: dict[str, Any]) -> dict[str, Any] | None:
+        if self.tickets is None:
+            return None
+        ticket = self.tickets["by_trial"][trial["trial_index"]][trial["plays_done"]]
+        digest = None
+        if trial["clip_sha256"] and self.manner.fetches:
+            digest = clip_digest(ticket, self._clip(trial))
+        interaction = self.manner.interaction(self.rng, self.who)
+        return {
+            "batch": self.tickets["batch"],
+            "ticket": ticket,
+            "digest": digest,
+            "interaction": interaction,
+        }
+
+    def _clip(self, trial: dict[str, Any]) -> bytes:
+        sha256 = trial["clip_sha256"]
+        if sha256 not in self.clips:
+            self.clips[sha256] = self.client.fetch(trial["clip_url"])
+        return self.clips[sha256]
+
+    def _deliver(self) -> None:
+        """Send what is held, after an absence of the network where it was away."""
+        if len(self._held) > 1:
+            self.moment += timedelta(seconds=OFFLINE_S)
+        self._holds = 0
+        self._tell_time()
+        held, self._held = self._held, []
+        for body in held:
+            try:
+                self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)
+                self.ratings += 1
+            except Refused as error:
+                self.refused.append(error.code)
+
+    def _tell_time(self) -> None:
+        if self.manner.waits:
+            self.client.headers[SIMULATED_TIME] = self.moment.isoformat()

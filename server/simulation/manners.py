@@ -1,0 +1,132 @@
+"""Manners of taking part: how people and programs act between two answers, seeded.
+
+Each is a model of who answers; the points of server/evidence/verdict.py were set by them. A second set,
+written apart, tests them (tests/server/evidence).
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Interaction = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How somebody takes part.
+
+    tickets: sends the server's tickets. fetches: fetches clips, and shows it. waits: lets the clips play.
+    rt_ms: response time of one answer. interaction: presses between two answers, None where none are told.
+    answers: by the rater model, always the same, or any; reads: does what attention checks ask.
+    offline, reloads, clock_jumps: chances of each before an answer.
+    """
+
+    tickets: bool
+    fetches: bool
+    waits: bool
+    rt_ms: Callable[[random.Random, "Person"], float]
+    interaction: Callable[[random.Random, "Person"], Interaction | None]
+    answers: Literal["model", "same", "any"] = "model"
+    reads: bool = True
+    offline: float = 0.0
+    reloads: float = 0.0
+    clock_jumps: float = 0.0
+
+
+@dataclass(frozen=True)
+class Person:
+    """What stays the same over one person's visit: pace (median response time, spread) and hand."""
+
+    rt_median_ms: float
+    rt_sigma: float
+    press_ms: float
+    press_sd_ms: float
+
+
+def person(rng: random.Random) -> Person:
+    """Somebody drawn at random."""
+    return Person(
+        rt_median_ms=rng.lognormvariate(6.7, 0.3),
+        rt_sigma=rng.uniform(0.25, 0.6),
+        press_ms=rng.uniform(60, 140),
+        press_sd_ms=rng.uniform(8, 30),
+    )
+
+
+def _human_rt(rng: random.Random, who: Person) -> float:
+    return who.rt_median_ms * rng.lognormvariate(0, who.rt_sigma)
+
+
+def _slow_rt(rng: random.Random, who: Person) -> float:
+    return 3 * _human_rt(rng, who)
+
+
+def _hasty_rt(rng: random.Random, _who: Person) -> float:
+    return rng.lognormvariate(5.3, 0.3)
+
+
+def _plausible_rt(rng: random.Random, _who: Person) -> float:
+    return rng.uniform(500, 1500)
+
+
+def _polling_rt(rng: random.Random, _who: Person) -> float:
+    return 250 + rng.uniform(0, 15)
+
+
+def _hand(rng: random.Random, who: Person) -> Interaction:
+    presses = rng.choice((2, 2, 2, 3))
+    length = max(20.0, rng.gauss(who.press_ms, who.press_sd_ms))
+    return {"presses": presses, "trusted": presses, "press_ms": round(length, 1), "moves": rng.randrange(60)}
+
+
+def _synthetic_click(_rng: random.Random, _who: Person) -> Interaction:
+    return {"presses": 2, "trusted": 0, "press_ms": None, "moves": 0}
+
+
+def _driver(rng: random.Random, _who: Person) -> Interaction:
+    return {"presses": 2, "trusted": 2, "press_ms": round(rng.uniform(0.3, 1.5), 1), "moves": 2}
+
+
+def _screen_reader(_rng: random.Random, _who: Person) -> Interaction:
+    return {"presses": 2, "trusted": 2, "press_ms": None, "moves": 0}
+
+
+def _nothing(_rng: random.Random, _who: Person) -> None:
+    return None
+
+
+MANNERS: dict[str, Manner] = {
+    "http": Manner(
+        tickets=False, fetches=False, waits=False, rt_ms=_plausible_rt, interaction=_nothing, answers="any"
+    ),
+    "http-slow": Manner(tickets=True, fetches=True, waits=True, rt_ms=_plausible_rt, interaction=_nothing),
+    "script": Manner(
+        tickets=True, fetches=True, waits=True, rt_ms=_polling_rt, interaction=_synthetic_click, answers="any"
+    ),
+    "frames": Manner(tickets=True, fetches=True, waits=True, rt_ms=_human_rt, interaction=_driver),
+    "careless": Manner(
+        tickets=True,
+        fetches=True,
+        waits=True,
+        rt_ms=_hasty_rt,
+        interaction=_hand,
+        answers="same",
+        reads=False,
+    ),
+    "honest": Manner(
+        tickets=True,
+        fetches=True,
+        waits=True,
+        rt_ms=_human_rt,
+        interaction=_hand,
+        offline=0.01,
+        reloads=0.01,
+        clock_jumps=0.01,
+    ),
+    "assistive": Manner(tickets=True, fetches=True, waits=True, rt_ms=_slow_rt, interaction=_screen_reader),
+}
+"""http: plain HTTP. http-slow: HTTP with plausible waits and fetched clips. script: a headless browser whose
+page a script clicks. frames: a driven browser that answers from single frames. careless: a person, fast
+and always the same. honest: a person whose network goes away, who reloads, whose clock jumps. assistive: a
+screen reader."""

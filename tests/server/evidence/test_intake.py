@@ -1,0 +1,159 @@
+"""What comes with an answer is checked: its ticket, the time there was, and its clip."""
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import select, text
+
+from server.clock import now
+from server.context import Services
+from server.evidence.intake import FALSE_ANSWERS_PER_MINUTE
+from server.models import AnswerEvidence
+from tests.helpers.evidence import Watcher
+from tests.helpers.studies import Participant, StudyInDatabase
+from tests.server.evidence.conftest import CLIP_S
+
+SHOWN_S = CLIP_S + 1.0
+
+
+def with_clips(state: Any) -> list[Any]:
+    return [trial for trial in state["trials"] if trial["clip_sha256"]]
+
+
+def code(response: Any) -> str:
+    return f"{response.status_code} {response.json()['error']['code']}"
+
+
+def rows(services: Services) -> list[AnswerEvidence]:
+    with services.database.read() as session:
+        return list(session.scalars(select(AnswerEvidence).order_by(AnswerEvidence.received_at)))
+
+
+def test_honest_answers_are_taken_with_their_evidence(watcher: Watcher, services: Services) -> None:
+    for trial in watcher.state()["trials"]:
+        watcher.wait(SHOWN_S)
+        assert watcher.answer(trial).status_code == 201
+    kept = rows(services)
+    assert len(kept) == 12
+    assert all(row.ticket and not row.late for row in kept)
+    assert [row.digest_right for row in kept].count(True) == 10
+    assert kept[0].interaction == {"presses": 2, "trusted": 2, "press_ms": 90.0, "moves": 5}
+
+
+def test_the_plain_http_program_is_refused(client: TestClient, study: StudyInDatabase) -> None:
+    bot = Watcher(client, study.link_token)
+    bot.moment = now()
+    bot.start()
+    bot.request("PUT", "/consent", {"agreed": True})
+    trials = bot.state()["trials"]
+    assert {code(bot.rate(trial)) for trial in trials} == {"422 ticket_missing"}
+
+
+def test_clips_cannot_outlast_the_time_since_their_tickets(watcher: Watcher) -> None:
+    trials = with_clips(watcher.state())
+    watcher.wait(SHOWN_S)
+    answers = [watcher.answer(trial) for trial in trials]
+    assert answers[0].status_code == 201
+    assert {code(one) for one in answers[1:]} == {"409 clips_outlast_tickets"}
+
+
+def test_many_batches_do_not_multiply_the_time(watcher: Watcher) -> None:
+    """As many batches as trials, all taken at once: each alone would have time enough."""
+    trials = with_clips(watcher.state())
+    batches = [watcher.state()["tickets"] for _ in trials]
+    watcher.wait(SHOWN_S)
+    taken = 0
+    for batch, trial in zip(batches, trials, strict=True):
+        watcher.tickets = batch
+        taken += watcher.answer(trial).status_code == 201
+    assert taken == 1
+
+
+def test_an_hour_offline_is_late_and_nothing_else(watcher: Watcher, services: Services) -> None:
+    trials = with_clips(watcher.state())
+    given = []
+    for trial in trials:
+        watcher.wait(SHOWN_S)
+        given.append((trial, watcher.moment))
+    watcher.wait(3600)
+    for trial, moment in given:
+        answer = watcher.rate(trial, evidence=watcher.evidence(trial), answered_at_client=moment.isoformat())
+        assert answer.status_code == 201
+    assert all(row.late for row in rows(services))
+
+
+@pytest.mark.parametrize("years", [-30, 30])
+def test_a_client_s_clock_years_off_is_no_reason_to_refuse(watcher: Watcher, years: int) -> None:
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(SHOWN_S)
+    moment = watcher.moment + timedelta(days=365 * years)
+    answer = watcher.rate(trial, evidence=watcher.evidence(trial), answered_at_client=moment.isoformat())
+    assert answer.status_code == 201
+
+
+def test_the_server_s_clock_set_back_is_no_reason_to_refuse(watcher: Watcher) -> None:
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(-7200)
+    assert watcher.answer(trial).status_code == 201
+
+
+def test_a_reload_gets_new_tickets_and_the_old_ones_stay_good(watcher: Watcher) -> None:
+    first, second = with_clips(watcher.state())[:2]
+    older = watcher.evidence(first)
+    watcher.wait(2 * SHOWN_S)
+    watcher.state()
+    watcher.wait(SHOWN_S)
+    assert watcher.answer(second).status_code == 201
+    assert watcher.answer(first, older).status_code == 201
+
+
+def test_a_digest_of_another_clip_or_none_is_refused(watcher: Watcher) -> None:
+    first, second = with_clips(watcher.state())[:2]
+    watcher.wait(3 * SHOWN_S)
+    other = watcher.evidence(first, digest=watcher.evidence(second)["digest"])
+    assert code(watcher.answer(first, other)) == "422 clip_digest_differs"
+    assert code(watcher.answer(first, watcher.evidence(first, digest=None))) == "422 clip_digest_missing"
+    assert watcher.answer(first).status_code == 201
+
+
+def test_tickets_of_another_run_and_tampered_ones_are_refused(
+    watcher: Watcher, client: TestClient, study: StudyInDatabase
+) -> None:
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(SHOWN_S)
+    other = Watcher(client, study.link_token).begin()
+    stolen = other.evidence(trial)
+    assert code(watcher.answer(trial, stolen)) == "422 ticket_of_another_run"
+    for changes, refusal in (
+        ({"batch": "x.1.2.3"}, "422 ticket_invalid"),
+        ({"ticket": "A" * 22}, "422 ticket_of_another_trial"),
+        ({"batch": "é"}, "422 invalid"),
+    ):
+        assert code(watcher.answer(trial, watcher.evidence(trial) | changes)).startswith(refusal[:5])
+    assert watcher.answer(trial).status_code == 201
+
+
+def test_false_answers_are_limited_without_touching_others(
+    watcher: Watcher, client: TestClient, study: StudyInDatabase
+) -> None:
+    trial = with_clips(watcher.state())[0]
+    codes = {code(watcher.rate(trial)) for _ in range(FALSE_ANSWERS_PER_MINUTE + 5)}
+    assert codes == {"422 ticket_missing", "429 too_many_requests"}
+    other = Watcher(client, study.link_token).begin()
+    trials = with_clips(other.state())
+    other.wait(SHOWN_S)
+    assert other.answer(trials[0]).status_code == 201
+
+
+def test_a_page_from_before_the_upgrade_begins_without_evidence(
+    client: TestClient, study: StudyInDatabase, services: Services
+) -> None:
+    assert Participant(client, study.link_token).start().status_code == 201
+    with services.database.write() as session:
+        session.execute(text("UPDATE study_runs SET evidence = 'none'"))
+    page = Participant(client, study.link_token).agree()
+    assert all(page.rate(trial).status_code == 201 for trial in page.state()["trials"])
+    assert page.state()["tickets"] is None
+    assert rows(services) == []

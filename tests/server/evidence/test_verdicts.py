@@ -1,0 +1,194 @@
+"""Verdicts on people and programs other than those that the points were set by."""
+
+import random
+from collections import Counter
+from dataclasses import fields
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+
+from experiments.columns.runs import EVIDENCE_COLUMNS
+from server.evidence.signals import SIGNAL_NAMES, JudgedAnswer, Signals, signals_of
+from server.evidence.verdict import BANDS, WITHOUT, judge
+
+START = datetime(2026, 11, 21, tzinfo=UTC)
+HONEST_RUNS, FALSE_ALARMS = 1_000, 0.01
+ADVERSE_RUNS = 200
+TRIALS, CHECK_EVERY, CLIP_MS = 60, 20, 1_500.0
+
+
+def answered(rng: random.Random, rt: Any, response: Any, press: Any, **rest: Any) -> list[JudgedAnswer]:
+    """The answers of one run: times and responses by the functions given, an attention check now and then."""
+    moment, answers = START, []
+    for index in range(TRIALS):
+        check = index % CHECK_EVERY == CHECK_EVERY - 1
+        took = rt(index)
+        moment += timedelta(milliseconds=CLIP_MS * (not check) + took + 600)
+        presses, trusted, length = press(index)
+        values = {
+            "trial_index": index,
+            "play": 1,
+            "part": "attention" if check else "main",
+            "expected": 2 if check else None,
+            "response": 2 if check and rest.get("reads", True) else response(index),
+            "rt": took,
+            "clip_ms": 0.0 if check else CLIP_MS,
+            "needs_digest": not check,
+            "issued_at": START if rest.get("tickets", True) else None,
+            "digest_right": None if check or not rest.get("digests", True) else True,
+            "received_at": moment,
+            "presses": presses,
+            "trusted": trusted,
+            "press_ms": length,
+        }
+        answers.append(JudgedAnswer(**values))
+    return answers
+
+
+def gamma_person(seed: int) -> list[JudgedAnswer]:
+    """An honest run by another model than the simulation's: ex-Gaussian times, autocorrelated answers.
+
+    Its network goes away for some answers, which then come together, its clock jumps (which no signal reads),
+    and it reloads, whereupon later tickets are younger.
+    """
+    rng = random.Random(f"gamma {seed}")
+    base, tail = rng.uniform(350, 900), rng.uniform(150, 900)
+    press = rng.gammavariate(9, rng.uniform(7, 14))
+    level = [rng.uniform(2, 6)]
+
+    def response(_index: int) -> int:
+        level[0] = 0.4 * level[0] + 0.6 * rng.uniform(1, 7)
+        return max(1, min(7, round(level[0])))
+
+    def presses(_index: int) -> tuple[int, int, float | None]:
+        # Somebody who holds a finger on touch glass now and then, or presses twice.
+        count = rng.choice((1, 2, 2, 3))
+        return count, count, None if rng.random() < 0.05 else max(15.0, rng.gauss(press, press / 5))
+
+    answers = answered(
+        rng, lambda _: max(180.0, rng.gauss(base, base / 8)) + rng.expovariate(1 / tail), response, presses
+    )
+    return with_mishaps(rng, answers)
+
+
+def with_mishaps(rng: random.Random, answers: list[JudgedAnswer]) -> list[JudgedAnswer]:
+    away_from = rng.randrange(TRIALS)
+    away_to = min(TRIALS - 1, away_from + rng.randrange(0, 20))
+    back = answers[away_to].received_at + timedelta(minutes=rng.uniform(0, 60))
+    reload_at = rng.randrange(TRIALS)
+    changed = []
+    for index, one in enumerate(answers):
+        values = {field.name: getattr(one, field.name) for field in fields(one)}
+        if away_from <= index <= away_to:
+            values |= {"received_at": back, "late": True}
+        elif index > away_to:
+            values["received_at"] = back + (one.received_at - answers[away_to].received_at)
+        if index >= reload_at:
+            values["issued_at"] = answers[max(0, reload_at - 1)].received_at
+        changed.append(JudgedAnswer(**values))
+    return changed
+
+
+def polling_script(seed: int) -> list[JudgedAnswer]:
+    """A headless browser polling each 250 ms, as the page's own `act` does."""
+    rng = random.Random(seed)
+    return answered(
+        rng, lambda _: 250 * rng.choice((1, 1, 2)), lambda _: 4, lambda _: (2, 0, None), reads=False
+    )
+
+
+def patient_script(seed: int) -> list[JudgedAnswer]:
+    """A script that waits a random time, reads the checks, and calls click()."""
+    rng = random.Random(seed)
+    return answered(
+        rng, lambda _: rng.uniform(400, 3000), lambda _: rng.randint(1, 7), lambda _: (2, 0, None)
+    )
+
+
+def driver(seed: int) -> list[JudgedAnswer]:
+    """A browser driven over its debugging protocol: trusted input without a hand's time."""
+    rng = random.Random(seed)
+    return answered(
+        rng,
+        lambda _: rng.lognormvariate(6.6, 0.4),
+        lambda _: rng.randint(1, 7),
+        lambda _: (2, 2, rng.uniform(0, 3)),
+    )
+
+
+def driver_with_delay(seed: int) -> list[JudgedAnswer]:
+    """The same with the delay option that drivers offer: each press lasts 80 ms, give or take the timer."""
+    rng = random.Random(seed)
+    return answered(
+        rng,
+        lambda _: rng.lognormvariate(6.6, 0.4),
+        lambda _: rng.randint(1, 7),
+        lambda _: (2, 2, 80 + rng.uniform(0, 1.5)),
+    )
+
+
+def http_with_tickets(seed: int) -> list[JudgedAnswer]:
+    """Plain HTTP that sends tickets and digests, waits, and knows nothing of presses."""
+    rng = random.Random(seed)
+    return answered(
+        rng, lambda _: rng.gauss(900, 200), lambda _: rng.randint(1, 7), lambda _: (None, None, None)
+    )
+
+
+def http_without_clips(seed: int) -> list[JudgedAnswer]:
+    """Plain HTTP against a server that only records: no ticket, no digest."""
+    rng = random.Random(seed)
+    nothing = lambda _: (None, None, None)  # noqa: E731 - three of one kind
+    return answered(rng, lambda _: 700.0, lambda _: rng.randint(1, 7), nothing, tickets=False, digests=False)
+
+
+ADVERSARIES = (
+    polling_script,
+    patient_script,
+    driver,
+    driver_with_delay,
+    http_with_tickets,
+    http_without_clips,
+)
+
+
+@pytest.mark.parametrize("adversary", ADVERSARIES, ids=lambda one: one.__name__)
+def test_no_program_is_likely_a_person(adversary: Any) -> None:
+    verdicts = Counter(judge(adversary(seed)).verdict for seed in range(ADVERSE_RUNS))
+    assert verdicts["likely"] == 0
+
+
+def test_honest_people_are_hardly_ever_doubted() -> None:
+    verdicts = Counter(judge(gamma_person(seed)).verdict for seed in range(HONEST_RUNS))
+    assert verdicts["likely"] > HONEST_RUNS * (1 - FALSE_ALARMS)
+    assert verdicts["unlikely"] == 0
+
+
+def test_assistive_technology_is_never_unlikely() -> None:
+    """A switch or speech that activates buttons: no press has a length, and scripts may have made them."""
+
+    def switch(seed: int) -> list[JudgedAnswer]:
+        rng = random.Random(seed)
+        trusted = rng.choice((0, 2))
+        return answered(
+            rng,
+            lambda _: rng.lognormvariate(8, 0.5),
+            lambda _: rng.randint(1, 7),
+            lambda _: (2, trusted, None),
+        )
+
+    verdicts = Counter(judge(switch(seed)).verdict for seed in range(ADVERSE_RUNS))
+    assert verdicts["unlikely"] == 0
+
+
+def test_few_answers_are_not_enough() -> None:
+    assert judge(gamma_person(1)[:5]).verdict == "unclear"
+    assert signals_of([]) == Signals()
+
+
+def test_the_export_has_a_column_a_signal() -> None:
+    assert tuple(column.name for column in EVIDENCE_COLUMNS) == tuple(
+        f"evidence_{name}" for name in SIGNAL_NAMES
+    )
+    assert {*BANDS, *WITHOUT} <= set(SIGNAL_NAMES)
