@@ -20,6 +20,7 @@ from server.studies.schemas import (
     Checked,
     ClipOut,
     DefinitionText,
+    JudgedEdit,
     NewStudy,
     NewVersion,
     ShippedExperiment,
@@ -91,6 +92,13 @@ def add_version(services: ServicesDep, who: Experimenter, study: str, body: NewV
     """Store a changed definition as a new version; runs keep the version they began with."""
     service.add_definition(services, study, body, who)
     return get_study(services, who, study)
+
+
+@router.post("/studies/{study}/versions/check")
+def judge_version(services: ServicesDep, _who: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
+    """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
+    with services.database.read() as session:
+        return service.judge_edit(session, study, body.toml)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)

@@ -75,6 +75,26 @@ class Checked(BaseModel):
     design: DesignOut | None
 
 
+class ChangeOut(BaseModel):
+    """One key of a definition that an edit changes."""
+
+    path: str
+    effect: Literal["wording", "measured"]
+    text: str = Field(description="The change in words.")
+
+
+class JudgedEdit(BaseModel):
+    """What saving an edited definition would do to the answers that are stored."""
+
+    changes: list[ChangeOut]
+    series: int = Field(description="Data series that answers to the edited definition would be of.")
+    present_series: int
+    runs: int = Field(description="Runs of the present series, previews aside.")
+    begins_series: bool = Field(
+        description="A new data series begins, and there are runs it is kept apart from."
+    )
+
+
 class ShippedExperiment(BaseModel):
     """An experiment that comes with the program."""
 

@@ -9,7 +9,7 @@ from experiments.schema.difference import changes_what_is_measured, difference
 from server.errors import NotFound
 from server.models import Study, StudyRun, StudyVersion
 from server.studies.lookup import active_version, definition_of
-from server.studies.schemas import SeriesOut
+from server.studies.schemas import ChangeOut, JudgedEdit, SeriesOut
 
 
 def series_of(session: Session, study: Study) -> list[SeriesOut]:
@@ -65,3 +65,27 @@ def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
         if known == clips and not changes_what_is_measured(changes):
             return version.series
     return max((version.series for version in study.versions), default=0) + 1
+
+
+def judged(session: Session, study: Study, experiment: Experiment) -> JudgedEdit:
+    """What saving this definition as a further version would do to the answers that are stored."""
+    present = active_version(session, study)
+    series = series_for(study, experiment, Manifest.model_validate(present.manifest))
+    runs = session.scalar(
+        select(func.count(StudyRun.id))
+        .join(StudyVersion, StudyVersion.id == StudyRun.version_id)
+        .where(
+            StudyRun.study_id == study.id, StudyVersion.series == present.series, StudyRun.origin != "preview"
+        )
+    )
+    known = {version.series for version in study.versions}
+    return JudgedEdit(
+        changes=[
+            ChangeOut(path=change.path, effect=change.effect, text=str(change))
+            for change in difference(definition_of(present), experiment)
+        ],
+        series=series,
+        present_series=present.series,
+        runs=runs or 0,
+        begins_series=bool(runs) and series not in known,
+    )

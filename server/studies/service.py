@@ -32,6 +32,7 @@ from server.studies.schemas import (
     Checked,
     DesignOut,
     FactorOut,
+    JudgedEdit,
     LevelOut,
     LevelsTable,
     NewStudy,
@@ -42,7 +43,7 @@ from server.studies.schemas import (
     StudySummary,
     VersionOut,
 )
-from server.studies.series import series_of
+from server.studies.series import judged, series_of
 from server.studies.uploads import FILMS, upload_folder
 
 ALLOWED = {
@@ -87,6 +88,11 @@ def check(text: str) -> Checked:
         problems = [ProblemOut(line=p.line, path=p.path, message=p.message) for p in error.problems]
         return Checked(problems=problems, design=None)
     return Checked(problems=[], design=design_out(experiment))
+
+
+def judge_edit(session: Session, name: str, text: str) -> JudgedEdit:
+    """What saving this definition would do to stored answers; DefinitionError where it cannot be used."""
+    return judged(session, find_study(session, name), parse_experiment(text))
 
 
 def shipped(services: Services) -> list[ShippedExperiment]:

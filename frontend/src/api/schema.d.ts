@@ -812,6 +812,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/versions/check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Judge Version
+         * @description Say, before a changed definition is saved, what changes and whether a new data series would begin.
+         */
+        post: operations["judge_version"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/versions/{number}": {
         parameters: {
             query?: never;
@@ -1606,6 +1626,24 @@ export interface components {
             role?: ("viewer" | "experimenter" | "owner") | null;
             /** Disabled */
             disabled?: boolean | null;
+        };
+        /**
+         * ChangeOut
+         * @description One key of a definition that an edit changes.
+         */
+        ChangeOut: {
+            /** Path */
+            path: string;
+            /**
+             * Effect
+             * @enum {string}
+             */
+            effect: "wording" | "measured";
+            /**
+             * Text
+             * @description The change in words.
+             */
+            text: string;
         };
         /**
          * ChangePassword
@@ -2521,6 +2559,31 @@ export interface components {
              * @enum {string}
              */
             status: "open" | "used" | "expired";
+        };
+        /**
+         * JudgedEdit
+         * @description What saving an edited definition would do to the answers that are stored.
+         */
+        JudgedEdit: {
+            /** Changes */
+            changes: components["schemas"]["ChangeOut"][];
+            /**
+             * Series
+             * @description Data series that answers to the edited definition would be of.
+             */
+            series: number;
+            /** Present Series */
+            present_series: number;
+            /**
+             * Runs
+             * @description Runs of the present series, previews aside.
+             */
+            runs: number;
+            /**
+             * Begins Series
+             * @description A new data series begins, and there are runs it is kept apart from.
+             */
+            begins_series: boolean;
         };
         /**
          * LanguageChange
@@ -4770,6 +4833,7 @@ export type CalibrationResult = components['schemas']['CalibrationResult'];
 export type CalibrationState = components['schemas']['CalibrationState'];
 export type CellResult = components['schemas']['CellResult'];
 export type ChangeAccount = components['schemas']['ChangeAccount'];
+export type ChangeOut = components['schemas']['ChangeOut'];
 export type ChangePassword = components['schemas']['ChangePassword'];
 export type ChangeSettings = components['schemas']['ChangeSettings'];
 export type ChangeStatus = components['schemas']['ChangeStatus'];
@@ -4812,6 +4876,7 @@ export type Health = components['schemas']['Health'];
 export type Interaction = components['schemas']['Interaction'];
 export type InvitationOut = components['schemas']['InvitationOut'];
 export type InvitationState = components['schemas']['InvitationState'];
+export type JudgedEdit = components['schemas']['JudgedEdit'];
 export type LanguageChange = components['schemas']['LanguageChange'];
 export type Level = components['schemas']['Level'];
 export type LevelOut = components['schemas']['LevelOut'];
@@ -6832,6 +6897,50 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StudyDetail"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    judge_version: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["DefinitionText"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JudgedEdit"];
                 };
             };
             /** @description The request's content is not acceptable */

@@ -241,3 +241,44 @@ def test_only_an_untouched_draft_can_be_deleted(
     study.change(status="draft")
     assert experimenter.send("DELETE", "/studies/short").status_code == 204
     assert experimenter.get("/studies").json() == []
+
+
+def test_an_edit_is_judged_before_it_is_saved(
+    experimenter: Admin, study: StudyInDatabase, participant: Participant
+) -> None:
+    participant.agree()
+    revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+
+    def judged(toml: str) -> dict[str, Any]:
+        answer = experimenter.send("POST", "/studies/short/versions/check", {"toml": toml})
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+    same = judged(SHORT)
+    assert same == {"changes": [], "series": 1, "present_series": 1, "runs": 1, "begins_series": False}
+    worded = judged(SHORT.replace("Do you agree?", "Do you really agree?"))
+    assert [change["effect"] for change in worded["changes"]] == ["wording"]
+    assert (worded["series"], worded["begins_series"]) == (1, False)
+    shorter = SHORT.replace("[trial.scale]\n", "[trial.scale]\nmaximum = 5\n")
+    assert shorter != SHORT
+    measured = judged(shorter)
+    assert measured["changes"][0] | {"text": ""} == {
+        "path": "trial.scale.maximum",
+        "effect": "measured",
+        "text": "",
+    }
+    assert measured["changes"][0]["text"] == "trial.scale.maximum: 7 becomes 5"
+    assert (measured["series"], measured["runs"], measured["begins_series"]) == (2, 1, True)
+    assert experimenter.get("/studies/short").json()["summary"]["revision"] == revision
+    saved = experimenter.send("POST", "/studies/short/versions", {"revision": revision, "toml": shorter})
+    assert saved.json()["series"][-1]["number"] == measured["series"]
+    assert judged(SHORT)["begins_series"] is False
+
+
+def test_an_edit_that_cannot_be_used_is_refused_with_its_line(
+    experimenter: Admin, study: StudyInDatabase
+) -> None:
+    wrong = {"toml": SHORT.replace("per_cell", "per_cel")}
+    answer = experimenter.send("POST", "/studies/short/versions/check", wrong)
+    assert answer.status_code == 422
+    assert "per_cell" in answer.json()["error"]["message"]

@@ -10,6 +10,7 @@ import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
 import { DefinitionEditor, useCheck } from "./DefinitionEditor";
+import { JudgedEdit } from "./JudgedEdit";
 import { Running } from "./Running";
 
 export function SettingsTab() {
@@ -44,6 +45,7 @@ function ChangeDefinition({ detail }: { detail: Schemas["StudyDetail"] }) {
           Definition
         </Title>
         <DefinitionEditor toml={toml} onChange={setToml} />
+        {toml !== detail.toml && usable && <JudgedEdit name={name} toml={toml} />}
         <Group align="end">
           <TextInput label="What changed" value={note} onChange={(event) => setNote(event.currentTarget.value)} w={320} />
           <Button disabled={toml === detail.toml || !usable} loading={save.isPending} onClick={() => save.mutate(undefined)}>
