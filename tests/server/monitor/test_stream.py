@@ -10,6 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
+from server.cli_run import GRACE_S
 from server.clock import now
 from server.context import Services
 from server.models import AdminSession
@@ -64,7 +65,7 @@ def test_the_stream_ends_when_the_session_does(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-def test_a_server_with_open_streams_ends_within_three_seconds(
+def test_a_server_with_open_streams_ends_before_its_grace_is_over(
     client: TestClient, services: Services, settings: Settings, study: StudyInDatabase
 ) -> None:
     token, port = read_token(signed_in(client, services, "viewer")), free_port()
@@ -81,8 +82,8 @@ def test_a_server_with_open_streams_ends_within_three_seconds(
             streams.append(answer)
         told = time.monotonic()
         os.kill(process.pid, signal.SIGTERM)
-        assert process.wait(20) in (0, -signal.SIGTERM)
-        assert time.monotonic() - told < 3
+        assert process.wait(60) in (0, -signal.SIGTERM)
+        assert time.monotonic() - told < GRACE_S
     finally:
         process.kill()
     for connection, answer in zip(connections, streams, strict=True):

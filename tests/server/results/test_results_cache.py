@@ -90,8 +90,8 @@ def test_slow_counting_goes_on_behind_the_page_and_not_all_the_time() -> None:
     slow.now += 3.0 * cache.PAUSE + 1
     slow.finished.clear()
     assert slow.get() == "counted 1"
-    assert slow.finished.wait(5)
-    until = time.monotonic() + 5
+    assert slow.finished.wait(60)
+    until = time.monotonic() + 60
     while slow.get() != "counted 2":
         assert time.monotonic() < until
         time.sleep(0.01)
