@@ -94,11 +94,13 @@ def test_a_clip_that_failed_before_the_reload_is_still_shown_again(
     visit.trials(most=3)
     page.context.set_offline(False)
     visit.trials()
-    assert sorted((row["play"], row["response"]) for row in server.rows(RATED)) == [
-        *[(1, 3)],
-        *[(1, 4)] * 5,
-        *[(2, 4)],
-    ]
+    plays: dict[int, list[tuple[int, int]]] = {}
+    for row in server.rows(RATED):
+        plays.setdefault(row["trial_index"], []).append((row["play"], row["response"]))
+    # On a machine under load others may fail by themselves, and are shown again too.
+    failed, *others = sorted(plays.values())
+    assert failed == [(1, 3), (2, 4)]
+    assert [each[0] for each in others] == [(1, 4)] * 5
 
 
 @pytest.mark.parametrize("policy", ["restart", "block"])
