@@ -13,6 +13,7 @@ from experiments import design
 from experiments.assignment.trial import Shown, Trial
 from experiments.base import Declaration, Translated
 from experiments.columns import Column, View, base
+from experiments.columns.tables import rows_of
 from experiments.trials.kind import Kind, TrialDeclaration
 
 if TYPE_CHECKING:
@@ -63,10 +64,10 @@ TOY = Kind(
         columns=(
             *base.STUDY,
             *base.RUN,
-            Column("same", "boolean", "True where the two looked alike.", source="t"),
+            Column("same", "boolean", "True where the two looked alike.", source="t.payload", member="same"),
+            Column("first_cell", "text", "Cell of the clip shown first.", source="one.cell"),
         ),
-        rows="FROM trial_ratings t JOIN study_runs r ON r.id = t.study_run_id "
-        "JOIN study_versions v ON v.id = r.version_id JOIN studies s ON s.id = r.study_id",
+        rows=rows_of("same_or_not", {"first": "one", "second": "two"}),
     ),
     roles=("first", "second"),
     effects={"question": "measured", "gap_ms": "measured", "expected_seconds": "wording"},
