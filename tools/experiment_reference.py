@@ -197,7 +197,8 @@ class Examples:
 
     def __init__(self) -> None:
         self._set: dict[tuple[str, type[BaseModel]], Any] = {}
-        self._collect(parse_experiment(EXAMPLES.read_text(encoding="utf-8"), EXAMPLES.name), "")
+        for path in (EXAMPLES, *sorted(EXAMPLES.parent.glob("*.toml"))):
+            self._collect(parse_experiment(path.read_text(encoding="utf-8"), path.name), "")
         for kind in KINDS.values():
             self._collect(kind.declaration.model_validate(tomllib.loads(kind.example)["trial"]), "trial.")
 

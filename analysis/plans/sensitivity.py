@@ -93,6 +93,7 @@ def mixed_model(analysis: Analysis) -> Section:
         f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
         f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
         f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
+        f"{_without_groups(analysis)}"
     )
     if not every:
         text += (
@@ -138,8 +139,19 @@ def ordinal_model(analysis: Analysis) -> Section:
         "Ratings as ordered categories: cumulative logit with free thresholds, crossed random intercepts of "
         "participants and blinks, Laplace approximation, joint Wald tests. Without by-participant slopes its "
         "p are too small where people differ in an effect; read it for direction and shape."
+        f"{_without_groups(analysis)}"
     )
     return Section("Ordinal mixed model", text, (table,))
+
+
+def _without_groups(analysis: Analysis) -> str:
+    """What to say where participants differ by factors that these models leave out."""
+    between = analysis.anova.between.factors
+    if not between:
+        return ""
+    return (
+        f" Groups ({', '.join(between)}) are left out of this model; `analysis mixed` takes them as factors."
+    )
 
 
 def bayes_factors(analysis: Analysis) -> Section:
@@ -151,7 +163,9 @@ def bayes_factors(analysis: Analysis) -> Section:
     from pingouin import bayesfactor_ttest
 
     planned = analysis.experiment.analysis.pairs if analysis.experiment else ()
-    pairs = [p for p in analysis.pairs if p.effect in (planned or analysis.anova.factors)]
+    # The test is that of differences within participants; pairs of groups have none.
+    within = [name for name in planned or analysis.anova.factors if name in analysis.anova.factors]
+    pairs = [p for p in analysis.pairs if p.effect in within]
     rows = []
     for pair in pairs:
         bf = float("nan")

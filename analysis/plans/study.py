@@ -1,5 +1,7 @@
 """The analysis of a declared experiment: its ratings, its exclusion rules, its tests."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import pandas as pd
 
@@ -8,6 +10,7 @@ from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.plans.result import Analysis, Labels, analyse_cells
 from analysis.read.pool import Pool, pooled
 from analysis.read.study_ratings import StudyRatings
+from analysis.within.between import BetweenDesign, between_design
 from analysis.within.cell_means import cell_table
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
@@ -32,7 +35,9 @@ def analyse_study(experiment: Experiment, ratings: StudyRatings, pool: Pool = Po
     _refuse_nobody(exclusions, ratings.source, pool)
     factors = experiment.analysis.factors or experiment.factor_names
     levels = {f.name: [level.name for level in f.levels] for f in experiment.factors}
-    cells = cell_table(exclusions.rows, "participant", "response", factors, levels)
+    within = [name for name in factors if not experiment.factor(name).between]
+    cells = cell_table(exclusions.rows, "participant", "response", within, levels)
+    between = [name for name in factors if name not in within]
     return analyse_cells(
         cells,
         name=experiment.name,
@@ -42,9 +47,31 @@ def analyse_study(experiment: Experiment, ratings: StudyRatings, pool: Pool = Po
         synthetic=checked.synthetic,
         decisions=(*checked.decisions, *repeats),
         labels=labels_of(experiment),
+        between=groups_of(exclusions.rows, cells.participants, between, levels) if between else None,
         experiment=experiment,
         exclusions=exclusions,
     )
+
+
+def groups_of(
+    rows: pd.DataFrame,
+    participants: Sequence[str],
+    factors: Sequence[str],
+    levels: Mapping[str, Sequence[str]],
+) -> BetweenDesign:
+    """The groups of these participants; InputError where one has rows of two."""
+    codes = np.zeros((len(participants), len(factors)), np.int64)
+    for column, name in enumerate(factors):
+        level_of: dict[str, str] = {}
+        pairs = rows[["participant", name]].astype(str).drop_duplicates()
+        for who, level in pairs.itertuples(index=False):
+            if level_of.setdefault(who, level) != level:
+                raise InputError(
+                    f"participant {who} has ratings of '{level_of[who]}' and '{level}', but '{name}' is "
+                    "declared between participants"
+                )
+        codes[:, column] = [levels[name].index(level_of[who]) for who in participants]
+    return between_design(factors, [levels[name] for name in factors], codes)
 
 
 def labels_of(experiment: Experiment) -> Labels:

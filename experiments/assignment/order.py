@@ -6,6 +6,8 @@ from itertools import cycle, islice, permutations
 from typing import TYPE_CHECKING, Literal
 
 from experiments import design
+from experiments.assignment.groups import Place, cells_of, place_of
+from experiments.assignment.shares import share
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec, ClipSpec
 
@@ -29,9 +31,11 @@ def single_clips(
     asked: draws the answer that an attention check asks for.
     """
     rng = random.Random(seed)
-    trials = _practice(experiment, rng)
-    for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
-        clips = list(block.clips)
+    place = place_of(experiment, slot)
+    mine = share(experiment, place)
+    trials = _practice(experiment, place, rng)
+    for number, block in enumerate(ordered_blocks(experiment, rng, place.number), start=1):
+        clips = [clip for clip in block.clips if clip in mine]
         if experiment.blocks.trial_order == "random":
             rng.shuffle(clips)
         main = [_of_one("main", number, block.label, clip) for clip in clips]
@@ -77,9 +81,9 @@ def _latin_square(count: int) -> list[tuple[int, ...]]:
     return rows if count % 2 == 0 else rows + [tuple(reversed(row)) for row in rows]
 
 
-def _practice(experiment: "Experiment", rng: random.Random) -> list[Trial]:
+def _practice(experiment: "Experiment", place: Place, rng: random.Random) -> list[Trial]:
     """Clips from as many different cells as there are practice trials, exemplars at random."""
-    cells = design.cells(experiment)
+    cells = cells_of(experiment, place)
     rng.shuffle(cells)
     drawn = islice(cycle(cells), experiment.practice.trials)
     clips = [ClipSpec(cell, rng.randint(1, experiment.exemplars.per_cell)) for cell in drawn]

@@ -1,6 +1,7 @@
 """What a study is: one module a table of the TOML, `forms` with a module a type of field."""
 
 from experiments.definition.analysis_plan import AnalysisPlan
+from experiments.definition.assignment import Assignment
 from experiments.definition.blocks import Blocks, Practice
 from experiments.definition.display import Display
 from experiments.definition.experiment import Experiment
@@ -10,6 +11,7 @@ from experiments.definition.texts import Texts
 
 __all__ = [
     "AnalysisPlan",
+    "Assignment",
     "Blocks",
     "Display",
     "Exemplars",

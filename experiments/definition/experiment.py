@@ -4,8 +4,10 @@ from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
+from experiments.assignment import shares
 from experiments.base import Declaration, Language, Name
 from experiments.definition.analysis_plan import AnalysisPlan
+from experiments.definition.assignment import Assignment
 from experiments.definition.blocks import Blocks, Practice
 from experiments.definition.display import Display
 from experiments.definition.factors import Exemplars, Factor
@@ -22,7 +24,7 @@ from experiments.rules import (
     ScreenFormAnswer,
     ScreeningRule,
 )
-from experiments.trials import reserved_names
+from experiments.trials import KINDS, reserved_names
 from experiments.trials.union import AnyTrial
 
 STORED = "stored"
@@ -50,6 +52,8 @@ class Experiment(Declaration):
     """How every clip is rendered, unless a level changes it."""
     exemplars: Exemplars
     """How many clips a cell has."""
+    assignment: Assignment = Assignment()
+    """Who sees which clips."""
     blocks: Blocks = Blocks()
     """Blocks and their order."""
     practice: Practice = Practice()
@@ -101,6 +105,17 @@ class Experiment(Declaration):
         for language in self.languages:
             if language not in self.texts:
                 raise ValueError(f"texts.{language} is missing: languages lists '{language}'")
+        return self
+
+    @model_validator(mode="after")
+    def _assignment_fits(self) -> Self:
+        if not KINDS[self.trial.kind].shares_clips:
+            between = next((factor.name for factor in self.factors if factor.between), None)
+            if between or self.assignment != Assignment():
+                key = f"factors: '{between}' is between participants; " if between else "assignment: "
+                raise ValueError(f"{key}trials of the kind {self.trial.kind} are dealt by their own design")
+        if fault := shares.fault(self):
+            raise ValueError(fault)
         return self
 
     @model_validator(mode="after")

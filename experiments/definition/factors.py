@@ -27,6 +27,8 @@ class Factor(Declaration):
     """Name of the factor's column in the ratings CSV and in the analysis; no other column may have it."""
     label: str
     """What tables, figures and reports call the factor."""
+    between: bool = False
+    """True shows each participant one level: groups take turns, and the analysis compares participants."""
     levels: Annotated[tuple[Level, ...], Field(min_length=1)]
     """In the order of tables and contrasts. In the list of cells the last factor's change fastest."""
 

@@ -20,11 +20,13 @@ EFFECTS: Mapping[str, Effect] = {
     # Names of levels make the cells; labels stand in tables and figures only.
     "factors.name": "measured",
     "factors.label": "wording",
+    "factors.between": "measured",
     "factors.levels.name": "measured",
     "factors.levels.label": "wording",
     "factors.levels.render": "measured",
     "render": "measured",
     "exemplars": "measured",
+    "assignment": "measured",
     "blocks.split_by": "measured",
     "blocks.repeats": "measured",
     "blocks.order": "measured",

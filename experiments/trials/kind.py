@@ -51,6 +51,7 @@ class Kind:
     assign: the trials of one participant in order, by declaration, seed and slot.
     block_size: trials of one participant in a block, attention checks not counted.
     example: a [trial] as TOML, for the reference; it is what a newcomer copies.
+    shares_clips: whether it follows [assignment] and factors between participants; else they are refused.
     plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
     check_response: the number that an answer, as stored, is to an attention check, which asks for one.
     """
@@ -67,6 +68,7 @@ class Kind:
     example: str
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda payload: payload.get("response")
+    shares_clips: bool = False
 
     @property
     def name(self) -> str:

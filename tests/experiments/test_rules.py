@@ -32,8 +32,9 @@ PYDANTIC = "from typing import Any\nclass BaseModel: ...\ndef __getattr__(name: 
     ],
 )
 def test_a_rule_without_its_finder_fails_type_checking(tmp_path: Path, union: str, user: str) -> None:
-    shutil.copytree(REPOSITORY / "experiments" / "rules", tmp_path / "experiments" / "rules")
-    for needed in ("base", "errors", "definition", "__init__"):
+    for folder in ("rules", "definition"):
+        shutil.copytree(REPOSITORY / "experiments" / folder, tmp_path / "experiments" / folder)
+    for needed in ("base", "errors", "__init__"):
         shutil.copy(REPOSITORY / "experiments" / f"{needed}.py", tmp_path / "experiments")
     (tmp_path / "mypy.ini").write_text(SETTINGS)
     (tmp_path / "pydantic.pyi").write_text(PYDANTIC)

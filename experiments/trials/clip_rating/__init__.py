@@ -5,7 +5,7 @@ from experiments.trials.clip_rating.answer import RatingAnswer
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import ClipRating
 from experiments.trials.clip_rating.page import ShownClipRating, shown
-from experiments.trials.clip_rating.plan import assign, block_size
+from experiments.trials.clip_rating.plan import assign, block_size, plan
 from experiments.trials.kind import Kind
 
 EFFECTS: dict[str, Effect] = {
@@ -44,5 +44,7 @@ CLIP_RATING = Kind(
     shown=shown,
     assign=assign,
     block_size=block_size,
+    plan=plan,
+    shares_clips=True,
     example=EXAMPLE,
 )

@@ -3,7 +3,9 @@
 import random
 from typing import TYPE_CHECKING
 
+from experiments.assignment.groups import place_of
 from experiments.assignment.order import single_clips
+from experiments.assignment.shares import lines, share
 from experiments.assignment.trial import Trial
 from experiments.design import BlockSpec
 from experiments.trials.clip_rating.declaration import clip_rating_of
@@ -22,7 +24,13 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
     return single_clips(experiment, seed, slot, asked)
 
 
+def plan(experiment: "Experiment") -> tuple[str, ...]:
+    """Groups, and how often each clip is seen."""
+    return lines(experiment)
+
+
 def block_size(experiment: "Experiment", block: BlockSpec) -> int:
-    """One trial a clip."""
-    del experiment
-    return len(block.clips)
+    """One trial a clip of the participant's share, the largest where they differ."""
+    laps = len(experiment.assignment.lists) or 1
+    places = (place_of(experiment, slot) for slot in range(laps))
+    return max(len(share(experiment, place).intersection(block.clips)) for place in places)

@@ -1421,6 +1421,26 @@ export interface components {
             table: "two_level_factors" | "pairs_and_interactions" | "one_factor";
         };
         /**
+         * Assignment
+         * @description Which clips of their cells participants see; without a key everybody sees every clip.
+         *
+         *     Places are dealt in turn: one that is given up, or screened out, goes to the next participant.
+         */
+        Assignment: {
+            /**
+             * Clips Per Cell
+             * @description Clips of each cell that a participant sees, with the same exemplar numbers in all cells, so that cells
+             *     are compared over the same blinks. Over participants each clip is seen equally often, give or take one.
+             */
+            clips_per_cell: number | null;
+            /**
+             * Lists
+             * @description Lists of clips, dealt to participants in turn. A clip is written as cell and exemplar: `"SL/30/1"`.
+             * @default []
+             */
+            lists: string[][];
+        };
+        /**
          * AttentionChecks
          * @description Instructed ratings put between trials: 'please answer 2 this time'.
          */
@@ -2272,6 +2292,13 @@ export interface components {
             /** @description How many clips a cell has. */
             exemplars: components["schemas"]["Exemplars"];
             /**
+             * @description Who sees which clips.
+             * @default {
+             *       "lists": []
+             *     }
+             */
+            assignment: components["schemas"]["Assignment"];
+            /**
              * @description Blocks and their order.
              * @default {
              *       "repeats": 1,
@@ -2394,6 +2421,12 @@ export interface components {
              * @description What tables, figures and reports call the factor.
              */
             label: string;
+            /**
+             * Between
+             * @description True shows each participant one level: groups take turns, and the analysis compares participants.
+             * @default false
+             */
+            between: boolean;
             /**
              * Levels
              * @description In the order of tables and contrasts. In the list of cells the last factor's change fastest.
@@ -4822,6 +4855,7 @@ export interface components {
 }
 export type AccountOut = components['schemas']['AccountOut'];
 export type AnalysisPlan = components['schemas']['AnalysisPlan'];
+export type Assignment = components['schemas']['Assignment'];
 export type AttentionChecks = components['schemas']['AttentionChecks'];
 export type AuditOut = components['schemas']['AuditOut'];
 export type BlinkLibrary = components['schemas']['BlinkLibrary'];

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from analysis.errors import NoRatingsError
 from analysis.plans.study import analyse_study
@@ -11,7 +12,7 @@ from analysis.report.json_output import as_data
 from analysis.report.left_out import left_out
 from experiments import rules
 from experiments.errors import InputError
-from experiments.load import load_experiment
+from experiments.load import load_experiment, locate, parse_experiment
 from tests.analysis.ratings_file import change, rows_of, simulate, write_export
 from tests.analysis.study_database import make_database
 
@@ -24,7 +25,8 @@ def rows() -> list[dict]:
 
 
 def analyse(path, rows, experiment=EXP3, pool=Pool()):
-    return analyse_study(experiment, load_csv(write_export(path / "r.csv", EXP3, rows), experiment), pool)
+    written = write_export(path / "r.csv", experiment, rows)
+    return analyse_study(experiment, load_csv(written, experiment), pool)
 
 
 def with_rules(*chosen):
@@ -190,3 +192,37 @@ def test_a_file_that_is_no_database_is_refused(tmp_path) -> None:
     (tmp_path / "f.sqlite").write_text("not a database, but a rather long text that SQLite cannot read")
     with pytest.raises(InputError, match=r"cannot read f\.sqlite"):
         load_database(f"sqlite:///{tmp_path}/f.sqlite", EXP3)
+
+
+def two_groups(tmp_path, rows):
+    text = locate("exp1").read_text(encoding="utf-8").replace('split_by = "character"\n', "")
+    text = text.replace('name = "character"\nlabel', 'name = "character"\nbetween = true\nlabel')
+    return analyse(tmp_path, rows, parse_experiment(text))
+
+
+def exp1_rows() -> list[dict]:
+    experiment = load_experiment("exp1")
+    return rows_of(experiment, simulate(experiment, 8, trials=1))
+
+
+def test_a_factor_between_participants_is_tested_between_them(tmp_path) -> None:
+    group = ("photorealistic", "cartoon")
+    kept = [row for row in exp1_rows() if row["character"] == group[int(str(row["participant"])[1:]) % 2]]
+    result = two_groups(tmp_path, kept)
+    assert (result.anova.between.factors, result.anova.n_participants) == (("character",), 8)
+    means = {
+        (row["character"], row["participant"]): np.mean(
+            [r["response"] for r in kept if r["participant"] == row["participant"]]
+        )
+        for row in kept
+    }
+    sides = [[mean for (character, _), mean in means.items() if character == name] for name in group]
+    t, p = stats.ttest_ind(*sides)
+    effect = result.anova.effect("character")
+    assert effect.univariate.f_value == pytest.approx(t**2)
+    assert effect.univariate.p_value == pytest.approx(p)
+
+
+def test_a_participant_of_two_groups_is_refused_by_name(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"participant P00 has ratings of .* declared between participants"):
+        two_groups(tmp_path, exp1_rows())

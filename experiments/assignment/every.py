@@ -1,0 +1,10 @@
+"""Every clip for everybody."""
+
+from collections.abc import Sequence
+
+from experiments.design import ClipSpec
+
+
+def every_clip(clips: Sequence[ClipSpec]) -> frozenset[ClipSpec]:
+    """All of `clips`, those of the participant's group."""
+    return frozenset(clips)

@@ -1,0 +1,39 @@
+"""Groups of participants: one for each combination of the levels of the factors between participants."""
+
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+from experiments import design
+from experiments.design import ClipSpec
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
+
+
+class Place(NamedTuple):
+    """Where a participant stands: the levels of their group, and their place in it, from 0."""
+
+    levels: tuple[tuple[str, str], ...]
+    number: int
+
+
+def groups(experiment: "Experiment") -> list[tuple[tuple[str, str], ...]]:
+    """The levels of each group, last factor fastest; one group without levels where no factor is between."""
+    between = [factor for factor in experiment.factors if factor.between]
+    return list(product(*([(factor.name, level.name) for level in factor.levels] for factor in between)))
+
+
+def place_of(experiment: "Experiment", slot: int) -> Place:
+    """The place of a slot of the study: groups take turns, so that their sizes differ by at most one."""
+    every = groups(experiment)
+    return Place(every[slot % len(every)], slot // len(every))
+
+
+def cells_of(experiment: "Experiment", place: Place) -> list[tuple[tuple[str, str], ...]]:
+    """The cells that the group sees, in the order of the design."""
+    return [cell for cell in design.cells(experiment) if set(place.levels) <= set(cell)]
+
+
+def clips_of(experiment: "Experiment", place: Place) -> list[ClipSpec]:
+    """The clips of those cells, in the order of the design."""
+    return [clip for clip in design.clips(experiment) if set(place.levels) <= set(clip.levels)]
