@@ -1,0 +1,40 @@
+"""What a real page sends with its answers satisfies a server that refuses what cannot have been."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.browser.server_process import ServerProcess
+from tests.browser.studies import STUDY
+from tests.browser.visit import Visit
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:  # noqa: ARG001 - the page is built first
+    """A server that refuses answers without evidence."""
+    process = ServerProcess(tmp_path / "data", evidence="refuse")
+    yield process
+    process.stop()
+
+
+@pytest.mark.slow
+def test_every_answer_of_the_page_brings_its_evidence(
+    strict: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = strict.add_study(tmp_path / "clips", STUDY)
+    strict.start()
+    visit = Visit(page, strict.address).open(study.link_token)
+    visit.begin().measure().instructions().practice()
+    assert visit.trials() == 6
+    assert visit.problems == []
+    answers = strict.rows("SELECT * FROM trial_ratings")
+    evidence = strict.rows("SELECT * FROM answer_evidence")
+    assert len(evidence) == len(answers) > 6
+    with_clips = [row for row in evidence if row["clip_ms"] > 0]
+    assert [row["digest_right"] for row in with_clips] == [1] * len(with_clips)
+    assert all('"presses"' in row["interaction"] for row in evidence)
+    assert strict.rows("SELECT DISTINCT evidence FROM study_runs") == [{"evidence": "asked"}]
