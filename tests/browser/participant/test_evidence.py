@@ -14,7 +14,7 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
-def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:  # noqa: ARG001 - the page is built first
+def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
     """A server that refuses answers without evidence."""
     process = ServerProcess(tmp_path / "data", evidence="refuse")
     yield process
