@@ -145,6 +145,16 @@ def test_a_misspelt_key_is_shown_at_its_line(dashboard: Dashboard) -> None:
     assert page.evaluate("window.getSelection().toString()") == 'titel = "y"'
 
 
+def test_an_edit_that_changes_what_is_measured_is_said_before_it_is_saved(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/settings")
+    editor = page.get_by_label("Definition", exact=True)
+    editor.fill(editor.input_value().replace("[trial.scale]", "[trial.scale]\nmaximum = 5"))
+    expect(page.get_by_text("Saving begins a new data series")).to_be_visible()
+    expect(page.get_by_text("trial.scale.maximum: 7 becomes 5")).to_be_visible()
+    page.get_by_role("button", name="Undo changes").click()
+    expect(page.get_by_text("Saving begins a new data series")).to_be_hidden()
+
+
 def test_texts_are_edited_as_a_new_version(dashboard: Dashboard) -> None:
     page = dashboard.open("/studies/short/texts")
     page.get_by_label("Debrief (Markdown)").fill("Many thanks.")
