@@ -1,6 +1,7 @@
 """The results of a study as data arrive."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 from itertools import combinations
 
 from sqlalchemy import select
@@ -33,7 +34,7 @@ def results(session: Session, study: Study, version: StudyVersion, origin: str) 
         ratings=sum(clip.ratings for clip in clips),
         scale_minimum=scale.minimum,
         scale_maximum=scale.maximum,
-        margins=margins(means, factors),
+        margins=margins(means, factors, [factor.name for factor in definition.factors if factor.between]),
         cells=_cells(clips),
         clips=clips,
         response_times=[
@@ -43,7 +44,7 @@ def results(session: Session, study: Study, version: StudyVersion, origin: str) 
     )
 
 
-def margins(means: summary.CellMeans, factors: list[str]) -> list[Margin]:
+def margins(means: summary.CellMeans, factors: list[str], between: Sequence[str] = ()) -> list[Margin]:
     """Every factor, every pair of factors, and the cells where there are more than two factors."""
     wanted = [list(chosen) for size in (1, 2) for chosen in combinations(factors, size)]
     if len(factors) > 2:
@@ -51,7 +52,7 @@ def margins(means: summary.CellMeans, factors: list[str]) -> list[Margin]:
     return [
         Margin(
             factors=keep,
-            means=[Mean.model_validate(vars(one)) for one in summary.margin(means, factors, keep)],
+            means=[Mean.model_validate(vars(one)) for one in summary.margin(means, factors, keep, between)],
         )
         for keep in wanted
     ]

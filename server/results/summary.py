@@ -22,11 +22,23 @@ CellMeans = Mapping[str, Mapping[tuple[str, ...], float]]
 """Participant -> (levels in factor order) -> mean rating."""
 
 
-def margin(cell_means: CellMeans, factors: Sequence[str], keep: Sequence[str]) -> list[MarginMean]:
+def margin(
+    cell_means: CellMeans, factors: Sequence[str], keep: Sequence[str], between: Sequence[str] = ()
+) -> list[MarginMean]:
     """Marginal means of the factors in `keep`, over the participants who have every one of those levels.
 
-    Cells of a participant are averaged without weights. Error bars: `within_participant_errors`.
+    Cells of a participant are averaged without weights. Error bars: `within_participant_errors`, each
+    group for itself where `keep` has factors of `between`, of which a participant has one level.
     """
+    fixed = [factors.index(name) for name in keep if name in between]
+    groups: dict[tuple[str, ...], dict[str, Mapping[tuple[str, ...], float]]] = {}
+    for who, cells in cell_means.items():
+        for group in dict.fromkeys(tuple(levels[place] for place in fixed) for levels in cells):
+            groups.setdefault(group, {})[who] = cells
+    return [mean for people in groups.values() for mean in _of_group(people, factors, keep)]
+
+
+def _of_group(cell_means: CellMeans, factors: Sequence[str], keep: Sequence[str]) -> list[MarginMean]:
     places = [factors.index(name) for name in keep]
     by_participant = {who: _collapse(cells, places) for who, cells in cell_means.items()}
     conditions = list(dict.fromkeys(key for row in by_participant.values() for key in row))

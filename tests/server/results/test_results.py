@@ -89,3 +89,23 @@ def test_a_constant_per_participant_changes_no_error_bar(offsets: list[float], d
 
 def test_a_histogram_keeps_every_value() -> None:
     assert histogram([0, 5, 10, 99, 1000], [0, 10, 20]) == [2, 1, 2]
+
+
+def test_groups_of_participants_have_means_and_errors_of_their_own() -> None:
+    rows = {
+        "a": {("near", "x"): 2.0, ("near", "y"): 4.0},
+        "b": {("near", "x"): 4.0, ("near", "y"): 6.0},
+        "c": {("far", "x"): 1.0, ("far", "y"): 1.0},
+    }
+    near, far = margin(rows, ["view", "form"], ["view"], ["view"])
+    assert (near.levels, near.mean, near.participants) == ({"view": "near"}, 4.0, 2)
+    assert near.se_within == pytest.approx(1.0)
+    assert (far.levels, far.mean, far.participants, far.se_within) == ({"view": "far"}, 1.0, 1, None)
+    both = margin(rows, ["view", "form"], ["view", "form"], ["view"])
+    assert [(one.levels["view"], one.mean) for one in both] == [
+        ("near", 3),
+        ("near", 5),
+        ("far", 1),
+        ("far", 1),
+    ]
+    assert [one.mean for one in margin(rows, ["view", "form"], ["form"], ["view"])] == [7 / 3, 11 / 3]
