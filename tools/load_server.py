@@ -47,6 +47,8 @@ class LoadServer:
             "PALPEBRA_DATA_FOLDER": str(self.settings.data_folder),
             "DATABASE_URL": self.settings.database_url,
             "PALPEBRA_RUN_STARTS_PER_MINUTE": "1000000",
+            # Raters here answer as fast as they are asked, and fetch clips only for their load.
+            "PALPEBRA_EVIDENCE": "record",
             "PALPEBRA_LOG_REQUESTS": "none",
             "PALPEBRA_LOG_FORMAT": "text",
         }
