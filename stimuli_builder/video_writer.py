@@ -8,7 +8,7 @@ from typing import Any, Self
 import av
 
 from experiments.errors import InputError
-from stimuli_builder.files import remove_quietly, temporary_beside
+from experiments.files import remove_quietly, temporary_beside
 from stimuli_builder.video import Picture
 from stimuli_builder.video_clock import reason
 

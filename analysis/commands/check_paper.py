@@ -43,10 +43,11 @@ def check_paper(
 
 
 def _check_document(file: Path, json: Path | None) -> None:
-    from analysis.files import json_text, whole_file
     from analysis.paper.document import read_document
     from analysis.paper.statistics import check_text
     from analysis.report.formats import wrap
+    from experiments.files import whole_file
+    from experiments.json import json_text
 
     result = check_text(read_document(file))
     typer.echo(
@@ -66,10 +67,11 @@ def _check_document(file: Path, json: Path | None) -> None:
 
 
 def _check_figures(figures: Path, json: Path | None) -> None:
-    from analysis.files import json_text, whole_file
     from analysis.paper import check as checks
     from analysis.paper.printed import load_figures
     from analysis.report.formats import wrap
+    from experiments.files import whole_file
+    from experiments.json import json_text
 
     paper = load_figures(figures)
     findings = checks.check_paper(paper)

@@ -28,7 +28,8 @@ def show_tables(*tables: "Table") -> None:
 
 def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool) -> None:
     """Write numbers to a JSON file, whole or not at all; nothing where no path is given."""
-    from analysis.files import json_text, whole_file
+    from experiments.files import whole_file
+    from experiments.json import json_text
 
     if path is None:
         return

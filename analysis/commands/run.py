@@ -258,8 +258,8 @@ def _working(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def _save_json(analysis: "Analysis", path: Path | None) -> None:
-    from analysis.files import whole_file
     from analysis.report.json_output import as_json
+    from experiments.files import whole_file
 
     if path is None:
         return

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from analysis.files import whole_file
 from analysis.power.simulate import PowerResult
 from analysis.report.figures import COLOURS, MARKERS
 from experiments.errors import InputError
+from experiments.files import whole_file
 
 FORMATS = (".png", ".svg", ".pdf")
 _STYLE: dict[Any, Any] = {

@@ -3,10 +3,10 @@
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from analysis.files import json_text
 from analysis.plans.result import Analysis
 from analysis.within.effect_tests import Effect
 from analysis.within.homogeneity import levene_tests
+from experiments.json import json_text
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from analysis.files import whole_file
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
 from analysis.plans.result import Analysis
@@ -16,6 +15,7 @@ from analysis.report.left_out import left_out
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables
 from experiments.errors import InputError
+from experiments.files import whole_file
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.files import whole_file
 from analysis.synthetic.feasible import GivenWay, make_feasible
 from analysis.synthetic.moves import value_of
 from analysis.synthetic.population import Population, draw, make_population
@@ -20,6 +19,7 @@ from analysis.synthetic.trials import rating_rows
 from analysis.synthetic.wishes import with_wishes
 from experiments.definition import Experiment
 from experiments.errors import InputError
+from experiments.files import whole_file
 from experiments.load import load_experiment
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import clip_rating_of

@@ -41,8 +41,8 @@ def actor(
 
       stimuli actor --seconds 120 --out actor.mp4 --labels labels.json --label-noise 1
     """
+    from experiments.files import check_targets
     from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
-    from stimuli_builder.files import check_targets
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.video_writer import check_video_name
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from experiments.files import whole_text
 from stimuli_builder.actor import skin
 from stimuli_builder.actor.face import (
     EYE_CENTRES,
@@ -22,7 +23,6 @@ from stimuli_builder.actor.face import (
 )
 from stimuli_builder.actor.physiology import Course, course, plan_blinks
 from stimuli_builder.actor.renderer import draw_eye
-from stimuli_builder.files import whole_text
 from stimuli_builder.video import Picture
 from stimuli_builder.video_writer import VideoWriter
 

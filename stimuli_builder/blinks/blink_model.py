@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.errors import InputError
+from experiments.files import whole_text
 from stimuli_builder.blinks.profile import (
     PROFILE_FPS,
     Array,
@@ -18,7 +19,6 @@ from stimuli_builder.blinks.profile import (
     resample_phases,
     with_minimum_at_peak,
 )
-from stimuli_builder.files import whole_text
 
 SHIPPED_MODEL = Path(__file__).parent / "library" / "model.json"
 MODEL_FORMAT = "palpebra-blink-model-1"

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.errors import InputError, did_you_mean
+from experiments.files import temporary_beside, whole_text
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
 from stimuli_builder.blinks.export.curve import make_curve
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
@@ -19,7 +20,6 @@ from stimuli_builder.blinks.plots import check_figure_name, model_figure, profil
 from stimuli_builder.blinks.profile import BlinkProfile, resample, to_full_closure
 from stimuli_builder.blinks.profile_table import read_profile_table, write_profile_table
 from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, textbook_profile
-from stimuli_builder.files import temporary_beside, whole_text
 
 EYES = ("auto", "each", "both")
 

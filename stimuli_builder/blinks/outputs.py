@@ -8,12 +8,12 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.errors import InputError
+from experiments.files import whole_text
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
 from stimuli_builder.blinks.extract import EyeBlinks, rate_doubt
 from stimuli_builder.blinks.recorded_curve import recorded_curve
 from stimuli_builder.blinks.series import read_table
 from stimuli_builder.blinks.units import scale_of, write_lids
-from stimuli_builder.files import whole_text
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 
 from experiments.errors import InputError, did_you_mean
+from experiments.files import whole_file
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.profile import BlinkProfile, phase_spline
 from stimuli_builder.blinks.tables import AMPLITUDE_BINS, DURATION_BIN_MS, aligned
-from stimuli_builder.files import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 
 from experiments.errors import InputError, did_you_mean
+from experiments.files import whole_file
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array, BlinkProfile, Eye
 from stimuli_builder.blinks.series import read_table
-from stimuli_builder.files import whole_file
 
 EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "both": "both", "": None}
 TABLE_COLUMNS = {

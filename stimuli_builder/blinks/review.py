@@ -10,9 +10,9 @@ from typing import Literal
 import pandas as pd
 
 from experiments.errors import InputError, did_you_mean
+from experiments.files import whole_file
 from stimuli_builder.blinks.measure import MeasuredBlink
 from stimuli_builder.blinks.series import read_table, scaled_frames
-from stimuli_builder.files import whole_file
 
 Decision = Literal["accept", "reject"]
 MATCH_FRAMES = 10

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.errors import InputError
+from experiments.files import check_targets
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.extract import (
     EyeBlinks,
@@ -38,7 +39,6 @@ from stimuli_builder.blinks.review import (
 )
 from stimuli_builder.blinks.series import read_series
 from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
-from stimuli_builder.files import check_targets
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from experiments.files import whole_file, whole_text
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.measure import MeasuredBlink
 from stimuli_builder.blinks.profile import Array, BlinkProfile
 from stimuli_builder.blinks.review import Review
-from stimuli_builder.files import whole_file, whole_text
 
 BLINK_COLUMNS = {
     "number": "number of the blink in its column, from 1",

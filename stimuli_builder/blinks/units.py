@@ -10,11 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.errors import InputError, did_you_mean
+from experiments.files import whole_file
 from stimuli_builder.blinks.events.levels import local_opening
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM
-from stimuli_builder.files import whole_file
 
 INTER_OCULAR_MM = 60.0
 """Between the middles of both eyes' openings; people differ by some 6% (sd)."""

@@ -12,9 +12,9 @@ from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from experiments.files import whole_file, whole_text
 from experiments.manifest import Clip, Manifest
 from stimuli_builder.clips.motion_blur import samples_per_frame
-from stimuli_builder.files import whole_file, whole_text
 
 Rgb = NDArray[np.uint8]
 THUMBNAIL_PX = (200, 75)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from experiments.errors import InputError, did_you_mean
+from experiments.files import whole_file
 from experiments.rendering import PROFILES, RenderSettings
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import resample
@@ -13,7 +14,6 @@ from stimuli_builder.clips.design_clips import Options, check_look, look_of
 from stimuli_builder.clips.exemplars import Exemplar, exemplar
 from stimuli_builder.clips.jobs import ClipJob, render
 from stimuli_builder.clips.motion_blur import samples_per_frame
-from stimuli_builder.files import whole_file
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ def train(
       stimuli train eye.mp4 --labels eye.labels.json --one-eye --folds 8
     """
     from experiments.errors import InputError
-    from stimuli_builder.files import check_targets
+    from experiments.files import check_targets
     from stimuli_builder.tracking.cli_track import report_modes
     from stimuli_builder.tracking.learn import learn, open_video
     from stimuli_builder.tracking.model import save_model

@@ -56,7 +56,7 @@ def label(
 
       stimuli label eye.mp4 --one-eye --frames 25 --out eye.labels.json
     """
-    from stimuli_builder.files import check_targets
+    from experiments.files import check_targets
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.tracking.labelfree import proposed_labels, survey
     from stimuli_builder.tracking.learn import open_video

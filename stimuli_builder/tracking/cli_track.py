@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from experiments.errors import InputError
+from experiments.files import check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
-from stimuli_builder.files import check_targets, temporary_beside
 from stimuli_builder.progress import frame_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson, survey
 from stimuli_builder.tracking.labels import Labels, load_labels

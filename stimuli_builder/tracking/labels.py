@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.files import whole_text
+from experiments.files import whole_text
 from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, default_markers, eye_axis
 
 FEWEST_FRAMES = 3

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.files import whole_file
+from experiments.files import whole_file
 from stimuli_builder.tracking.kernels import sample
 from stimuli_builder.tracking.mesh import BaseMesh, build_mesh, mesh_from
 from stimuli_builder.tracking.picture import reduced, reduced_points

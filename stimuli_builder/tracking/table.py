@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.files import whole_text
+from experiments.files import whole_text
 from stimuli_builder.tracking.shapes import EYE_POINTS
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ import sys
 
 import numpy as np
 
+from experiments.files import whole_text
 from stimuli_builder.blinks.events.template import FORMS
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import Array, BlinkProfile
-from stimuli_builder.files import whole_text
 
 NODES = 41
 TOP = 0.97

@@ -11,6 +11,7 @@ import sys
 import numpy as np
 from sklearn.neural_network import MLPClassifier
 
+from experiments.files import whole_text
 from stimuli_builder.blinks.events.candidates import (
     FEATURES,
     Candidate,
@@ -22,7 +23,6 @@ from stimuli_builder.blinks.events.generated import KINDS, Generated, Motion, ge
 from stimuli_builder.blinks.events.levels import Depth, depth_of
 from stimuli_builder.blinks.events.network import WEIGHTS
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.files import whole_text
 
 SEED = 20261121
 CLASSES = (*KINDS, "nothing")

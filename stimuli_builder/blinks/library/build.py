@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.errors import InputError
+from experiments.files import whole_file
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.extract import all_profiles, blinks_of
 from stimuli_builder.blinks.label_options import LabelOptions, preset
@@ -14,7 +15,6 @@ from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, Recording
 from stimuli_builder.blinks.profile import BlinkProfile
 from stimuli_builder.blinks.profile_table import write_profile_table
 from stimuli_builder.blinks.series import read_series
-from stimuli_builder.files import whole_file
 
 PROFILE_COLUMNS = (
     "profile_id",
