@@ -200,7 +200,8 @@ class Examples:
         for path in (EXAMPLES, *sorted(EXAMPLES.parent.glob("*.toml"))):
             self._collect(parse_experiment(path.read_text(encoding="utf-8"), path.name), "")
         for kind in KINDS.values():
-            self._collect(kind.declaration.model_validate(tomllib.loads(kind.example)["trial"]), "trial.")
+            for text in (kind.example, *kind.further_examples):
+                self._collect(kind.declaration.model_validate(tomllib.loads(text)["trial"]), "trial.")
 
     def _collect(self, value: Any, path: str) -> None:
         if isinstance(value, BaseModel):

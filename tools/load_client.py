@@ -47,7 +47,7 @@ class LoadRater:
         self.person = Person(None, Rater(number, 1, {}))  # type: ignore[arg-type]
         self.rng = random.Random(number)
         self.trials: list[dict[str, Any]] = []
-        self.scale: dict[str, Any] = {}
+        self.declared: dict[str, Any] = {}
 
     async def begin(self) -> None:
         """Start the run; counted as failed where it is not."""
@@ -68,7 +68,7 @@ class LoadRater:
         if self.connection.token:
             await self.insist("PUT", "/api/run/consent", {"agreed": True})
             state = json.loads((await self.insist("GET", "/api/run"))[1])
-            self.scale = state["trial"]["scale"]
+            self.declared = state["trial"]
             # Thousands of raters are in this process: what they do not need is let go.
             self.trials = [{name: trial[name] for name in NEEDED} for trial in state["trials"]]
 
@@ -89,7 +89,7 @@ class LoadRater:
             await self.insist("GET", f"/clips/{trial['clip_sha256']}.mp4", keep=False)
             self.tally.clip_ms.append(1000 * (time.perf_counter() - began))
         rating_id = str(uuid.uuid4())
-        body = self.person.rating(trial, self.scale)
+        body = self.person.rating(trial, self.declared)
         began = time.perf_counter()
         status, _ = await self.insist("PUT", f"/api/run/ratings/{rating_id}", body, keep=False)
         self.tally.rating_at.append(began)

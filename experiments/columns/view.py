@@ -66,11 +66,13 @@ class View:
         What is missing stays None, which a CSV writer leaves empty.
         """
         place = self._levels_at
+        if place is None:
+            return tuple(row)
         return (*row[:place], *_level_cells(row[place], factors), *row[place + 1 :])
 
     @cached_property
-    def _levels_at(self) -> int:
-        return self.names.index(LEVELS.name)
+    def _levels_at(self) -> int | None:
+        return self.names.index(LEVELS.name) if LEVELS.name in self.names else None
 
     def factors_in_header(self, header: Iterable[str]) -> list[str]:
         """The factor columns of a CSV export: every column the view does not name, in order."""

@@ -24,6 +24,11 @@ class TrialDeclaration(Declaration):
     expected_seconds: Annotated[float, Field(gt=0)] = 6.0
     """Seconds a trial takes on average, from which the length of a visit is reckoned."""
 
+    def asked(self, language: str) -> str:
+        """What participants are asked and may answer, in one line of the codebook."""
+        del language
+        return ""
+
     def fault(self, experiment: "Experiment") -> str | None:
         """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""
         del experiment
@@ -51,6 +56,7 @@ class Kind:
     assign: the trials of one participant in order, by declaration, seed and slot.
     block_size: trials of one participant in a block, attention checks not counted.
     example: a [trial] as TOML, for the reference; it is what a newcomer copies.
+    further_examples: of keys that exclude one another, so that the reference shows each.
     shares_clips: whether it follows [assignment] and factors between participants; else they are refused.
     plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
     check_response: the number that an answer, as stored, is to an attention check, which asks for one.
@@ -66,6 +72,7 @@ class Kind:
     assign: "Callable[[Experiment, int, int], list[Trial]]"
     block_size: "Callable[[Experiment, BlockSpec], int]"
     example: str
+    further_examples: tuple[str, ...] = ()
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda payload: payload.get("response")
     shares_clips: bool = False

@@ -1,5 +1,5 @@
 // Prints what a page loads at first, gzipped, and fails above its budget: `node bundle_size.mjs participant | admin`.
-// The participant's page counts whole; the admin site counts the entry and the largest page, whose parts load when
+// The participant's page counts whole, but of the kinds of trial, which load on demand, the largest; the admin site counts the entry and the largest page, whose parts load when
 // they are first opened.
 import { existsSync, readdirSync, readFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
@@ -35,7 +35,16 @@ const manifestFile = new URL(".vite/manifest.json", folder);
 if (site === "participant") {
   const names = readdirSync(folder, { withFileTypes: true }).filter((entry) => entry.isFile());
   for (const { name } of names) console.log(`${String(bytesOf(name)).padStart(7)}  ${name}`);
-  report(sum(names.map(({ name }) => name)), "participant bundle");
+  const trials = new URL("../src/participant/trials/", import.meta.url);
+  const kinds = readdirSync(trials).filter((name) => existsSync(new URL(`${name}/index.ts`, trials)));
+  const kindOf = (file) => kinds.find((kind) => file.startsWith(`${kind}-`)) ?? null;
+  const filesOfKind = (kind) => names.map(({ name }) => name).filter((name) => kindOf(name) === kind);
+  const total = (kind) => sum(filesOfKind(kind));
+  for (const kind of kinds.filter((one) => filesOfKind(one).length === 0)) {
+    console.error(`error: expected a file of the kind ${kind} in dist/participant, found none; build the page again`);
+    process.exitCode = 1;
+  }
+  report(total(null) + Math.max(...kinds.map(total)), "participant bundle with the largest kind of trial");
 } else if (!existsSync(manifestFile)) {
   console.error("error: expected dist/admin/.vite/manifest.json; build the site first");
   process.exitCode = 1;

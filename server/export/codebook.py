@@ -5,8 +5,7 @@ from typing import Any
 
 from experiments.columns import RUN_COLUMNS, Column
 from experiments.definition import Experiment
-from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials import KINDS
 
 
 def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
@@ -21,26 +20,25 @@ def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
 
 
 def rating_columns(definitions: Iterable[Experiment]) -> list[Column]:
-    """Every column of the ratings CSV of a study with these versions, in order."""
+    """Every column of the tidy CSV of a study with these versions, in order; the last one's kind counts."""
+    versions = list(definitions)
     columns: list[Column] = []
-    for column in RATINGS.columns:
-        columns.extend(factor_columns(definitions) if column.name == "levels" else [column])
+    for column in KINDS[versions[-1].trial.kind].view.columns:
+        columns.extend(factor_columns(versions) if column.name == "levels" else [column])
     return columns
 
 
 def markdown(definition: Experiment, columns: Iterable[Column]) -> str:
     """The codebook as Markdown: `columns` are those of the ratings."""
-    scale = clip_rating_of(definition).scale
-    language = definition.languages[0]
+    kind = KINDS[definition.trial.kind]
     lines = [
         f"# Codebook: {definition.title}",
         "",
-        f"Scale: {scale.minimum} ({scale.low.get(language, '')}) to {scale.maximum} "
-        f"({scale.high.get(language, '')}). Question: {scale.question.get(language, '')}",
+        definition.trial.asked(definition.languages[0]),
         "",
     ]
     for title, table in (
-        (RATINGS.title, columns),
+        (kind.view.title, columns),
         ("Runs: one row a visit", RUN_COLUMNS),
     ):
         lines += [f"## {title}", "", "| column | type | unit | meaning | values |", "|---|---|---|---|---|"]

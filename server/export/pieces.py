@@ -9,8 +9,7 @@ from typing import Any, TypeVar
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
-from experiments.trials.clip_rating.columns import RATINGS
-from server.export.ratings_csv import factor_names, rating_count, rating_rows
+from server.export.ratings_csv import factor_names, rating_count, rating_rows, view_of
 from server.models import Study
 from server.text import encoded
 
@@ -42,8 +41,8 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
 
 
 def rating_table(session: Session, study: Study) -> Iterator[Sequence[Any]]:
-    """Header and rows of the tidy ratings CSV."""
-    factors = factor_names(session, study)
-    yield RATINGS.csv_header(factors)
-    rows = (RATINGS.csv_row(row, factors) for row in rating_rows(session, study))
+    """Header and rows of the tidy CSV."""
+    factors, view = factor_names(session, study), view_of(session, study)
+    yield view.csv_header(factors)
+    rows = (view.csv_row(row, factors) for row in rating_rows(session, study))
     yield from whole(rows, rating_count(session, study))

@@ -1,20 +1,31 @@
-"""The tidy CSV: the rows of the view `ratings`, one run after another, in constant memory."""
+"""The tidy CSV: the rows of the view of the study's kind of trial, run after run, in constant memory."""
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Any
 
-from sqlalchemy import CursorResult, func, select, text
+from sqlalchemy import CursorResult, TextClause, func, select, text
 from sqlalchemy.orm import Session
 
-from experiments.columns import names_of
-from experiments.trials.clip_rating.columns import RATINGS
+from experiments.columns import View, names_of
+from experiments.trials import KINDS
 from server.models import Rating, Study, StudyRun, StudyVersion
+from server.studies.lookup import active_definition
 
 RUNS_AT_ONCE = 200
-_BOOLEANS = names_of(RATINGS.columns, "boolean")
-# PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
-_COLUMNS = ", ".join(f"CAST({name} AS INTEGER)" if name in _BOOLEANS else name for name in RATINGS.names)
-_ROWS = text(f"SELECT {_COLUMNS} FROM ratings WHERE run = :run ORDER BY trial_index, play")  # noqa: S608
+
+
+@cache
+def _rows_of_a_run(view: View) -> TextClause:
+    booleans = names_of(view.columns, "boolean")
+    # PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
+    columns = ", ".join(f"CAST({name} AS INTEGER)" if name in booleans else name for name in view.names)
+    return text(f"SELECT {columns} FROM {view.name} WHERE run = :run ORDER BY trial_index, play")  # noqa: S608
+
+
+def view_of(session: Session, study: Study) -> View:
+    """The view that holds the answers of the study's kind of trial, as its version in use declares it."""
+    return KINDS[active_definition(session, study).trial.kind].view
 
 
 def factor_names(session: Session, study: Study) -> tuple[str, ...]:
@@ -28,21 +39,23 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 
 def rating_count(session: Session, study: Study) -> int:
     """Rows that `rating_rows` gives."""
+    kind = active_definition(session, study).trial.kind
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
-    query = query.where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
+    query = query.where(StudyRun.study_id == study.id, StudyRun.origin != "preview", Rating.kind == kind)
     return session.scalar(query) or 0
 
 
 def rating_rows(session: Session, study: Study) -> Iterator[Sequence[Any]]:
-    """Rows of the view (values in the order of RATINGS.names) by start of the run, then trial and play.
+    """Rows of the view (values in the order of its names) by start of the run, then trial and play.
 
     Booleans are 0 and 1. One run's rows are in memory at a time.
     """
     connection, latest = session.connection(), 0
+    of_a_run = _rows_of_a_run(view_of(session, study))
     while runs := _runs_after(session, study, latest):
         latest = runs[-1].id
         for run in runs:
-            yield from _plain_rows(connection.execute(_ROWS, {"run": run.public_id}))
+            yield from _plain_rows(connection.execute(of_a_run, {"run": run.public_id}))
 
 
 def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:

@@ -4,7 +4,7 @@ from sqlalchemy.orm import Session
 
 from server.models import StudyRun
 from server.participants import repository
-from server.participants.schemas import TrialInfo
+from server.participants.schemas import TrialClip, TrialInfo
 from server.trials.verdict import is_settled
 from server.versions import LoadedVersion
 
@@ -15,7 +15,8 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
     most = loaded.experiment.playback.max_repeats
     trials = []
     for row in repository.trials(session, run):
-        first = next(iter(clips.get(row.trial_index, {}).values()), None)
+        shown = clips.get(row.trial_index, {})
+        first = next(iter(shown.values()), None)
         clip = loaded.clips[first] if first is not None else None
         plays = done.get(row.trial_index, [])
         settled = any(is_settled(row.kind, play, verdict, most) for play, verdict in plays)
@@ -33,6 +34,7 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
                 height_px=clip.height_px if clip else None,
                 width_mm=clip.width_mm if clip else None,
                 inter_ocular_px=loaded.inter_ocular_px if clip else None,
+                clips=[_clip(loaded, role, clip_id) for role, clip_id in shown.items()],
                 prompt=_prompt(loaded, run.language, row.expected_response),
                 plays_done=len(plays),
                 plays_wanted=len(plays) if settled else len(plays) + 1,
@@ -40,6 +42,23 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
             )
         )
     return trials
+
+
+def _clip(loaded: LoadedVersion, role: str, clip_id: int) -> TrialClip:
+    clip = loaded.clips[clip_id]
+    return TrialClip.model_validate(
+        {
+            "role": role,
+            "clip_sha256": clip.sha256,
+            "clip_url": f"/clips/{clip.sha256}.mp4",
+            "frames": clip.frames,
+            "fps": clip.fps,
+            "width_px": clip.width_px,
+            "height_px": clip.height_px,
+            "width_mm": clip.width_mm,
+            "inter_ocular_px": loaded.inter_ocular_px,
+        }
+    )
 
 
 def _prompt(loaded: LoadedVersion, language: str, expected: int | None) -> str | None:

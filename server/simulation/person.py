@@ -10,9 +10,10 @@ from pydantic import TypeAdapter
 
 from experiments.definition.forms import FormField
 from server.simulation.http import JsonClient
+from server.trials.kinds import served
 
-LEVEL_SD, PERSON_SD, CLIP_SD, TRIAL_SD = 0.5, 0.6, 0.2, 1.0
-"""Spread of level effects, person means, exemplars and single answers, in points of a seven-point scale."""
+LEVEL_SD, PERSON_SD, CLIP_SD = 0.5, 0.6, 0.2
+"""Spread of level effects, person means and exemplars, in points of a seven-point scale."""
 FLAGGED_SHARE, FAILED_SHARE = 0.03, 0.01
 """Shares of plays with a frame lost (flagged) and with the focus lost (failed)."""
 
@@ -32,14 +33,11 @@ class Rater:
         self.rng = random.Random(f"{effects_seed}/person/{seed}")
         self.shift = self.rng.gauss(0, PERSON_SD)
 
-    def answer(self, clip: str, minimum: int, maximum: int) -> int:
-        """A rating of this clip, rounded into the scale."""
-        middle, unit = (minimum + maximum) / 2, (maximum - minimum) / 6
+    def likes(self, clip: str) -> float:
+        """How well this person likes a clip: effects of levels and exemplar, and the person's own shift."""
         levels = self.levels_of.get(clip, {}).items()
         effects = sum(self._effect(f"{name}/{level}") for name, level in levels)
-        own = self._effect(clip) * CLIP_SD / LEVEL_SD
-        value = middle + unit * (effects + own + self.shift + self.rng.gauss(0, TRIAL_SD))
-        return min(maximum, max(minimum, round(value)))
+        return effects + self._effect(clip) * CLIP_SD / LEVEL_SD + self.shift
 
     def _effect(self, key: str) -> float:
         digest = hashlib.sha256(f"{self.effects_seed}/{key}".encode()).digest()
@@ -68,7 +66,7 @@ class Person:
             trial = due.pop(0)
             if stop_after is not None and self.ratings >= stop_after:
                 return None
-            if self.rate(trial, state["trial"]["scale"]):
+            if self.rate(trial, state["trial"]):
                 self._offer_again(trial, due)
             progress()
         if not self._forms(state, "after"):
@@ -109,28 +107,23 @@ class Person:
                     return False
         return True
 
-    def rate(self, trial: dict[str, Any], scale: dict[str, Any]) -> bool:
+    def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:
         """Play and rate one trial; True where the receipt asks for the clip again."""
-        body = self.rating(trial, scale)
+        body = self.rating(trial, declared)
         receipt = self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)["receipt"]
         self.ratings += 1
         return bool(receipt["again"])
 
-    def rating(self, trial: dict[str, Any], scale: dict[str, Any]) -> dict[str, Any]:
+    def rating(self, trial: dict[str, Any], declared: dict[str, Any]) -> dict[str, Any]:
         """The rating as the page would send it."""
         rng, clip = self.rater.rng, trial["clip_sha256"]
-        length_ms = 1000 * trial["frames"] / trial["fps"] if clip else 0.0
+        length_ms = 1000 * _frames(trial) / trial["fps"] if clip else 0.0
         rt = rng.lognormvariate(6.5, 0.4)
         self.elapsed_ms += length_ms + rt + 500
-        if clip:
-            response = self.rater.answer(clip, scale["minimum"], scale["maximum"])
-        else:
-            asked = [int(word) for word in trial["prompt"].replace("*", " ").split() if word.isdigit()]
-            response = asked[0]
         return {
             "trial_index": trial["trial_index"],
             "play": trial["plays_done"] + 1,
-            "response": response,
+            **served(declared["kind"]).simulated(self.rater.likes, trial, declared, rng),
             "rt": round(rt, 2),
             "rt_from_first_frame": round(rt + length_ms, 2),
             "time_elapsed": round(self.elapsed_ms, 2),
@@ -139,13 +132,14 @@ class Person:
         }
 
     def _playback(self, trial: dict[str, Any]) -> dict[str, Any]:
-        rng, frames = self.rater.rng, trial["frames"]
+        rng, frames = self.rater.rng, _frames(trial)
         chance, period = rng.random(), 1000 / trial["fps"]
         lost = {rng.randrange(1, frames)} if chance < FLAGGED_SHARE and frames > 1 else set()
         drawn = [[index, round(10 + index * period, 2)] for index in range(frames) if index not in lost]
         return {
             "method": "webcodecs",
             "clip_sha256": trial["clip_sha256"],
+            "clips": _each_clip(trial, lost),
             "key_to_first_frame_ms": round(rng.uniform(6, 20), 2),
             "frames_drawn": len(drawn),
             "frames_late": 0,
@@ -165,6 +159,27 @@ class Person:
         """Put the trial at the end of its block."""
         place = sum(1 for other in due if other["block"] == trial["block"])
         due.insert(place, {**trial, "plays_done": trial["plays_done"] + 1})
+
+
+def _frames(trial: dict[str, Any]) -> int:
+    """Frames that one showing draws: clips at once are drawn together, those in turn one after the other."""
+    frames = [int(clip["frames"]) for clip in trial["clips"] if clip["role"] != "reference"]
+    before = sum(int(clip["frames"]) for clip in trial["clips"] if clip["role"] == "reference")
+    in_turn = any(clip["role"] == "first" for clip in trial["clips"])
+    return before + (sum(frames) if in_turn else max(frames))
+
+
+def _each_clip(trial: dict[str, Any], lost: set[int]) -> dict[str, Any] | None:
+    if len(trial["clips"]) < 2:
+        return None
+    return {
+        clip["role"]: {
+            "clip_sha256": clip["clip_sha256"],
+            "frames_drawn": clip["frames"] - sum(frame < clip["frames"] for frame in lost),
+            "frames_missing": sum(frame < clip["frames"] for frame in lost),
+        }
+        for clip in trial["clips"]
+    }
 
 
 _FIELD: TypeAdapter[FormField] = TypeAdapter(FormField)

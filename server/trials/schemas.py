@@ -14,11 +14,26 @@ FrameTime = tuple[
 ]
 
 
+Role = Literal["shown", "left", "right", "first", "second", "reference"]
+ShortText = Annotated[str, StringConstraints(max_length=40)]
+
+
+class ShownClip(BaseModel):
+    """One of several clips of a trial; the log of drawn frames is that of all, since one clock draws them."""
+
+    clip_sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+    frames_drawn: Count
+    frames_missing: Count
+
+
 class PlaybackLog(BaseModel):
     """What the page measured while the clip played; null where it could not."""
 
     method: Literal["webcodecs", "video", "none"]
     clip_sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
+    clips: dict[Role, ShownClip] | None = Field(
+        default=None, description="Of each clip, by its role, where a trial shows several."
+    )
     key_to_first_frame_ms: Milliseconds | None = None
     frames_drawn: Count | None = None
     frames_late: Count | None = None
@@ -41,11 +56,17 @@ class PlaybackLog(BaseModel):
 
 
 class RatingIn(BaseModel):
-    """One play of one trial with its answer; `response` is null where the clip could not be rated."""
+    """One play of one trial with its answer: a rating as `response`, of other kinds as `answer`.
+
+    `response` is null where the clip could not be rated.
+    """
 
     trial_index: Count
     play: Annotated[int, Field(ge=1, le=100)] = 1
     response: StrictInt | None
+    answer: dict[ShortText, ShortText | None] | None = Field(
+        default=None, description="The answer of a kind other than clip_rating, as its model has it."
+    )
     rt: Milliseconds | None = Field(default=None, description="From the clip's last frame to the answer, ms.")
     rt_from_first_frame: Milliseconds | None = None
     time_elapsed: Milliseconds | None = Field(

@@ -6,6 +6,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.definition import Experiment
+from experiments.trials import KINDS
 from server.errors import Conflict, Invalid, NotFound
 from server.evidence.intake import Answer, Intake
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
@@ -57,7 +58,9 @@ def save_rating(
         )
     loaded = versions.get(connection, run.version_id)
     stored = repository.stored_ratings(connection, run.id, rating.trial_index, rating_id)
-    known = _known(stored, rating_id, rating)
+    kind = loaded.experiment.trial.kind
+    answer = served(kind).payload(rating)
+    known = _known(stored, rating_id, rating, answer)
     most = loaded.experiment.playback.max_repeats
     if known is not None:
         again = not is_settled(trial.kind, known.play, known.verdict, most)
@@ -66,10 +69,10 @@ def save_rating(
         return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
     _check(run, loaded.experiment, trial.kind, rating)
     if run.evidence == "asked":
-        intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at))
-    kind = loaded.experiment.trial.kind
+        rated = KINDS[kind].check_response(answer) is not None
+        intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at, rated=rated))
     ruling = served(kind).judge(loaded, trial.clips, rating)
-    repository.add_rating(connection, _row(run, rating_id, kind, rating, ruling, saved_at))
+    repository.add_rating(connection, _row(run, rating_id, kind, answer, rating, ruling, saved_at))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
     before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
     answered = int(settles and not before)
@@ -81,20 +84,24 @@ def save_rating(
     return _receipt(rating_id, saved_at, ruling, not settles and not before, left, status), True
 
 
-def _known(stored: list[Any], rating_id: str, rating: RatingIn) -> Any:
+def _known(stored: list[Any], rating_id: str, rating: RatingIn, answer: dict[str, Any]) -> Any:
     """The stored rating this one repeats; RatingDiffers where it says something else."""
     for row in stored:
         same_play = (row.trial_index, row.play) == (rating.trial_index, rating.play)
         if row.rating_id != rating_id and not same_play:
             continue
-        if same_play and row.payload["response"] == rating.response:
+        if same_play and row.payload == answer:
             return row
         raise RatingDiffers(
-            f"Trial {row.trial_index}, play {row.play} is stored with the answer {row.payload['response']}; "
-            f"got {rating.response} for trial {rating.trial_index}, play {rating.play}. The first is kept.",
+            f"Trial {row.trial_index}, play {row.play} is stored with the answer {_short(row.payload)}; "
+            f"got {_short(answer)} for trial {rating.trial_index}, play {rating.play}. The first is kept.",
             stored={"trial_index": row.trial_index, "play": row.play, "answer": row.payload},
         )
     return None
+
+
+def _short(answer: dict[str, Any]) -> Any:
+    return next(iter(answer.values()))
 
 
 def _check(run: Any, experiment: Experiment, part: Part, rating: RatingIn) -> None:
@@ -109,10 +116,15 @@ def _check(run: Any, experiment: Experiment, part: Part, rating: RatingIn) -> No
 
 
 def _answer(
-    run: Any, loaded: LoadedVersion, roles: dict[str, int], rating: RatingIn, received_at: datetime
+    run: Any,
+    loaded: LoadedVersion,
+    roles: dict[str, int],
+    rating: RatingIn,
+    received_at: datetime,
+    *,
+    rated: bool,
 ) -> Answer:
     clips = [loaded.clips[ident] for ident in roles.values()]
-    rated = rating.response is not None
     views = getattr(loaded.experiment.trial, "views", 1)
     return Answer(
         run=run.id,
@@ -134,7 +146,13 @@ def _with_zone(moment: datetime | None) -> datetime | None:
 
 
 def _row(
-    run: Any, rating_id: str, kind: str, rating: RatingIn, ruling: Ruling, saved_at: datetime
+    run: Any,
+    rating_id: str,
+    kind: str,
+    answer: dict[str, Any],
+    rating: RatingIn,
+    ruling: Ruling,
+    saved_at: datetime,
 ) -> dict[str, Any]:
     return {
         "rating_id": rating_id,
@@ -142,14 +160,15 @@ def _row(
         "trial_index": rating.trial_index,
         "play": rating.play,
         "kind": kind,
-        "payload": {"response": rating.response},
+        "payload": answer,
         "rt": rating.rt,
         "rt_from_first_frame": rating.rt_from_first_frame,
         "time_elapsed": rating.time_elapsed,
         "changes": rating.changes,
         "comment": rating.comment,
         "answered_at_client": _with_zone(rating.answered_at_client),
-        **rating.playback.model_dump(),
+        **rating.playback.model_dump(exclude={"clips"}),
+        "playback": rating.playback.model_dump(include={"clips"})["clips"],
         "focus_lost": None if rating.playback.focus_lost is None else rating.playback.focus_lost > 0,
         "px_per_mm": run.px_per_mm,
         "viewing_distance_mm": run.viewing_distance_mm,

@@ -1,18 +1,17 @@
 """Views as the page sends them: when they begin, and once more when they have ended."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 from uuid import UUID
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
 
-from server.trials.schemas import Count, FrameTime
+from server.trials.schemas import Count, FrameTime, Role
 
 # The earliest and latest moments of the calendar have no UTC in it.
 Moment = Annotated[
     AwareDatetime, Field(ge=datetime(1970, 1, 1, tzinfo=UTC), lt=datetime(9000, 1, 1, tzinfo=UTC))
 ]
-Role = Literal["shown", "left", "right", "first", "second", "reference"]
 
 
 class SeenClip(BaseModel):

@@ -65,7 +65,7 @@ def test_no_acknowledged_rating_is_lost_or_doubled(
             state = client.get("/api/run")
             last = rng.randrange(3, len(state["trials"]))
             for trial in state["trials"]:
-                rating_id, body = str(uuid.uuid4()), person.rating(trial, state["trial"]["scale"])
+                rating_id, body = str(uuid.uuid4()), person.rating(trial, state["trial"])
                 if trial["trial_index"] == last:
                     # The request is under way when the server dies; the client sends it again afterwards.
                     client.send("PUT", f"/api/run/ratings/{rating_id}", body)

@@ -56,6 +56,14 @@ class ClipRating(TrialDeclaration):
     comment: bool = False
     """Adds a line of free text beside the rating; it stands in the column `comment`."""
 
+    def asked(self, language: str) -> str:
+        """The scale's ends and the question."""
+        scale = self.scale
+        return (
+            f"Scale: {scale.minimum} ({scale.low.get(language, '')}) to {scale.maximum} "
+            f"({scale.high.get(language, '')}). Question: {scale.question.get(language, '')}"
+        )
+
 
 def clip_rating_of(experiment: "Experiment") -> ClipRating:
     """The experiment's trial as a rating of single clips; InputError where it is of another kind."""

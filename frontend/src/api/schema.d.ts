@@ -1380,6 +1380,24 @@ export interface components {
             created_at: string;
         };
         /**
+         * AllPairs
+         * @description Every clip with every other; `matched` compares clips of the same exemplar number only.
+         */
+        AllPairs: {
+            /**
+             * @description Names this choice of pairs. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            among: "all";
+            /**
+             * Exemplars
+             * @description Only clips of the same exemplar number, or any two clips of the design.
+             * @default matched
+             * @enum {string}
+             */
+            exemplars: "matched" | "any";
+        };
+        /**
          * AnalysisPlan
          * @description The analysis fixed before the data: factor order, the test of the table, and the pairs.
          */
@@ -1622,6 +1640,22 @@ export interface components {
             window_height_px: number;
             /** Zoom */
             zoom: number;
+        };
+        /**
+         * CellPair
+         * @description Two cells to compare, by their labels, each exemplar of the one with the same exemplar of the other.
+         */
+        CellPair: {
+            /**
+             * Cell
+             * @description Label of the one cell: its level names in factor order, joined by slashes.
+             */
+            cell: string;
+            /**
+             * Other
+             * @description Label of the other cell.
+             */
+            other: string;
         };
         /**
          * CellResult
@@ -1935,6 +1969,22 @@ export interface components {
          *     The text under a key is its description: docs/reference/experiment.md and the API's schema are made of it.
          */
         Declaration: Record<string, never>;
+        /**
+         * DeclaredPairs
+         * @description The pairs of cells in this list and no others.
+         */
+        DeclaredPairs: {
+            /**
+             * @description Names this choice of pairs. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            among: "declared";
+            /**
+             * Cells
+             * @description The pairs of cells.
+             */
+            cells: components["schemas"]["CellPair"][];
+        };
         /**
          * DefinitionText
          * @description A definition to check.
@@ -2319,7 +2369,7 @@ export interface components {
              * Trial
              * @description What one trial shows and asks, by its kind.
              */
-            trial: components["schemas"]["ClipRating"];
+            trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"];
             /**
              * @description Size and surround of the clip, and what the device must offer.
              * @default {
@@ -3235,6 +3285,22 @@ export interface components {
             maximum: number;
         };
         /**
+         * OneAfterTheOther
+         * @description Two clips in the same place, the second `gap_ms` of plain background after the first.
+         */
+        OneAfterTheOther: {
+            /**
+             * @description Names this arrangement. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            arrangement: "one_after_the_other";
+            /**
+             * Gap Ms
+             * @description Plain background between the two clips, in ms.
+             */
+            gap_ms: number;
+        };
+        /**
          * Option
          * @description One answer of a choice field; `value` is what is stored.
          */
@@ -3276,6 +3342,57 @@ export interface components {
             high?: string;
         };
         /**
+         * PairedComparison
+         * @description Which of two clips? Shown at once or in turn, with a tie where one is declared.
+         *
+         *     A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+         */
+        PairedComparison: {
+            /**
+             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "paired_comparison";
+            /**
+             * Expected Seconds
+             * @description Expected length of a trial in seconds, for the length of a visit.
+             * @default 8
+             */
+            expected_seconds: number;
+            /**
+             * Question
+             * @description What is asked of the two clips, in every language.
+             */
+            question: {
+                [key: string]: string;
+            };
+            /**
+             * Presentation
+             * @description How the two clips are shown; there is no default.
+             */
+            presentation: components["schemas"]["SideBySide"] | components["schemas"]["Stacked"] | components["schemas"]["OneAfterTheOther"];
+            /**
+             * Pairs
+             * @description Which clips are compared.
+             */
+            pairs: components["schemas"]["AllPairs"] | components["schemas"]["WithinFactor"] | components["schemas"]["DeclaredPairs"];
+            /** @description Allows the answer that neither is chosen. */
+            ties: components["schemas"]["Ties"] | null;
+            /** @description A clip shown before each pair. */
+            reference: components["schemas"]["Reference"] | null;
+            /**
+             * Pointer Delay Ms
+             * @description Time, in ms, for which a mouse that has not moved since its last press chooses nothing.
+             * @default 1500
+             */
+            pointer_delay_ms: number;
+            /**
+             * Pairs Per Person
+             * @description Comparisons of one participant in a block, dealt in turn from all pairs; where not given, all.
+             */
+            pairs_per_person: number | null;
+        };
+        /**
          * Playback
          * @description How the clips were shown.
          */
@@ -3310,6 +3427,13 @@ export interface components {
             method: "webcodecs" | "video" | "none";
             /** Clip Sha256 */
             clip_sha256?: string | null;
+            /**
+             * Clips
+             * @description Of each clip, by its role, where a trial shows several.
+             */
+            clips?: {
+                [key: string]: components["schemas"]["ShownClip"];
+            } | null;
             /** Key To First Frame Ms */
             key_to_first_frame_ms?: number | null;
             /** Frames Drawn */
@@ -3457,7 +3581,9 @@ export interface components {
         };
         /**
          * RatingIn
-         * @description One play of one trial with its answer; `response` is null where the clip could not be rated.
+         * @description One play of one trial with its answer: a rating as `response`, of other kinds as `answer`.
+         *
+         *     `response` is null where the clip could not be rated.
          */
         RatingIn: {
             /** Trial Index */
@@ -3469,6 +3595,13 @@ export interface components {
             play?: number;
             /** Response */
             response: number | null;
+            /**
+             * Answer
+             * @description The answer of a kind other than clip_rating, as its model has it.
+             */
+            answer?: {
+                [key: string]: string | null;
+            } | null;
             /**
              * Rt
              * @description From the clip's last frame to the answer, ms.
@@ -3635,6 +3768,30 @@ export interface components {
              * @default
              */
             code_screened_out?: string;
+        };
+        /**
+         * Reference
+         * @description A clip shown before each pair, as in degradation category rating: the cell, the pair's exemplar.
+         */
+        Reference: {
+            /**
+             * Cell
+             * @description Label of its cell; the exemplar is that of the pair.
+             */
+            cell: string;
+            /**
+             * Label
+             * @description What the page says below it while it runs, in every language.
+             */
+            label: {
+                [key: string]: string;
+            };
+            /**
+             * Gap Ms
+             * @description Plain background after it, in ms.
+             * @default 500
+             */
+            gap_ms: number;
         };
         /**
          * RenderOverrides
@@ -3907,7 +4064,7 @@ export interface components {
             /** Forms */
             forms: components["schemas"]["Form"][];
             /** Trial */
-            trial: components["schemas"]["ShownClipRating"];
+            trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"];
             display: components["schemas"]["Display"];
             playback: components["schemas"]["PlaybackRules"];
             /** Break Seconds Min */
@@ -4258,6 +4415,18 @@ export interface components {
             clips_ready: boolean;
         };
         /**
+         * ShownClip
+         * @description One of several clips of a trial; the log of drawn frames is that of all, since one clock draws them.
+         */
+        ShownClip: {
+            /** Clip Sha256 */
+            clip_sha256: string;
+            /** Frames Drawn */
+            frames_drawn: number;
+            /** Frames Missing */
+            frames_missing: number;
+        };
+        /**
          * ShownClipRating
          * @description The declared single-clip rating as the page gets it.
          */
@@ -4287,6 +4456,70 @@ export interface components {
             expected_seconds: number;
         };
         /**
+         * ShownPairedComparison
+         * @description The declared paired comparison as the page gets it: nothing of which pairs there are.
+         */
+        ShownPairedComparison: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "paired_comparison";
+            /** Question */
+            question: {
+                [key: string]: string;
+            };
+            /** Presentation */
+            presentation: components["schemas"]["SideBySide"] | components["schemas"]["Stacked"] | components["schemas"]["OneAfterTheOther"];
+            /** Tie */
+            tie: {
+                [key: string]: string;
+            } | null;
+            reference: components["schemas"]["ShownReference"] | null;
+            /** Pointer Delay Ms */
+            pointer_delay_ms: number;
+            /** Expected Seconds */
+            expected_seconds: number;
+        };
+        /**
+         * ShownReference
+         * @description The label of the reference clip, and how long the canvas stays plain after it; not which clip it is.
+         */
+        ShownReference: {
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
+            /** Gap Ms */
+            gap_ms: number;
+        };
+        /**
+         * SideBySide
+         * @description Two clips beside one another on one canvas, drawn by one clock.
+         *
+         *     `if_too_narrow` says what happens on a screen where the two do not fit at actual size: they are stacked,
+         *     or the participant is asked for a larger window. Which of them was shown is stored with each answer.
+         */
+        SideBySide: {
+            /**
+             * @description Names this arrangement. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            arrangement: "side_by_side";
+            /**
+             * Gap Mm
+             * @description Plain background between the two clips, in mm.
+             * @default 8
+             */
+            gap_mm: number;
+            /**
+             * If Too Narrow
+             * @description Where two clips do not fit beside one another: stack them, or ask for a larger window.
+             * @enum {string}
+             */
+            if_too_narrow: "stack" | "refuse";
+        };
+        /**
          * SignIn
          * @description Name and password, and where a second factor is set up its code or a recovery code.
          */
@@ -4297,6 +4530,23 @@ export interface components {
             password: string;
             /** Code */
             code?: string | null;
+        };
+        /**
+         * Stacked
+         * @description Two clips one above the other on one canvas, drawn by one clock.
+         */
+        Stacked: {
+            /**
+             * @description Names this arrangement. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            arrangement: "stacked";
+            /**
+             * Gap Mm
+             * @description Plain background between the two clips, in mm.
+             * @default 8
+             */
+            gap_mm: number;
         };
         /**
          * StageChange
@@ -4474,6 +4724,19 @@ export interface components {
             by_trial: string[][];
         };
         /**
+         * Ties
+         * @description The answer that neither clip is chosen, and its label.
+         */
+        Ties: {
+            /**
+             * Label
+             * @description Label of this answer, in every language.
+             */
+            label: {
+                [key: string]: string;
+            };
+        };
+        /**
          * TimeBin
          * @description Answers within 250 ms from `start_ms` after the clip's end.
          */
@@ -4648,6 +4911,33 @@ export interface components {
             expires_at: string | null;
         };
         /**
+         * TrialClip
+         * @description One clip of a trial, and the role in which it is shown.
+         */
+        TrialClip: {
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "shown" | "left" | "right" | "first" | "second" | "reference";
+            /** Clip Sha256 */
+            clip_sha256: string;
+            /** Clip Url */
+            clip_url: string;
+            /** Frames */
+            frames: number;
+            /** Fps */
+            fps: number;
+            /** Width Px */
+            width_px: number;
+            /** Height Px */
+            height_px: number;
+            /** Width Mm */
+            width_mm: number | null;
+            /** Inter Ocular Px */
+            inter_ocular_px: number | null;
+        };
+        /**
          * TrialDeclaration
          * @description What every kind declares; each adds its own keys, and a constant as its `kind`.
          */
@@ -4696,6 +4986,11 @@ export interface components {
             width_mm: number | null;
             /** Inter Ocular Px */
             inter_ocular_px: number | null;
+            /**
+             * Clips
+             * @description Every clip, in the order of its places.
+             */
+            clips: components["schemas"]["TrialClip"][];
             /**
              * Prompt
              * @description Markdown of an attention check.
@@ -4846,6 +5141,22 @@ export interface components {
              */
             saved_at: string;
         };
+        /**
+         * WithinFactor
+         * @description Clips that differ in the level of one factor only: other factors and the exemplar are the same.
+         */
+        WithinFactor: {
+            /**
+             * @description Names this choice of pairs. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            among: "within";
+            /**
+             * Factor
+             * @description The factor in whose level the two clips differ.
+             */
+            factor: string;
+        };
     };
     responses: never;
     parameters: never;
@@ -4854,6 +5165,7 @@ export interface components {
     pathItems: never;
 }
 export type AccountOut = components['schemas']['AccountOut'];
+export type AllPairs = components['schemas']['AllPairs'];
 export type AnalysisPlan = components['schemas']['AnalysisPlan'];
 export type Assignment = components['schemas']['Assignment'];
 export type AttentionChecks = components['schemas']['AttentionChecks'];
@@ -4865,6 +5177,7 @@ export type Blocks = components['schemas']['Blocks'];
 export type BodyUploadClips = components['schemas']['Body_upload_clips'];
 export type CalibrationResult = components['schemas']['CalibrationResult'];
 export type CalibrationState = components['schemas']['CalibrationState'];
+export type CellPair = components['schemas']['CellPair'];
 export type CellResult = components['schemas']['CellResult'];
 export type ChangeAccount = components['schemas']['ChangeAccount'];
 export type ChangeOut = components['schemas']['ChangeOut'];
@@ -4882,6 +5195,7 @@ export type ConfirmCode = components['schemas']['ConfirmCode'];
 export type ConfirmPassword = components['schemas']['ConfirmPassword'];
 export type Consent = components['schemas']['Consent'];
 export type Declaration = components['schemas']['Declaration'];
+export type DeclaredPairs = components['schemas']['DeclaredPairs'];
 export type DefinitionText = components['schemas']['DefinitionText'];
 export type DesignOut = components['schemas']['DesignOut'];
 export type Display = components['schemas']['Display'];
@@ -4937,8 +5251,10 @@ export type NewToken = components['schemas']['NewToken'];
 export type NewTokenOut = components['schemas']['NewTokenOut'];
 export type NewVersion = components['schemas']['NewVersion'];
 export type NumberField = components['schemas']['NumberField'];
+export type OneAfterTheOther = components['schemas']['OneAfterTheOther'];
 export type Option = components['schemas']['Option'];
 export type OwnClips = components['schemas']['OwnClips'];
+export type PairedComparison = components['schemas']['PairedComparison'];
 export type Playback = components['schemas']['Playback'];
 export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
@@ -4952,6 +5268,7 @@ export type Received = components['schemas']['Received'];
 export type RecordedProfile = components['schemas']['RecordedProfile'];
 export type RecoveryCodes = components['schemas']['RecoveryCodes'];
 export type Recruiter = components['schemas']['Recruiter'];
+export type Reference = components['schemas']['Reference'];
 export type RenderOverrides = components['schemas']['RenderOverrides'];
 export type RenderSettings = components['schemas']['RenderSettings'];
 export type ReportOut = components['schemas']['ReportOut'];
@@ -4973,8 +5290,13 @@ export type SeriesOut = components['schemas']['SeriesOut'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
+export type ShownClip = components['schemas']['ShownClip'];
 export type ShownClipRating = components['schemas']['ShownClipRating'];
+export type ShownPairedComparison = components['schemas']['ShownPairedComparison'];
+export type ShownReference = components['schemas']['ShownReference'];
+export type SideBySide = components['schemas']['SideBySide'];
 export type SignIn = components['schemas']['SignIn'];
+export type Stacked = components['schemas']['Stacked'];
 export type StageChange = components['schemas']['StageChange'];
 export type Strips = components['schemas']['Strips'];
 export type StudyDetail = components['schemas']['StudyDetail'];
@@ -4982,6 +5304,7 @@ export type StudySummary = components['schemas']['StudySummary'];
 export type TextField = components['schemas']['TextField'];
 export type Texts = components['schemas']['Texts'];
 export type Tickets = components['schemas']['Tickets'];
+export type Ties = components['schemas']['Ties'];
 export type TimeBin = components['schemas']['TimeBin'];
 export type Timeline = components['schemas']['Timeline'];
 export type TimelineCalibration = components['schemas']['TimelineCalibration'];
@@ -4989,6 +5312,7 @@ export type TimelineEvent = components['schemas']['TimelineEvent'];
 export type TimelineForm = components['schemas']['TimelineForm'];
 export type TimelineTrial = components['schemas']['TimelineTrial'];
 export type TokenOut = components['schemas']['TokenOut'];
+export type TrialClip = components['schemas']['TrialClip'];
 export type TrialDeclaration = components['schemas']['TrialDeclaration'];
 export type TrialInfo = components['schemas']['TrialInfo'];
 export type Unsupported = components['schemas']['Unsupported'];
@@ -4998,6 +5322,7 @@ export type VersionOut = components['schemas']['VersionOut'];
 export type ViewIn = components['schemas']['ViewIn'];
 export type ViewsIn = components['schemas']['ViewsIn'];
 export type ViewsSaved = components['schemas']['ViewsSaved'];
+export type WithinFactor = components['schemas']['WithinFactor'];
 export type $defs = Record<string, never>;
 export interface operations {
     healthz: {

@@ -115,6 +115,7 @@ function ratingOf(trial: RunState["trials"][number]): RatingBody {
     trial_index: trial.trial_index,
     play: 1,
     response: 1 + Math.floor(Math.random() * 7),
+    answer: null,
     rt: 500,
     rt_from_first_frame: 1_500,
     time_elapsed: 1_000 * (trial.trial_index + 1),

@@ -25,6 +25,7 @@ const trial = (trial_index: number): TrialInfo => ({
   height_px: 300,
   width_mm: 130,
   inter_ocular_px: 400,
+  clips: [],
   prompt: null,
   plays_done: 0,
   plays_wanted: 1,

@@ -21,6 +21,7 @@ const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
   height_px: 300,
   width_mm: 130,
   inter_ocular_px: 400,
+  clips: [],
   prompt: null,
   plays_done: 0,
   plays_wanted: 1,

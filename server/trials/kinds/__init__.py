@@ -3,10 +3,11 @@
 Nothing else joins them: the name in the declaration finds the file.
 """
 
+import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from experiments.definition import Experiment
 from server.trials.schemas import RatingIn
@@ -16,6 +17,13 @@ if TYPE_CHECKING:
     from server.versions import LoadedVersion
 
 Part = Literal["practice", "main", "attention"]
+Preference = Callable[[str], float]
+"""How well a simulated person likes the clip with this hash, 0 being neutral."""
+
+
+def asked_in(prompt: str) -> int:
+    """The number that the prompt of an attention check asks for."""
+    return next(int(word) for word in prompt.replace("*", " ").split() if word.isdigit())
 
 
 @dataclass(frozen=True)
@@ -24,13 +32,18 @@ class Served:
 
     Attributes
     ----------
+    payload: the answer as it is stored; refuses what is none of this kind.
     validate: refuses (by an `Invalid`) an answer that the declaration does not allow in this part.
     judge: the verdict on the views of the clips with these ids by role (none for an attention check), by
         the declared playback rules.
+    simulated: the answer of a simulated person (`response`, `answer`) to a trial as the page gets it, with
+        the declaration as the page gets it.
     """
 
+    payload: Callable[[RatingIn], dict[str, Any]]
     validate: Callable[[Experiment, Part, RatingIn], None]
     judge: "Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]"
+    simulated: Callable[[Preference, Mapping[str, Any], Mapping[str, Any], random.Random], dict[str, Any]]
 
 
 _SERVED: dict[str, Served] = {}

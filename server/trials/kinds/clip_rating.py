@@ -1,18 +1,23 @@
 """The single-clip rating: a whole number on the scale, and one play of one clip."""
 
+import random
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
 from experiments.trials.clip_rating.declaration import clip_rating_of
 from server.errors import Invalid
-from server.trials.kinds import Part, Served
+from server.trials.kinds import Part, Preference, Served, asked_in
 from server.trials.schemas import PlaybackLog, RatingIn
 from server.trials.verdict import Playback, Ruling, frames_in_log
 from server.trials.verdict import judge as judge_play
 
 if TYPE_CHECKING:
     from server.versions import LoadedVersion
+
+
+TRIAL_SD = 1.0
+"""Spread of single answers of simulated people, in points of a seven-point scale."""
 
 
 class RatingOutOfScale(Invalid):
@@ -25,6 +30,11 @@ class RatingMissing(Invalid):
     """Only a clip that failed may go without a rating."""
 
     code = "rating_missing"
+
+
+def payload(rating: RatingIn) -> dict[str, Any]:
+    """The rating, as its model has it."""
+    return {"response": rating.response}
 
 
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
@@ -42,13 +52,14 @@ def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -
     """The verdict on one play over all its views, and the rule that gave it."""
     rules, rated = loaded.experiment.playback, rating.response is not None
     if not clips:
-        return judge_play(rules, _playback(rating.playback), None, 0, 0.0, rated=rated)
+        return judge_play(rules, playback_of(rating.playback), None, 0, 0.0, rated=rated)
     clip = loaded.clips[clips["shown"]]
     frames = clip.frames * clip_rating_of(loaded.experiment).views
-    return judge_play(rules, _playback(rating.playback), clip.sha256, frames, clip.fps, rated=rated)
+    return judge_play(rules, playback_of(rating.playback), clip.sha256, frames, clip.fps, rated=rated)
 
 
-def _playback(log: PlaybackLog) -> Playback:
+def playback_of(log: PlaybackLog) -> Playback:
+    """What a log says of one play."""
     seen = frames_in_log(index for index, _ in log.drawn) if log.drawn is not None else None
     return Playback(
         method=log.method,
@@ -65,4 +76,16 @@ def _playback(log: PlaybackLog) -> Playback:
     )
 
 
-SERVED = Served(validate, judge)
+def simulated(
+    preference: Preference, trial: Mapping[str, Any], declared: Mapping[str, Any], rng: random.Random
+) -> dict[str, Any]:
+    """The rating of a simulated person: the liking around the middle of the scale, rounded into it."""
+    minimum, maximum = declared["scale"]["minimum"], declared["scale"]["maximum"]
+    if not trial["clips"]:
+        return {"response": asked_in(trial["prompt"])}
+    middle, unit = (minimum + maximum) / 2, (maximum - minimum) / 6
+    value = middle + unit * (preference(trial["clips"][0]["clip_sha256"]) + rng.gauss(0, TRIAL_SD))
+    return {"response": min(maximum, max(minimum, round(value)))}
+
+
+SERVED = Served(payload, validate, judge, simulated)

@@ -7,6 +7,14 @@ export interface Prepared {
   height: number;
   fps: number;
 }
+/** A prepared clip and its place on a canvas of several, in that canvas's pixels. */
+export interface Part {
+  sha256: string;
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
 export type ShownClip = Omit<Showing, "key_at_ms" | "focus_lost">;
 export interface PlayOptions {
   fixation_ms: number;
@@ -24,6 +32,11 @@ export interface ClipPlayer {
   readonly element: HTMLElement;
   /** Make a clip ready to start at once. Rejects with ClipBroken. */
   prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared>;
+  /**
+   * Put prepared clips on one canvas under a name of its own: it is then played as a clip, one clock drawing frame k of
+   * each in the same refresh. A shorter one holds its last frame. Rejects with ClipBroken.
+   */
+  compose(name: string, parts: readonly Part[], width: number, height: number): Promise<Prepared>;
   /** Give the element this clip's own pixel size and the surround's colour. */
   blank(sha256: string): void;
   /** Show a prepared clip from the next screen refresh on; resolves after its last frame. */

@@ -1,11 +1,13 @@
 /** Messages between the page and the worker that decodes and draws. Times are absolute: timeOrigin + now, in ms. */
 
+import type { Part } from "./player";
 import type { Evenness } from "./refresh-clock";
 
 export type ToWorker =
   | { type: "canvas"; canvas: OffscreenCanvas; background: string }
   | { type: "prepare"; sha256: string; bytes: ArrayBuffer; fps: number | null }
   | { type: "play"; sha256: string; refresh_ms: number; fixation_ms: number }
+  | { type: "compose"; sha256: string; parts: Part[]; width: number; height: number }
   | { type: "warm" }
   | { type: "blank"; width: number; height: number }
   | { type: "release"; sha256: string };

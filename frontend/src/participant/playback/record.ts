@@ -40,6 +40,7 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
   return {
     method: first ? worst(showings) : "none",
     clip_sha256,
+    clips: null,
     key_to_first_frame_ms: first && first_drawn ? round(first_drawn[1] - first.key_at_ms) : null,
     frames_drawn: sum(showings.map((showing) => distinct(showing.drawn))),
     frames_late: sum(showings.map((showing) => late(showing, refresh_ms))),

@@ -63,6 +63,10 @@ export class VideoPlayer implements ClipPlayer {
     };
   }
 
+  compose(): Promise<Prepared> {
+    return Promise.reject(new ClipBroken("this browser cannot draw several clips by one clock; it has no WebCodecs"));
+  }
+
   release(sha256: string): void {
     const clip = this.loaded.get(sha256);
     if (clip) URL.revokeObjectURL(clip.address);

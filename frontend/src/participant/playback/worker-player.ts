@@ -1,5 +1,5 @@
 /** The page's side of the worker: asks, and turns its messages into promises. */
-import { ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type ShownClip } from "./player";
+import { ClipBroken, type ClipPlayer, type Part, type PlayOptions, type Prepared, type ShownClip } from "./player";
 import type { FromWorker, ToWorker } from "./protocol";
 
 const DECODE_LIMIT_MS = 20_000;
@@ -38,6 +38,15 @@ export class WorkerPlayer implements ClipPlayer {
     const result = asked.then((message) => message as FromWorker & { type: "prepared" });
     result.catch(() => this.prepared.delete(sha256));
     this.prepared.set(sha256, result);
+    return result;
+  }
+
+  compose(name: string, parts: readonly Part[], width: number, height: number): Promise<Prepared> {
+    const asked = this.ask(`prepared ${name}`, DECODE_LIMIT_MS);
+    this.tell({ type: "compose", sha256: name, parts: [...parts], width, height });
+    const result = asked.then((message) => message as FromWorker & { type: "prepared" });
+    result.catch(() => this.prepared.delete(name));
+    this.prepared.set(name, result);
     return result;
   }
 

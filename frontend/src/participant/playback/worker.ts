@@ -2,7 +2,9 @@
  * Decodes clips ahead and draws them at screen refreshes, away from the page's own work.
  * Every drawn frame's index and time is logged and returned.
  */
+import { type Composed, composition, drawFrame, framesOf } from "./compose";
 import { decodeClip, type DecodedClip } from "./decode";
+import type { Part } from "./player";
 import { absoluteNow, type FromWorker, type ToWorker } from "./protocol";
 import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
 import { FrameSchedule } from "./schedule";
@@ -18,13 +20,14 @@ const scope = self as unknown as Scope;
 const WARM_REFRESHES = 4;
 const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callback), absoluteNow, performance.timeOrigin);
 
-const clips = new Map<string, DecodedClip>();
+const clips = new Map<string, DecodedClip | Composed>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
 let background = "#808080";
 
 async function prepare(sha256: string, bytes: ArrayBuffer, declared_fps: number | null): Promise<void> {
   try {
-    const clip = clips.get(sha256) ?? (await decodeClip(bytes, declared_fps));
+    const known = clips.get(sha256);
+    const clip = known && "bitmaps" in known ? known : await decodeClip(bytes, declared_fps);
     clips.set(sha256, clip);
     const { fps, width, height } = clip;
     scope.postMessage({ type: "prepared", sha256, frames: clip.bitmaps.length, width, height, fps });
@@ -33,8 +36,20 @@ async function prepare(sha256: string, bytes: ArrayBuffer, declared_fps: number 
   }
 }
 
+/** Put decoded clips on one canvas, under a name of their own. */
+function compose(name: string, parts: readonly Part[], width: number, height: number): void {
+  try {
+    const composed = composition(parts, (sha256) => clips.get(sha256), width, height);
+    clips.set(name, composed);
+    scope.postMessage({ type: "prepared", sha256: name, frames: framesOf(composed), width, height, fps: composed.fps });
+  } catch (error) {
+    scope.postMessage({ type: "failed", sha256: name, reason: String(error) });
+  }
+}
+
 function release(sha256: string): void {
-  clips.get(sha256)?.bitmaps.forEach((bitmap) => bitmap.close());
+  const clip = clips.get(sha256);
+  if (clip && "bitmaps" in clip) clip.bitmaps.forEach((bitmap) => bitmap.close());
   clips.delete(sha256);
 }
 
@@ -77,8 +92,8 @@ function play(sha256: string, refresh_ms: number, fixation_ms: number): void {
   });
 }
 
-function showing(sha256: string, clip: DecodedClip, refresh_ms: number): Job {
-  const schedule = new FrameSchedule(clip.bitmaps.length, 1000 / clip.fps, refresh_ms);
+function showing(sha256: string, clip: DecodedClip | Composed, refresh_ms: number): Job {
+  const schedule = new FrameSchedule(framesOf(clip), 1000 / clip.fps, refresh_ms);
   const evenness = new EvennessMeter();
   const drawn: [number, number][] = [];
   return (refresh_at_ms, ran_at_ms) => {
@@ -86,15 +101,13 @@ function showing(sha256: string, clip: DecodedClip, refresh_ms: number): Job {
     if (schedule.isOver(refresh_at_ms)) {
       clock.stop();
       blank();
-      const figures = { frames: clip.bitmaps.length, fps: clip.fps, ended_at_ms: absoluteNow(), ...evenness.read() };
+      const figures = { frames: framesOf(clip), fps: clip.fps, ended_at_ms: absoluteNow(), ...evenness.read() };
       scope.postMessage({ type: "played", sha256, drawn, ...figures });
       return;
     }
     const index = schedule.next(refresh_at_ms);
-    const bitmap = index === null ? undefined : clip.bitmaps[index];
-    if (index === null || !bitmap || !context) return;
-    context.drawImage(bitmap, 0, 0, context.canvas.width, context.canvas.height);
-    drawn.push([index, absoluteNow()]);
+    if (index === null || !context) return;
+    if (drawFrame(context, clip, index)) drawn.push([index, absoluteNow()]);
   };
 }
 
@@ -114,6 +127,7 @@ scope.onmessage = ({ data }) => {
   } else if (data.type === "prepare") void prepare(data.sha256, data.bytes, data.fps);
   else if (data.type === "release") release(data.sha256);
   else if (data.type === "blank") resize(data.width, data.height);
+  else if (data.type === "compose") compose(data.sha256, data.parts, data.width, data.height);
   else if (data.type === "warm") warm();
   else play(data.sha256, data.refresh_ms, data.fixation_ms);
 };

@@ -19,8 +19,14 @@ interface Data {
   waited_ms: number;
 }
 
-export function sourcesOf(trials: readonly TrialInfo[]): ClipSource[] {
-  return trials.flatMap(({ clip_sha256, clip_url }) => (clip_sha256 && clip_url ? [{ clip_sha256, clip_url }] : []));
+type WithClips = Pick<TrialInfo, "clip_sha256" | "clip_url"> & Partial<Pick<TrialInfo, "clips">>;
+
+/** Every clip of these trials. A visit that an earlier page has kept knows one clip a trial. */
+export function sourcesOf(trials: readonly WithClips[]): ClipSource[] {
+  return trials.flatMap(({ clips, clip_sha256, clip_url }) => {
+    if (clips) return clips.map((clip) => ({ clip_sha256: clip.clip_sha256, clip_url: clip.clip_url }));
+    return clip_sha256 && clip_url ? [{ clip_sha256, clip_url }] : [];
+  });
 }
 
 export function preloadPage(session: Session): PluginClass<Parameters> {

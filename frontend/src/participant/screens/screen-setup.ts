@@ -29,7 +29,8 @@ export function screenSetup(session: Session): PluginClass<Parameters> {
     data: { full_screen: { type: BOOL, description: "whether the page fills the screen" } },
     async show(display, { eyebrow, again }) {
       if (lacksFullScreen(session)) await askFullScreen(session, display, eyebrow, again);
-      while (lacksRoom(session)) await askRoom(session, display, eyebrow);
+      const { minimum_width_px: width, minimum_height_px: height } = session.run.display;
+      while (lacksRoom(session)) await askRoom(session, display, eyebrow, { width, height });
       return { full_screen: isFullScreen() };
     },
     simulate: () => ({ full_screen: false }),
@@ -66,11 +67,17 @@ function settled(): Promise<void> {
   return new Promise((resolve) => setTimeout(resolve, 300));
 }
 
-async function askRoom(session: Session, display: HTMLElement, eyebrow: string): Promise<void> {
-  const { t, run } = session;
+/** Ask for a larger window; resolves at the next try, however large it is then. */
+export async function askRoom(
+  session: Session,
+  display: HTMLElement,
+  eyebrow: string,
+  needed: { width: number; height: number },
+): Promise<void> {
+  const { t } = session;
   const values = {
-    width: run.display.minimum_width_px,
-    height: run.display.minimum_height_px,
+    width: Math.ceil(needed.width),
+    height: Math.ceil(needed.height),
     have_width: window.innerWidth,
     have_height: window.innerHeight,
   };

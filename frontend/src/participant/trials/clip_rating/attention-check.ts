@@ -8,6 +8,7 @@ import { playbackRecord } from "../../playback/record";
 import { absoluteNow } from "../../playback/protocol";
 import { screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
+import { declaredRating } from "./declared";
 import { askScale, type Rated } from "./scale";
 import { saveRating } from "../save-rating";
 
@@ -25,7 +26,7 @@ export function attentionCheck(session: Session): PluginClass<Parameters> {
     data: { response: { type: INT, description: "the answer given" } },
     show: (display, { trial }) => check(session, display, trial),
     async simulate({ trial }) {
-      const response = Number(/\*\*(\d+)\*\*/.exec(trial.prompt ?? "")?.[1] ?? session.run.trial.scale.minimum);
+      const response = Number(/\*\*(\d+)\*\*/.exec(trial.prompt ?? "")?.[1] ?? declaredRating(session).scale.minimum);
       await store(session, trial, absoluteNow(), { response, answered_at_ms: absoluteNow(), changes: 0, comment: null });
       return { response };
     },
@@ -45,7 +46,7 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
     ...markdown(trial.prompt ?? ""),
   );
   const shown_at_ms = absoluteNow();
-  const rating = { ...session.run.trial, comment: false };
+  const rating = { ...declaredRating(session), comment: false };
   const answer = askScale(below, { trial: rating, language: session.language, t: session.t, signal, question });
   focusHeading(section);
   const rated = await answer;
@@ -59,6 +60,7 @@ function store(session: Session, trial: TrialInfo, shown_at_ms: number, rated: R
     trial_index: trial.trial_index,
     play: 1,
     response: rated.response,
+    answer: null,
     rt: Math.round((rated.answered_at_ms - shown_at_ms) * 100) / 100,
     rt_from_first_frame: null,
     time_elapsed: session.clock.elapsed(),

@@ -2,7 +2,8 @@
 import { trial } from "../../jspsych";
 import type { TrialKind } from "../kind";
 import { attentionCheck } from "./attention-check";
-import { clipRating, placeIn } from "./screen";
+import { placeIn } from "../shared/place";
+import { clipRating } from "./screen";
 
 export const kind: TrialKind = {
   node: (session, what) =>

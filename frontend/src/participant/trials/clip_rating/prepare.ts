@@ -4,7 +4,7 @@ import { h } from "../../../ui/element";
 import { ClipBroken } from "../../playback/player";
 import { sourcesOf } from "../../screens/preload";
 import type { Session } from "../../session";
-import type { Stage } from "./stage";
+import type { Stage } from "../shared/stage";
 
 const SOON_MS = 150;
 

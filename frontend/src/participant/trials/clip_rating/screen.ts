@@ -8,15 +8,16 @@ import { ClipBroken } from "../../playback/player";
 import { playbackRecord } from "../../playback/record";
 import { clipHeight, clipWidth } from "../../screen/size";
 import { screenSignal } from "../../screens/support";
-import { counted, type Session } from "../../session";
+import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
-import { showBroken } from "./broken";
-import { procedureFeedback } from "./feedback";
+import { showBroken } from "../shared/broken";
+import { procedureFeedback } from "../shared/feedback";
+import { declaredRating } from "./declared";
 import { prepareClip } from "./prepare";
 import { askScale, type Rated } from "./scale";
-import { showOnce, type Shown, waitForStart } from "./showing";
+import { showOnce, type Shown, waitForStart } from "../shared/showing";
 import { simulatedRating } from "./simulate";
-import { stage, type Stage } from "./stage";
+import { stage, type Stage } from "../shared/stage";
 
 export interface ClipRatingParameters {
   trial: TrialInfo;
@@ -99,7 +100,7 @@ async function watch(
   sha256: string,
 ): Promise<Shown[]> {
   const { t } = session;
-  const { views } = session.run.trial;
+  const { views, start, fixation_ms, pointer_delay_ms } = declaredRating(session);
   const showings: Shown[] = [];
   const key = trial.kind === "practice" ? "practice_note" : "trial_of";
   for (let view = 1; view <= views; view += 1) {
@@ -107,8 +108,8 @@ async function watch(
     const first = t(touch ? "ready_touch" : "ready");
     const prompt = view > 1 ? t(touch ? "ready_again_touch" : "ready_again", { view, views }) : first;
     const note = play > 1 ? t("ready_replay") : t(key, { number, total });
-    const key_at_ms = await waitForStart(session, place, prompt, note);
-    showings.push(await showOnce(session, place, sha256, key_at_ms));
+    const key_at_ms = await waitForStart(session, place, prompt, note, pointer_delay_ms);
+    showings.push(await showOnce(session, place, sha256, key_at_ms, start === "fixation" ? fixation_ms : 0));
     if (showings.some((shown) => shown.focus_lost > 0)) session.events.add("focus_lost", { trial_index: trial.trial_index });
   }
   return showings;
@@ -116,11 +117,8 @@ async function watch(
 
 async function rate(session: Session, place: Stage): Promise<Rated> {
   const { signal, done } = screenSignal(session);
-  const {
-    run: { trial },
-    language,
-    t,
-  } = session;
+  const { language, t } = session;
+  const trial = declaredRating(session);
   const question = h("h1", { class: "question" }, pick(trial.scale.question, language));
   const rated = await askScale(place.below, { trial, language, t, signal, question });
   done();
@@ -135,6 +133,7 @@ function ratingBody(session: Session, { trial, play }: ClipRatingParameters, sho
     trial_index: trial.trial_index,
     play,
     response: rated.response,
+    answer: null,
     rt: since(last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms),
     rt_from_first_frame: since(last?.drawn[0]?.[1]),
     time_elapsed: session.clock.elapsed(),
@@ -150,6 +149,7 @@ function emptyBody(session: Session, { trial, play }: ClipRatingParameters): Rat
     trial_index: trial.trial_index,
     play,
     response: null,
+    answer: null,
     rt: null,
     rt_from_first_frame: null,
     time_elapsed: session.clock.elapsed(),
@@ -158,11 +158,6 @@ function emptyBody(session: Session, { trial, play }: ClipRatingParameters): Rat
     answered_at_client: new Date().toISOString(),
     playback: { ...playbackRecord(trial.clip_sha256, [], session.screen.record()), frames_missing: trial.frames ?? 0 },
   };
-}
-
-export function placeIn(session: Session, trial: TrialInfo): { number: number; total: number } {
-  const kind = trial.kind === "practice" ? session.run.trials.filter((one) => one.kind === "practice") : counted(session.run);
-  return { number: kind.findIndex((one) => one.trial_index === trial.trial_index) + 1, total: kind.length };
 }
 
 /** Presses start, then a middle key, then whatever goes on. */

@@ -3,16 +3,18 @@ import type { RatingBody } from "../rating";
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
+import { declaredRating } from "./declared";
 import type { ClipRatingData, ClipRatingParameters } from "./screen";
 
 export async function simulatedRating(session: Session, { trial, play }: ClipRatingParameters): Promise<ClipRatingData> {
-  const { minimum, maximum } = session.run.trial.scale;
+  const { minimum, maximum } = declaredRating(session).scale;
   const response = minimum + Math.floor(Math.random() * (maximum - minimum + 1));
   const rt = 400 + Math.round(Math.random() * 1_200);
   const body: RatingBody = {
     trial_index: trial.trial_index,
     play,
     response,
+    answer: null,
     rt,
     rt_from_first_frame: rt + 1_500,
     time_elapsed: session.clock.elapsed(),

@@ -16,11 +16,11 @@ export interface Shown extends Showing {
 const FALLBACK_REFRESH_MS = 1000 / 60;
 
 /** The ready screen; resolves with the time of the press that starts the clip (absolute, ms). */
-export function waitForStart(session: Session, place: Stage, prompt: string, note: string): Promise<number> {
+export function waitForStart(session: Session, place: Stage, prompt: string, note: string, pointer_delay_ms: number): Promise<number> {
   const { signal, done } = screenSignal(session);
   const { t } = session;
   return new Promise((resolve) => {
-    const meant = new MeantPress(session.run.trial.pointer_delay_ms, signal);
+    const meant = new MeantPress(pointer_delay_ms, signal);
     const start = (event: Event): void => {
       if (!meant.allows(event)) return;
       done();
@@ -40,13 +40,15 @@ export function waitForStart(session: Session, place: Stage, prompt: string, not
 }
 
 /** Play the prepared clip once, with nothing else on the screen. */
-export async function showOnce(session: Session, place: Stage, sha256: string, key_at_ms: number): Promise<Shown> {
-  const {
-    run: { trial },
-    player,
-    screen,
-    t,
-  } = session;
+export async function showOnce(
+  session: Session,
+  place: Stage,
+  sha256: string,
+  key_at_ms: number,
+  fixation_ms: number,
+  label = "",
+): Promise<Shown> {
+  const { player, screen, t } = session;
   const { signal, done } = screenSignal(session);
   let early_keys = 0;
   document.addEventListener(
@@ -58,11 +60,11 @@ export async function showOnce(session: Session, place: Stage, sha256: string, k
     { signal },
   );
   place.setPlaying(true);
-  place.below.replaceChildren(h("p", { class: "spoken", role: "status" }, t("clip_playing")));
+  place.below.replaceChildren(h("p", { class: label ? "count" : "spoken", role: "status" }, label || t("clip_playing")));
   const focus = watchFocus();
   const refresh_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : FALLBACK_REFRESH_MS;
   try {
-    const shown = await player.play(sha256, { fixation_ms: trial.start === "fixation" ? trial.fixation_ms : 0, refresh_ms });
+    const shown = await player.play(sha256, { fixation_ms, refresh_ms });
     return { ...shown, key_at_ms, focus_lost: focus.stop(), early_keys };
   } finally {
     focus.stop();

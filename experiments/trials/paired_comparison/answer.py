@@ -1,0 +1,25 @@
+"""What a participant answers to one pair."""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from experiments.base import Declaration
+
+CODES = {"left": 1, "right": 2, "tie": 3}
+"""The number of each answer, as its key has it and an attention check asks for it."""
+
+
+class ComparisonAnswer(Declaration):
+    """The clip chosen, or a tie; None where the pair could not be shown.
+
+    `left` is the first of two clips in turn, and the upper of two stacked ones. arrangement: how the two were
+    in fact shown, which differs from the declaration where two clips beside one another did not fit.
+    """
+
+    winner: Literal["left", "right", "tie"] | None
+    arrangement: Literal["side_by_side", "stacked", "one_after_the_other"] | None = None
+
+
+def check_response(payload: Mapping[str, Any]) -> int | None:
+    """The number of a stored answer."""
+    return CODES.get(payload["winner"])

@@ -1,0 +1,176 @@
+"""The keys of a [trial] whose kind is `paired_comparison`."""
+
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from experiments.base import Declaration, Name, Translated
+from experiments.errors import InputError
+from experiments.trials.kind import TrialDeclaration
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
+
+
+class SideBySide(Declaration):
+    """Two clips beside one another on one canvas, drawn by one clock.
+
+    `if_too_narrow` says what happens on a screen where the two do not fit at actual size: they are stacked,
+    or the participant is asked for a larger window. Which of them was shown is stored with each answer.
+    """
+
+    arrangement: Literal["side_by_side"] = "side_by_side"
+    """Names this arrangement."""
+    gap_mm: Annotated[float, Field(ge=0, le=100)] = 8.0
+    """Plain background between the two clips, in mm."""
+    if_too_narrow: Literal["stack", "refuse"]
+    """Where two clips do not fit beside one another: stack them, or ask for a larger window."""
+
+
+class Stacked(Declaration):
+    """Two clips one above the other on one canvas, drawn by one clock."""
+
+    arrangement: Literal["stacked"] = "stacked"
+    """Names this arrangement."""
+    gap_mm: Annotated[float, Field(ge=0, le=100)] = 8.0
+    """Plain background between the two clips, in mm."""
+
+
+class OneAfterTheOther(Declaration):
+    """Two clips in the same place, the second `gap_ms` of plain background after the first."""
+
+    arrangement: Literal["one_after_the_other"] = "one_after_the_other"
+    """Names this arrangement."""
+    gap_ms: Annotated[int, Field(ge=0, le=10_000)]
+    """Plain background between the two clips, in ms."""
+
+
+Presentation = Annotated[SideBySide | Stacked | OneAfterTheOther, Field(discriminator="arrangement")]
+
+
+class AllPairs(Declaration):
+    """Every clip with every other; `matched` compares clips of the same exemplar number only."""
+
+    among: Literal["all"] = "all"
+    """Names this choice of pairs."""
+    exemplars: Literal["matched", "any"] = "matched"
+    """Only clips of the same exemplar number, or any two clips of the design."""
+
+
+class WithinFactor(Declaration):
+    """Clips that differ in the level of one factor only: other factors and the exemplar are the same."""
+
+    among: Literal["within"] = "within"
+    """Names this choice of pairs."""
+    factor: Name
+    """The factor in whose level the two clips differ."""
+
+
+class CellPair(Declaration):
+    """Two cells to compare, by their labels, each exemplar of the one with the same exemplar of the other."""
+
+    cell: str
+    """Label of the one cell: its level names in factor order, joined by slashes."""
+    other: str
+    """Label of the other cell."""
+
+
+class DeclaredPairs(Declaration):
+    """The pairs of cells in this list and no others."""
+
+    among: Literal["declared"] = "declared"
+    """Names this choice of pairs."""
+    cells: Annotated[tuple[CellPair, ...], Field(min_length=1)]
+    """The pairs of cells."""
+
+
+Pairs = Annotated[AllPairs | WithinFactor | DeclaredPairs, Field(discriminator="among")]
+
+
+class Ties(Declaration):
+    """The answer that neither clip is chosen, and its label."""
+
+    label: Translated
+    """Label of this answer, in every language."""
+
+
+class Reference(Declaration):
+    """A clip shown before each pair, as in degradation category rating: the cell, the pair's exemplar."""
+
+    cell: str
+    """Label of its cell; the exemplar is that of the pair."""
+    label: Translated
+    """What the page says below it while it runs, in every language."""
+    gap_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
+    """Plain background after it, in ms."""
+
+
+class PairedComparison(TrialDeclaration):
+    """Which of two clips? Shown at once or in turn, with a tie where one is declared.
+
+    A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+    """
+
+    kind: Literal["paired_comparison"] = "paired_comparison"
+    """Names this kind of trial."""
+    question: Translated
+    """What is asked of the two clips, in every language."""
+    presentation: Presentation
+    """How the two clips are shown; there is no default."""
+    pairs: Pairs
+    """Which clips are compared."""
+    ties: Ties | None = None
+    """Allows the answer that neither is chosen."""
+    reference: Reference | None = None
+    """A clip shown before each pair."""
+    pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
+    """Time, in ms, for which a mouse that has not moved since its last press chooses nothing."""
+    pairs_per_person: Annotated[int, Field(ge=1, le=5000)] | None = None
+    """Comparisons of one participant in a block, dealt in turn from all pairs; where not given, all."""
+    expected_seconds: Annotated[float, Field(gt=0)] = 8.0
+    """Expected length of a trial in seconds, for the length of a visit."""
+
+    def asked(self, language: str) -> str:
+        """The question and what may be answered."""
+        tie = f" or tie ({self.ties.label.get(language, '')})" if self.ties else ""
+        return f"Question: {self.question.get(language, '')} Answers: left, right{tie}."
+
+    @property
+    def roles(self) -> tuple[str, str]:
+        """The two clips' roles as shown: sides, or order."""
+        if isinstance(self.presentation, OneAfterTheOther):
+            return ("first", "second")
+        return ("left", "right")
+
+    @property
+    def arrangements(self) -> tuple[str, ...]:
+        """Every arrangement that may be shown by this declaration."""
+        shown = self.presentation
+        if isinstance(shown, SideBySide) and shown.if_too_narrow == "stack":
+            return ("side_by_side", "stacked")
+        return (shown.arrangement,)
+
+    @model_validator(mode="after")
+    def _languages_agree(self) -> Self:
+        labelled = {"ties": self.ties, "reference": self.reference}
+        for path, labels in ((f"{name}.label", one.label) for name, one in labelled.items() if one):
+            missing = sorted(set(self.question) - set(labels))
+            if missing:
+                raise ValueError(f"{path} has no text in '{missing[0]}', which the question has")
+        return self
+
+    def fault(self, experiment: "Experiment") -> str | None:
+        """What in the pairs does not fit the experiment, in one line; None where all is well."""
+        from experiments.trials.paired_comparison.pairs import fault
+
+        return fault(experiment, self)
+
+
+def paired_comparison_of(experiment: "Experiment") -> PairedComparison:
+    """The experiment's trial as a paired comparison; InputError where it is of another kind."""
+    if not isinstance(experiment.trial, PairedComparison):
+        raise InputError(
+            f"this needs trials of the kind paired_comparison, '{experiment.name}' has "
+            f"{experiment.trial.kind}"
+        )
+    return experiment.trial

@@ -1,0 +1,188 @@
+"""The pairs of a design: which clips are compared, whether they hang together, and who gets which.
+
+Pure functions of the declaration. A pair is deterministic in its order; sides are dealt by `Deal`.
+"""
+
+import random
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from itertools import combinations, islice, starmap
+from typing import TYPE_CHECKING, NamedTuple
+
+from experiments import design
+from experiments.design import ClipSpec
+from experiments.errors import InputError, did_you_mean
+from experiments.trials.paired_comparison.declaration import (
+    AllPairs,
+    PairedComparison,
+    WithinFactor,
+    paired_comparison_of,
+)
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
+
+
+MAX_PAIRS = 20_000
+
+
+class Pair(NamedTuple):
+    """Two different clips that are compared; `left` names the one that is left at its first showing."""
+
+    left: ClipSpec
+    right: ClipSpec
+
+    @property
+    def swapped(self) -> "Pair":
+        """The same clips, sides exchanged."""
+        return Pair(self.right, self.left)
+
+
+def fault(experiment: "Experiment", trial: PairedComparison) -> str | None:
+    """What in the declared pairs does not fit the experiment, in one line; None where all is well."""
+    cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
+    named: list[tuple[str, str]] = []
+    if isinstance(trial.pairs, WithinFactor):
+        names = experiment.factor_names
+        if trial.pairs.factor not in names:
+            near = did_you_mean(trial.pairs.factor, names)
+            return f"trial.pairs.factor: no factor is called '{trial.pairs.factor}'{near}"
+    elif not isinstance(trial.pairs, AllPairs):
+        named = [
+            ("trial.pairs.cells", cell) for pair in trial.pairs.cells for cell in (pair.cell, pair.other)
+        ]
+        same = [pair.cell for pair in trial.pairs.cells if pair.cell == pair.other]
+        if same:
+            return f"trial.pairs.cells: '{same[0]}' is paired with itself; a pair needs two different cells"
+    if trial.reference:
+        named.append(("trial.reference.cell", trial.reference.cell))
+    unknown = next(((path, cell) for path, cell in named if cell not in cells), None)
+    if unknown:
+        return f"{unknown[0]}: no cell is called '{unknown[1]}'{did_you_mean(unknown[1], cells)}"
+    return _no_pairs_or_split(experiment)
+
+
+def _no_pairs_or_split(experiment: "Experiment") -> str | None:
+    pairs, split = list(islice(_every(experiment), MAX_PAIRS + 1)), experiment.blocks.split_by
+    if not pairs:
+        return "trial.pairs: the design has no two clips to compare; give the factor two levels or more"
+    if len(pairs) > MAX_PAIRS:
+        return (
+            f"trial.pairs: the design has more than {MAX_PAIRS} pairs; compare within a factor, or list them"
+        )
+    for left, right in pairs:
+        if split and left.level(split) != right.level(split):
+            return (
+                f"blocks.split_by: pairs such as {left.cell} with {right.cell} lie across the levels of "
+                f"'{split}', so they are in no block; leave split_by out, or compare within another factor"
+            )
+    return None
+
+
+def every_pair(experiment: "Experiment") -> list[Pair]:
+    """Every pair of the design once, sides as even for each clip as they can be.
+
+    Each pair in turn is put so that the clip which has been left less often (relative to right) is left.
+    """
+    lead: dict[ClipSpec, int] = {}
+    pairs = []
+    for pair in _every(experiment):
+        placed = pair if lead.get(pair.left, 0) <= lead.get(pair.right, 0) else pair.swapped
+        lead[placed.left] = lead.get(placed.left, 0) + 1
+        lead[placed.right] = lead.get(placed.right, 0) - 1
+        pairs.append(placed)
+    return pairs
+
+
+def _every(experiment: "Experiment") -> Iterator[Pair]:
+    declared, clips = paired_comparison_of(experiment).pairs, design.clips(experiment)
+    if isinstance(declared, AllPairs):
+        matched = declared.exemplars == "matched"
+        yield from (Pair(a, b) for a, b in combinations(clips, 2) if not matched or a.exemplar == b.exemplar)
+    elif isinstance(declared, WithinFactor):
+        alike: dict[object, list[ClipSpec]] = {}
+        for clip in clips:
+            rest = tuple(level for level in clip.levels if level[0] != declared.factor)
+            alike.setdefault((rest, clip.exemplar), []).append(clip)
+        for group in alike.values():
+            yield from starmap(Pair, combinations(group, 2))
+    else:
+        at = {(clip.cell, clip.exemplar): clip for clip in clips}
+        numbers = range(1, experiment.exemplars.per_cell + 1)
+        for cells in declared.cells:
+            yield from (Pair(at[cells.cell, number], at[cells.other, number]) for number in numbers)
+
+
+class Deal:
+    """Which pairs each slot gets, and with which sides.
+
+    The pairs stand in one order drawn for the whole study; slot after slot takes the next
+    `pairs_per_person` of them, round and round. So over any run of slots each pair is dealt as often as any
+    other, give or take one, and at every second deal its sides are exchanged.
+    """
+
+    def __init__(self, experiment: "Experiment") -> None:
+        self._experiment = experiment
+        self.pairs = every_pair(experiment)
+        self.each = paired_comparison_of(experiment).pairs_per_person or len(self.pairs)
+
+    @cached_property
+    def _order(self) -> list[int]:
+        order = list(range(len(self.pairs)))
+        if self.each < len(order):
+            random.Random(f"pairs/{self._experiment.exemplars.seed}").shuffle(order)
+        return order
+
+    def of_slot(self, slot: int) -> list[Pair]:
+        """The pairs of one slot, repeats of the blocks not counted."""
+        places = range(slot * self.each, (slot + 1) * self.each)
+        dealt = []
+        for place in places:
+            times, at = divmod(place, len(self.pairs))
+            pair = self.pairs[self._order[at]]
+            dealt.append(pair.swapped if times % 2 else pair)
+        return dealt
+
+
+def item_of(experiment: "Experiment", clip: ClipSpec) -> str:
+    """What a clip stands for when pairs are analysed.
+
+    Its cell; its level where pairs lie within one factor; itself where any exemplars are compared.
+    """
+    declared = paired_comparison_of(experiment).pairs
+    if isinstance(declared, WithinFactor):
+        return clip.level(declared.factor)
+    if isinstance(declared, AllPairs) and declared.exemplars == "any":
+        return f"{clip.cell} ({clip.exemplar})"
+    return clip.cell
+
+
+def groups(edges: Iterable[tuple[str, str]], items: Iterable[str]) -> list[list[str]]:
+    """Items that are compared with one another, directly or through others; one group where all are."""
+    group_of = {item: {item} for item in items}
+    for a, b in edges:
+        if group_of[a] is not group_of[b]:
+            merged = group_of[a] | group_of[b]
+            group_of.update(dict.fromkeys(merged, merged))
+    distinct = {id(group): group for group in group_of.values()}
+    return sorted(sorted(group) for group in distinct.values())
+
+
+def check_connected(experiment: "Experiment", pairs: Iterable[Pair]) -> None:
+    """InputError where these pairs leave items that cannot be put on one scale, naming the groups."""
+    items = {item_of(experiment, clip) for clip in design.clips(experiment)}
+    edges = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
+    found = groups(edges, items)
+    if len(found) > 1:
+        raise InputError(
+            f"'{experiment.name}': expected pairs that connect all items, got {len(found)} groups never "
+            f"compared with one another: {_named(found)}; declare a pair between them, or more participants "
+            "or pairs_per_person"
+        )
+
+
+def _named(found: list[list[str]], limit: int = 6) -> str:
+    def short(names: list[str], joint: str) -> str:
+        return joint.join(names[:limit] + (["..."] if len(names) > limit else []))
+
+    return short(["{" + short(group, ", ") + "}" for group in found], " and ")

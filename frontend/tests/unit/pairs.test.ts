@@ -1,0 +1,140 @@
+import { describe, expect, it } from "vitest";
+
+import type { TrialInfo } from "../../src/api/schema";
+import { composition, drawFrame, framesOf } from "../../src/participant/playback/compose";
+import type { DecodedClip } from "../../src/participant/playback/decode";
+import { winnerOf } from "../../src/participant/trials/paired_comparison/answer-keys";
+import { clipsOf, seenClips } from "../../src/participant/trials/paired_comparison/body";
+import { layoutOf, roomNeeded } from "../../src/participant/trials/paired_comparison/layout";
+
+const BESIDE = { arrangement: "side_by_side", gap_mm: 10, if_too_narrow: "stack" } as const;
+const PIXELS = { width: 960, height: 360 };
+const SHOWN = { width: 480, height: 180 };
+
+describe("layout of a pair", () => {
+  it("puts two clips beside one another at their own size, the gap in millimetres", () => {
+    const layout = layoutOf(BESIDE, PIXELS, SHOWN, { width: 1440, height: 900 }, 4);
+    expect(layout?.canvas).toEqual({ width: 2 * 960 + 80, height: 360 });
+    expect(layout?.shown).toEqual({ width: 1000, height: 180 });
+    expect(layout?.places.map(({ x, y, width, height }) => [x, y, width, height])).toEqual([
+      [0, 0, 960, 360],
+      [1040, 0, 960, 360],
+    ]);
+    expect(layout?.single.x).toBe(520);
+  });
+
+  it("stacks them on a narrow screen only where that is declared", () => {
+    const narrow = { width: 900, height: 900 };
+    expect(layoutOf(BESIDE, PIXELS, SHOWN, narrow, 4)?.arrangement).toBe("stacked");
+    expect(layoutOf({ ...BESIDE, if_too_narrow: "refuse" }, PIXELS, SHOWN, narrow, 4)).toBeNull();
+    expect(layoutOf(BESIDE, PIXELS, SHOWN, { width: 900, height: 500 }, 4)).toBeNull();
+    expect(roomNeeded(BESIDE, SHOWN, 4).width).toBe(1000);
+  });
+
+  it("has one place for two clips in turn", () => {
+    const layout = layoutOf({ arrangement: "one_after_the_other", gap_ms: 300 }, PIXELS, SHOWN, SHOWN, null);
+    expect(layout?.places[0]).toEqual(layout?.places[1]);
+    expect(layout?.canvas).toEqual(PIXELS);
+  });
+});
+
+describe("answers to a pair", () => {
+  it("are given by arrows and numbers, a tie only where there is one", () => {
+    expect(["ArrowLeft", "1", "ArrowRight", "2"].map((key) => winnerOf(key, false))).toEqual(["left", "left", "right", "right"]);
+    expect(["3", "T", "0"].map((key) => winnerOf(key, true))).toEqual(["tie", "tie", "tie"]);
+    expect(["3", "t", "0", "x", "toString"].map((key) => winnerOf(key, false))).toEqual([null, null, null, null, null]);
+  });
+});
+
+describe("one clock for two clips", () => {
+  const clip = (name: string, frames: number, fps = 30): DecodedClip => ({
+    bitmaps: Array.from({ length: frames }, (_, index) => ({ name: `${name}${index}` }) as unknown as ImageBitmap),
+    fps,
+    width: 10,
+    height: 5,
+  });
+  const clips = new Map([
+    ["a", clip("a", 3)],
+    ["b", clip("b", 2)],
+    ["c", clip("c", 3, 60)],
+  ]);
+  const at = (sha256: string, x: number) => ({ sha256, x, y: 0, width: 10, height: 5 });
+
+  it("draws the same frame of each in one call; the shorter holds its last", () => {
+    const pair = composition([at("a", 0), at("b", 12)], (name) => clips.get(name), 22, 5);
+    const drawn: unknown[] = [];
+    const canvas = {
+      canvas: { width: 22, height: 5 },
+      drawImage: (image: unknown, x: number) => drawn.push([(image as { name: string }).name, x]),
+    };
+    expect(framesOf(pair)).toBe(3);
+    for (let index = 0; index < 3; index += 1) expect(drawFrame(canvas, pair, index)).toBe(true);
+    expect(drawn).toEqual([
+      ["a0", 0],
+      ["b0", 12],
+      ["a1", 0],
+      ["b1", 12],
+      ["a2", 0],
+      ["b1", 12],
+    ]);
+  });
+
+  it("refuses clips of two frame rates, and one that is not there", () => {
+    expect(() => composition([at("a", 0), at("c", 12)], (name) => clips.get(name), 22, 5)).toThrow("one frame rate, got 30 and 60");
+    expect(() => composition([at("a", 0), at("z", 12)], (name) => clips.get(name), 22, 5)).toThrow("expected decoded clips");
+  });
+});
+
+describe("what is sent of a pair", () => {
+  const clip = { clip_url: "/c", fps: 30, width_px: 10, height_px: 5, width_mm: null, inter_ocular_px: null };
+  const trial = {
+    clips: [
+      { ...clip, role: "left", clip_sha256: "aa", frames: 3 },
+      { ...clip, role: "right", clip_sha256: "bb", frames: 2 },
+    ],
+  } as unknown as TrialInfo;
+  const showing = {
+    method: "webcodecs" as const,
+    key_at_ms: 100,
+    ended_at_ms: 220,
+    drawn: [
+      [0, 110],
+      [2, 177],
+    ] as [number, number][],
+    frames: 3,
+    fps: 30,
+    stalls: 0,
+    clock_gap_ms: null,
+    clock_late_ms: null,
+    focus_lost: 0,
+  };
+  const shown = [{ roles: ["left", "right"], showing }];
+
+  it("counts each clip's own frames from the one log", () => {
+    expect(clipsOf(trial, shown)).toEqual({
+      left: { clip_sha256: "aa", frames_drawn: 2, frames_missing: 1 },
+      right: { clip_sha256: "bb", frames_drawn: 2, frames_missing: 0 },
+    });
+  });
+
+  it("gives both clips of a view the same times", () => {
+    expect(seenClips(trial, shown)).toEqual([
+      {
+        role: "left",
+        clip_sha256: "aa",
+        drawn: [
+          [0, 10],
+          [2, 77],
+        ],
+      },
+      {
+        role: "right",
+        clip_sha256: "bb",
+        drawn: [
+          [0, 10],
+          [1, 77],
+        ],
+      },
+    ]);
+  });
+});

@@ -1,0 +1,112 @@
+"""The paired comparison: one of two clips, or a tie where one is declared; both clips are judged."""
+
+import math
+import random
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from experiments.definition import Experiment
+from experiments.trials.paired_comparison.answer import CODES, ComparisonAnswer
+from experiments.trials.paired_comparison.declaration import OneAfterTheOther, paired_comparison_of
+from server.errors import Invalid
+from server.trials.kinds import Part, Preference, Served, asked_in
+from server.trials.kinds.clip_rating import RatingMissing, playback_of
+from server.trials.schemas import RatingIn, ShownClip
+from server.trials.verdict import Ruling
+from server.trials.verdict import judge as judge_play
+
+if TYPE_CHECKING:
+    from server.versions import LoadedVersion
+
+
+TIE_SHARE = 0.5
+"""Davidson's nu of simulated people: ties against the geometric mean of the two odds."""
+
+
+class NoComparison(Invalid):
+    """The answer is none to a pair."""
+
+    code = "no_comparison"
+
+
+def payload(rating: RatingIn) -> dict[str, Any]:
+    """The answer as its model has it."""
+    return _answer(rating).model_dump()
+
+
+def _answer(rating: RatingIn) -> ComparisonAnswer:
+    try:
+        return ComparisonAnswer.model_validate(rating.answer)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "answer"
+        raise NoComparison(
+            "Expected an answer with a winner (left, right, tie or none) and an arrangement; got a fault in "
+            f"{place}: {first['msg']}."
+        ) from error
+
+
+def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
+    """Refuse a tie where none is declared, an arrangement that is not, and a check without an answer."""
+    declared, answer = paired_comparison_of(experiment), _answer(rating)
+    if rating.response is not None:
+        raise NoComparison(f"Expected an answer to a pair, got the rating {rating.response}.")
+    if answer.winner == "tie" and declared.ties is None:
+        raise NoComparison("Expected left or right, got tie; this study declares no ties.")
+    if answer.winner is None and part == "attention":
+        raise RatingMissing("Expected an answer, got none; only a pair that failed may go without.")
+    allowed = declared.arrangements
+    if part != "attention" and answer.winner is not None and answer.arrangement not in allowed:
+        raise NoComparison(
+            f"Expected the arrangement {' or '.join(allowed)}, as declared; got {answer.arrangement}."
+        )
+
+
+def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
+    """The verdict on a showing of all clips of the trial: each must be there, and every frame of each.
+
+    Clips at once are drawn by one clock: a frame of the log is one of each clip, and the longest counts. In
+    turn, and for a reference, the log has one clip after the other.
+    """
+    rules, answer = loaded.experiment.playback, _answer(rating)
+    rated = answer.winner is not None
+    playback = playback_of(rating.playback)
+    if not clips:
+        return judge_play(rules, playback, None, 0, 0.0, rated=rated)
+    assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
+    shown: dict[str, ShownClip] = dict((rating.playback.clips or {}).items())
+    if playback.method != "none" and {role: one.clip_sha256 for role, one in shown.items()} != {
+        role: clip.sha256 for role, clip in assigned.items()
+    }:
+        return "failed", "wrong_clip"
+    pair = [clip.frames for role, clip in assigned.items() if role != "reference"]
+    in_turn = isinstance(paired_comparison_of(loaded.experiment).presentation, OneAfterTheOther)
+    before = assigned["reference"].frames if "reference" in assigned else 0
+    frames = before + (sum(pair) if in_turn else max(pair))
+    first = next(iter(assigned.values()))
+    playback = replace(playback, clip_sha256=first.sha256)
+    ruling = judge_play(rules, playback, first.sha256, frames, first.fps, rated=rated)
+    counted = {role: one.frames_drawn + one.frames_missing for role, one in shown.items()}
+    if ruling[0] != "good" or counted == {role: clip.frames for role, clip in assigned.items()}:
+        return ruling
+    return "flagged", "frame_log_disagrees"
+
+
+def simulated(
+    preference: Preference, trial: Mapping[str, Any], declared: Mapping[str, Any], rng: random.Random
+) -> dict[str, Any]:
+    """The answer of a simulated person, by Davidson's model of ties with the odds of the two likings."""
+    if not trial["clips"]:
+        winner = list(CODES)[asked_in(trial["prompt"]) - 1]
+        return {"response": None, "answer": {"winner": winner, "arrangement": None}}
+    left, right = (math.exp(2 * preference(clip["clip_sha256"])) for clip in trial["clips"][:2])
+    tie = TIE_SHARE * math.sqrt(left * right) if declared["tie"] else 0.0
+    winner = rng.choices(list(CODES), weights=[left, right, tie])[0]
+    arrangement = declared["presentation"]["arrangement"]
+    return {"response": None, "answer": {"winner": winner, "arrangement": arrangement}}
+
+
+SERVED = Served(payload, validate, judge, simulated)

@@ -1,0 +1,187 @@
+"""Paired comparisons through the API: assigned by role, judged on both clips, stored, exported, simulated."""
+
+import uuid
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.context import Services
+from server.export.formats import FORMATS
+from server.models import Study
+from server.simulation.person import Person, Rater
+from tests.helpers.comparisons import comparisons
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
+
+PAIRS = (
+    SHORT[: SHORT.index("[trial]")].replace('split_by = "character"\norder = "alternating"', "repeats = 2")
+    + """
+[trial]
+kind = "paired_comparison"
+question = { en = "Which?", de = "Welcher?" }
+pairs = { among = "within", factor = "character" }
+presentation = { arrangement = "side_by_side", if_too_narrow = "stack" }
+ties = { label = { en = "Neither", de = "Keiner" } }
+"""
+    + SHORT[SHORT.index("[[exclusions]]") :]
+)
+
+
+@pytest.fixture
+def pairs(services: Services, tmp_path: Path) -> StudyInDatabase:
+    return add_study(services, tmp_path / "clips", PAIRS)
+
+
+@pytest.fixture
+def judge(client: TestClient, pairs: StudyInDatabase) -> Participant:
+    return Participant(client, pairs.link_token).agree()
+
+
+def mains(participant: Participant) -> list[Any]:
+    return [trial for trial in participant.state()["trials"] if trial["kind"] == "main"]
+
+
+def play_of(trial: Any, **changes: Any) -> dict[str, Any]:
+    clips = {
+        clip["role"]: {
+            "clip_sha256": clip["clip_sha256"],
+            "frames_drawn": clip["frames"],
+            "frames_missing": 0,
+        }
+        for clip in trial["clips"]
+    }
+    return {**good_playback(trial), "clips": clips, **changes}
+
+
+def compare(
+    participant: Participant, trial: Any, winner: str | None, rating_id: str = "", **changes: Any
+) -> Any:
+    body = {
+        "trial_index": trial["trial_index"],
+        "play": 1,
+        "response": None,
+        "answer": {"winner": winner, "arrangement": "side_by_side"},
+        "rt": 700.5,
+        "playback": play_of(trial),
+        **changes,
+    }
+    return participant.request("PUT", f"/ratings/{rating_id or uuid.uuid4()}", body)
+
+
+def stored(services: Services) -> Sequence[Mapping[str, Any]]:
+    with services.database.read() as session:
+        return comparisons(session)
+
+
+def test_a_comparison_is_stored_with_both_clips_and_the_winner(
+    judge: Participant, services: Services
+) -> None:
+    trial = mains(judge)[0]
+    assert [clip["role"] for clip in trial["clips"]] == ["left", "right"]
+    answer = compare(judge, trial, "right")
+    assert answer.status_code == 201, answer.text
+    receipt = answer.json()["receipt"]
+    assert (receipt["verdict"], receipt["rule"]) == ("good", "")
+    (row,) = stored(services)
+    assert (row["winner"], row["arrangement"], row["rt"]) == ("right", "side_by_side", 700.5)
+    assert {row["left_cell"].split("/")[0], row["right_cell"].split("/")[0]} == {"a", "b"}
+    assert row["left_cell"].split("/")[1] == row["right_cell"].split("/")[1]
+    assert row["left_exemplar"] == row["right_exemplar"]
+    assert [row["left_clip_sha256"], row["right_clip_sha256"]] == [
+        clip["clip_sha256"] for clip in trial["clips"]
+    ]
+
+
+def test_the_same_again_is_stored_once_and_another_answer_refused(judge: Participant) -> None:
+    trial, name = mains(judge)[0], str(uuid.uuid4())
+    codes = [compare(judge, trial, winner, name).status_code for winner in ("left", "left", "tie")]
+    assert codes == [201, 200, 409]
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"answer": {"winner": "middle", "arrangement": "side_by_side"}}, "no_comparison"),
+        ({"answer": {"winner": "left", "arrangement": "one_after_the_other"}}, "no_comparison"),
+        ({"answer": {"winner": "left", "arrangement": "side_by_side", "more": "x"}}, "no_comparison"),
+        ({"answer": None}, "no_comparison"),
+        ({"response": 3}, "no_comparison"),
+    ],
+)
+def test_what_is_no_answer_to_a_pair_is_refused_in_one_line(
+    judge: Participant, services: Services, changes: dict[str, Any], code: str
+) -> None:
+    answer = compare(judge, mains(judge)[0], "left", **changes)
+    assert (answer.status_code, answer.json()["error"]["code"]) == (422, code)
+    assert "\n" not in answer.json()["error"]["message"]
+    assert stored(services) == []
+
+
+def test_a_tie_is_refused_where_none_is_declared(
+    client: TestClient, services: Services, tmp_path: Path
+) -> None:
+    without = PAIRS.replace('ties = { label = { en = "Neither", de = "Keiner" } }\n', "")
+    study = add_study(services, tmp_path / "clips", without)
+    judge = Participant(client, study.link_token).agree()
+    trial = mains(judge)[0]
+    assert compare(judge, trial, "tie").json()["error"]["code"] == "no_comparison"
+    assert compare(judge, trial, "left").status_code == 201
+
+
+def test_both_clips_are_judged(judge: Participant) -> None:
+    first, second, third = mains(judge)[:3]
+    clips = play_of(first)["clips"]
+    swapped = {"left": clips["right"], "right": clips["left"]}
+    wrong = compare(judge, first, "left", playback=play_of(first, clips=swapped)).json()["receipt"]
+    assert (wrong["verdict"], wrong["rule"], wrong["again"]) == ("failed", "wrong_clip", True)
+    clips = play_of(second)["clips"]
+    clips["right"]["frames_drawn"] -= 1
+    less = compare(judge, second, "left", playback=play_of(second, clips=clips)).json()["receipt"]
+    assert (less["verdict"], less["rule"]) == ("flagged", "frame_log_disagrees")
+    missing = compare(judge, third, "left", playback=play_of(third, clips=None)).json()["receipt"]
+    assert (missing["verdict"], missing["rule"]) == ("failed", "wrong_clip")
+
+
+def test_simulated_people_compare_to_the_end_and_the_csv_has_their_answers(
+    client: TestClient, services: Services, pairs: StudyInDatabase
+) -> None:
+    class Api:
+        """The client that `Person` speaks through."""
+
+        token = ""
+
+        def get(self, path: str) -> Any:
+            return self._send("GET", path)
+
+        def put(self, path: str, body: Any = None) -> Any:
+            return self._send("PUT", path, body)
+
+        def post(self, path: str, body: Any = None) -> Any:
+            return self._send("POST", path, body)
+
+        def _send(self, method: str, path: str, body: Any = None) -> Any:
+            headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
+            answer = client.request(method, path, json=body, headers=headers)
+            assert answer.status_code < 300, answer.text
+            return answer.json()
+
+    link = pairs.link(synthetic=True)
+    person = Person(Api(), Rater(1, 1, {}))  # type: ignore[arg-type]
+    assert person.take_part(link)
+    rows = stored(services)
+    main = [row for row in rows if row["kind"] == "main"]
+    assert {row["winner"] for row in main} <= {"left", "right", "tie"}
+    assert all(row["run_origin"] == "simulated" for row in rows)
+    checks = [row for row in rows if row["kind"] == "attention"]
+    assert checks
+    assert all(["left", "right", "tie"].index(r["winner"]) + 1 == r["expected_response"] for r in checks)
+    with services.database.read() as session:
+        study = session.query(Study).filter_by(name=pairs.name).one()
+        lines = b"".join(FORMATS["csv"](session, study)).decode().splitlines()
+        codebook = b"".join(FORMATS["codebook"](session, study)).decode()
+    assert len(lines) == 1 + len(rows)
+    assert {"left_cell", "right_cell", "winner", "verdict", "participant"} <= set(lines[0].split(","))
+    assert "| winner | text |" in codebook
+    assert "Question: Which? Answers: left, right or tie (Neither)." in codebook
