@@ -114,7 +114,8 @@ def compare(told: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     assert lost == []
     for one in acknowledged.values():
         row = stored[one["rating_id"]]
-        assert (row["run"], row["trial_index"], row["response"]) == (
+        answered = json.loads(row["payload"])["response"]
+        assert (row["run"], row["trial_index"], answered) == (
             one["run_id"],
             one["trial_index"],
             one["response"],

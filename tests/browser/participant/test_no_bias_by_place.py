@@ -70,7 +70,7 @@ def test_a_mouse_that_has_not_moved_chooses_nothing(
     page.mouse.down()
     page.mouse.up()
     page.wait_for_selector(".ready, .break")
-    rows = server.rows_soon("SELECT response FROM trial_ratings ORDER BY time_elapsed", 2)
+    rows = server.rows_soon("SELECT response FROM ratings ORDER BY time_elapsed", 2)
     assert [row["response"] for row in rows] == [7, 4]
 
 
