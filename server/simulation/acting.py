@@ -47,7 +47,7 @@ class Actor(Person):
             if not due or self.refused:
                 break
             for trial in due:
-                self.rate(trial, state["trial"]["scale"])
+                self.rate(trial, state["trial"])
             self._deliver()
             state = self._state()
         if self.refused or not self._forms(state, "after"):
@@ -61,7 +61,7 @@ class Actor(Person):
         self.tickets = state["tickets"]
         return state
 
-    def rate(self, trial: dict[str, Any], scale: dict[str, Any]) -> bool:
+    def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:
         """Watch and answer one trial; whether it is asked again shows when the run is read anew."""
         manner, clip = self.manner, trial["clip_sha256"]
         self._mishaps()
@@ -69,8 +69,9 @@ class Actor(Person):
         if manner.waits:
             clip_s = trial["frames"] / trial["fps"] if clip else 0.0
             self.moment += timedelta(seconds=clip_s + rt / 1000 + READY_S)
-        body = self.rating(trial, scale) | {"rt": round(rt, 2)}
-        body["response"] = self._response(trial, scale, body["response"])
+        body = self.rating(trial, declared) | {"rt": round(rt, 2)}
+        if "scale" in declared:  # other kinds are answered as the rater model does
+            body["response"] = self._response(trial, declared["scale"], body["response"])
         body["answered_at_client"] = (self.moment + self.clock_off).isoformat()
         if manner.tickets:
             body["evidence"] = self._evidence(trial)

@@ -28,7 +28,7 @@ def rate_until_refused(port: int, link: str, number: int, acknowledged: set[str]
         state = client.get("/api/run")
         for trial in state["trials"]:
             rating_id = str(uuid.uuid4())
-            client.put(f"/api/run/ratings/{rating_id}", person.rating(trial, state["trial"]["scale"]))
+            client.put(f"/api/run/ratings/{rating_id}", person.rating(trial, state["trial"]))
             acknowledged.add(rating_id)
             time.sleep(0.02)
     except OSError:
