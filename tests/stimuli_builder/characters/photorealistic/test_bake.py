@@ -76,6 +76,7 @@ def test_finished_shots_become_an_atlas_without_rendering(tmp_path: Path) -> Non
 
 def test_bake_without_blender_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr("sys.executable", str(tmp_path / "python"))  # no uv beside it either
     with pytest.raises(InputError, match="uv is not on the PATH"):
         bake(order(tmp_path), lambda *_: None)
 
