@@ -45,7 +45,11 @@ class DefinitionError(InputError):
 def load_experiment(name_or_path: str) -> Experiment:
     """Load a shipped experiment by name, or the TOML file at a path."""
     path = locate(name_or_path)
-    return parse_experiment(path.read_text(encoding="utf-8"), path.name)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is not UTF-8 text ({error.reason}); save it as UTF-8") from error
+    return parse_experiment(text, path.name)
 
 
 def locate(name_or_path: str) -> Path:

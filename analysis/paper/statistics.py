@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
+from itertools import product, zip_longest
 from typing import Literal
 
 import numpy as np
@@ -87,7 +87,7 @@ def check_text(text: str) -> TextCheck:
     """Read and check every statistic of `text` (plain signs, see `analysis.paper.document.plain`)."""
     matches = list(_STATISTIC.finditer(text))
     found, covered = [], []
-    for match, following in zip(matches, [*matches[1:], None], strict=True):
+    for match, following in zip_longest(matches, matches[1:]):
         end = min(match.end() + REACH, following.start() if following else len(text))
         tail = text[match.end() : end].split("\n\n")[0]
         reported, used = _reported(match, tail)

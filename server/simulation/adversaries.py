@@ -26,9 +26,7 @@ from server.simulation.person import Rater
 def manner_called(name: str) -> Manner:
     """The manner of this name; InputError where there is none."""
     if name not in MANNERS:
-        raise InputError(
-            f"--as: expected one of {', '.join(MANNERS)}, got '{name}'{did_you_mean(name, MANNERS)}"
-        )
+        raise InputError(f"--as: no manner '{name}'{did_you_mean(name, MANNERS)}")
     return MANNERS[name]
 
 

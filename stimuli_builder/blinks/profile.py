@@ -1,5 +1,6 @@
 """What a blink profile is: closure over time at 300 fps, and what may be done to it."""
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -199,7 +200,8 @@ def with_minimum_at_peak(profile: BlinkProfile) -> BlinkProfile:
 
 def split_duration(duration_frames_30fps: float, down_fraction: float) -> tuple[int, int]:
     """Share a duration, in frames at 30 fps, between the phases: whole 300 fps samples, one or more each."""
-    total = round(duration_frames_30fps * SAMPLES_PER_CLIP_FRAME)
+    finite = math.isfinite(duration_frames_30fps)
+    total = round(duration_frames_30fps * SAMPLES_PER_CLIP_FRAME) if finite else 0
     if not 2 <= total <= 3000:
         raise InputError(f"a blink lasts between 0.2 and 300 frames at 30 fps, got {duration_frames_30fps:g}")
     down = min(max(round(total * down_fraction), 1), total - 1)

@@ -98,3 +98,11 @@ def test_other_files_are_refused(tmp_path, name, message) -> None:
     (tmp_path / "m.xyz").write_text("x")
     with pytest.raises(InputError, match=message):
         read_document(tmp_path / name)
+
+
+def test_text_without_statistics_has_none(tmp_path) -> None:
+    file = tmp_path / "words.txt"
+    file.write_text("nothing to read here")
+    result = CliRunner().invoke(app, ["check-paper", str(file)])
+    assert result.exit_code == 0
+    assert "0 statistics read" in result.output

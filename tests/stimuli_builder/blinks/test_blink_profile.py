@@ -129,3 +129,9 @@ def test_a_table_without_its_columns_is_refused(tmp_path):
     (tmp_path / "t.csv").write_text("profile,closure\na,0\n", encoding="utf-8")
     with pytest.raises(InputError, match="lacks the column 'profile_id'; did you mean 'profile'"):
         read_profile_table(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("frames", [float("nan"), float("inf"), -1.0, 301.0])
+def test_a_duration_no_blink_has_is_refused(frames: float) -> None:
+    with pytest.raises(InputError, match=r"between 0\.2 and 300 frames at 30 fps, got"):
+        split_duration(frames, 0.3)
