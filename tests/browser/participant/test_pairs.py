@@ -1,5 +1,6 @@
 """A pair in a real Chromium: both clips by one clock, answered by keyboard, stored with both logs."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -32,10 +33,18 @@ ties = { label = { en = "No difference", de = "Kein Unterschied" } }
 )
 
 
-def test_pairs_by_keyboard(server: ServerProcess, tmp_path: Path, page: Page) -> None:
-    link = server.add_study(tmp_path / "clips", PAIRS).link_token
-    server.start()
-    visit = Visit(page, server.address).open(link).begin().instructions()
+@pytest.fixture
+def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
+    """A server that refuses answers whose clips were not there."""
+    process = ServerProcess(tmp_path / "data", evidence="refuse")
+    yield process
+    process.stop()
+
+
+def test_pairs_by_keyboard(strict: ServerProcess, tmp_path: Path, page: Page) -> None:
+    link = strict.add_study(tmp_path / "clips", PAIRS).link_token
+    strict.start()
+    visit = Visit(page, strict.address).open(link).begin().instructions()
     for key in ("ArrowRight", "3"):
         page.wait_for_selector(".ready")
         page.keyboard.press(" ")
@@ -45,7 +54,7 @@ def test_pairs_by_keyboard(server: ServerProcess, tmp_path: Path, page: Page) ->
         page.wait_for_selector(".pair-answers", state="detached")
     visit.trials()
     assert visit.problems == []
-    with migrated_services(server.settings) as services, services.database.read() as session:
+    with migrated_services(strict.settings) as services, services.database.read() as session:
         rows = comparisons(session)
         views = session.query(View).order_by(View.trial_index).all()
         logs = {view.trial_index: [] for view in views}
@@ -54,6 +63,8 @@ def test_pairs_by_keyboard(server: ServerProcess, tmp_path: Path, page: Page) ->
             clips = session.query(ViewClip).filter_by(view=view.id).order_by(ViewClip.role)
             logs[view.trial_index] = [(clip.role, unpacked(clip.frame_log)) for clip in clips]
     assert [row["winner"] for row in rows] == ["right", "tie"]
+    digests = strict.rows("SELECT digest_right FROM answer_evidence WHERE clip_ms > 0")
+    assert [row["digest_right"] for row in digests] == [1, 1]
     assert [row["arrangement"] for row in rows] == ["side_by_side"] * 2
     assert {row["verdict"] for row in rows} <= {"good", "uncertain", "flagged"}
     for (left, one), (right, other) in logs.values():

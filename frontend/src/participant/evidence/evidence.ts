@@ -9,6 +9,17 @@ export async function evidenceFor(session: Session, trial: TrialInfo, play: numb
   const ticket = tickets?.by_trial[trial.trial_index]?.[play - 1];
   const interaction = session.interaction.take();
   if (!tickets || !ticket) return null;
-  const clip = trial.clip_sha256 === null ? undefined : session.clips.get(trial.clip_sha256);
-  return { batch: tickets.batch, ticket, digest: clip ? await clipDigest(ticket, clip) : null, interaction };
+  const clips = bytesOf(session, trial);
+  return { batch: tickets.batch, ticket, digest: clips ? await clipDigest(ticket, clips) : null, interaction };
+}
+
+/** The bytes of every clip of a trial, one after the other in the order of their places; null where one is not here. */
+function bytesOf(session: Session, trial: TrialInfo): Blob | null {
+  const parts: ArrayBuffer[] = [];
+  for (const { clip_sha256 } of trial.clips) {
+    const bytes = session.clips.get(clip_sha256);
+    if (!bytes) return null;
+    parts.push(bytes);
+  }
+  return parts.length ? new Blob(parts) : null;
 }
