@@ -70,7 +70,8 @@ def lid_course(
     """Return c of equations 1 to 3 at moments after the onset (n,); durations may differ by moment (n,)."""
     closing = np.clip(time_s / closing_s, 0.0, 1.0) ** closing_power
     opening = np.clip((time_s - closing_s - closed_s) / opening_s, 0.0, 1.0) ** opening_power
-    return np.asarray(_smooth(closing) * (1.0 - _smooth(opening)), dtype=np.float64)
+    # At its end 1 - s(1) may lie a rounding error below 0.
+    return np.maximum(_smooth(closing) * (1.0 - _smooth(opening)), 0.0)
 
 
 def _smooth(u: _Number) -> _Number:
