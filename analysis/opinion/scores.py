@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.opinion.projection import Projection, alternating_projection
-from analysis.read.text_table import name_lines, numbers, read_text_table, texts_required
+from analysis.read.text_table import name_lines, numbers, read_text_table, refuse_shared_roles, texts_required
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -80,9 +80,7 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
         As `read_text_table`; a rating that is no number, no rating at all.
     """
     roles = [item, participant, rating]
-    for name in roles:
-        if roles.count(name) > 1:
-            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+    refuse_shared_roles(roles)
     table = read_text_table(path, roles, ("synthetic",))
     for name in roles[:2]:
         texts_required(table, name)
@@ -99,7 +97,6 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
     np.add.at(totals, (who, which), values[keep])
     np.add.at(counts, (who, which), 1.0)
     scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
-    synthetic = "synthetic" in table.columns and bool((table.columns["synthetic"] == "1").any())
     return Votes(
         scores,
         counts,
@@ -107,7 +104,7 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
         tuple(str(one) for one in items),
         tuple(values[keep][which == index] for index in range(items.size)),
         path.name,
-        synthetic,
+        table.synthetic,
         tuple(table.decisions),
     )
 

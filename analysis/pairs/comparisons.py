@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.read.text_table import MISSING_MARKS, TextTable, name_lines, read_text_table, texts_required
+from analysis.read.text_table import (
+    MISSING_MARKS,
+    TextTable,
+    name_lines,
+    read_text_table,
+    refuse_shared_roles,
+    texts_required,
+)
 from experiments.errors import InputError
 
 LEFT, RIGHT, TIE = 0, 1, 2
@@ -68,9 +75,7 @@ def read_comparisons(
         As `read_text_table`; a pair of an item with itself; a winner that is none of the two.
     """
     roles = [left, right, winner, *([participant] if participant else [])]
-    for name in roles:
-        if roles.count(name) > 1:
-            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+    refuse_shared_roles(roles)
     table = read_text_table(path, roles, ("synthetic",))
     for name in (left, right, *([participant] if participant else [])):
         texts_required(table, name)
@@ -83,7 +88,6 @@ def read_comparisons(
     if participant is not None:
         names, codes = np.unique(columns[participant][judged], return_inverse=True)
         people = tuple(str(name) for name in names)
-    synthetic = "synthetic" in table.columns and bool((table.columns["synthetic"] == "1").any())
     return Comparisons(
         items,
         _indices(items, columns[left][judged]),
@@ -92,7 +96,7 @@ def read_comparisons(
         None if codes is None else codes.astype(np.int64),
         people,
         path.name,
-        synthetic,
+        table.synthetic,
         tuple(table.decisions),
     )
 

@@ -13,6 +13,7 @@ from analysis.read.text_table import (
     name_lines,
     numbers,
     read_text_table,
+    refuse_shared_roles,
     texts_required,
     unusual_numbers,
 )
@@ -63,7 +64,7 @@ def read_long_table(
         with two ratings.
     """
     wanted = [participant, rating, *within, *between, *covariates, *([trial] if trial else [])]
-    _refuse_shared_roles(wanted)
+    refuse_shared_roles(wanted)
     table = read_text_table(path, wanted, ("synthetic",))
     for name in (participant, *within, *between):
         texts_required(table, name)
@@ -99,12 +100,6 @@ def _with_covariate(
         people = f"participant{'s' if len(lacking) > 1 else ''} {', '.join(map(str, lacking))}"
         table.decisions.append(f"left out for want of '{name}': {people}")
     return np.asarray(~np.isin(who, lacking), dtype=bool)
-
-
-def _refuse_shared_roles(names: list[str]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
 
 
 def refuse_out_of_scale(

@@ -34,6 +34,11 @@ class TextTable:
     separator: str
     decisions: list[str] = field(default_factory=list)
 
+    @property
+    def synthetic(self) -> bool:
+        """Whether a column `synthetic`, where it was read, marks a row as made and not given by a person."""
+        return "synthetic" in self.columns and bool((self.columns["synthetic"] == "1").any())
+
     def line(self, row: int) -> int:
         """Line of the file on which data row `row` (from 0) stands, where no cell spans lines."""
         return row + 2
@@ -131,6 +136,13 @@ def categorical(codes: NDArray[np.integer[Any]], found: Sequence[str]) -> "pd.Ca
     lookup = np.array([position[name] for name in found], dtype=np.int64)
     index: pd.Index[str] = pd.Index(names, dtype=object)
     return pd.Categorical.from_codes(lookup[codes], categories=index)
+
+
+def refuse_shared_roles(names: Sequence[str]) -> None:
+    """Refuse a column that is named for two roles."""
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
 
 
 def texts_required(table: TextTable, name: str) -> None:

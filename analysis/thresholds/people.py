@@ -7,7 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from analysis.read.text_table import TextTable, name_lines, numbers, read_text_table, texts_required
+from analysis.read.text_table import (
+    TextTable,
+    name_lines,
+    numbers,
+    read_text_table,
+    refuse_shared_roles,
+    texts_required,
+)
 from analysis.thresholds.likelihood import Shape, Trials
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
@@ -79,9 +86,7 @@ def read_answers(
         As `read_text_table`; a response that is neither, a stimulus that is no number.
     """
     roles = [x, response, *(name for name in (participant, by) if name)]
-    for name in roles:
-        if roles.count(name) > 1:
-            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+    refuse_shared_roles(roles)
     table = read_text_table(path, roles, ("synthetic",))
     for name in roles[2:]:
         texts_required(table, name)
@@ -92,13 +97,12 @@ def read_answers(
         table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer left out ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
-    synthetic = "synthetic" in table.columns and bool((table.columns["synthetic"] == "1").any())
     names = [
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)
     ]
     return Answers(
-        values[keep], answers[keep], names[0], names[1], path.name, synthetic, tuple(table.decisions)
+        values[keep], answers[keep], names[0], names[1], path.name, table.synthetic, tuple(table.decisions)
     )
 
 
