@@ -11,6 +11,7 @@ from experiments.base import Declaration
 from experiments.columns.view import View
 from experiments.design import BlockSpec
 from experiments.schema.effects import Effect
+from experiments.trials.scales import RatedScale
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -28,6 +29,10 @@ class TrialDeclaration(Declaration):
         """What participants are asked and may answer, in one line of the codebook."""
         del language
         return ""
+
+    def rated_scales(self) -> tuple[RatedScale, ...]:
+        """The scales on which each trial is rated; none where its answers are no ratings."""
+        return ()
 
     def fault(self, experiment: "Experiment") -> str | None:
         """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""

@@ -7,9 +7,13 @@ from pydantic import Field, model_validator
 from experiments.base import Declaration, Translated
 from experiments.errors import InputError
 from experiments.trials.kind import TrialDeclaration
+from experiments.trials.scales import RatedScale
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
+
+SCALE_NAME = "rating"
+"""Name of the scale of a [trial.scale], which declares none."""
 
 
 class Scale(Declaration):
@@ -62,6 +66,25 @@ class ClipRating(TrialDeclaration):
         return (
             f"Scale: {scale.minimum} ({scale.low.get(language, '')}) to {scale.maximum} "
             f"({scale.high.get(language, '')}). Question: {scale.question.get(language, '')}"
+        )
+
+    def rated_scales(self) -> tuple[RatedScale, ...]:
+        """The one scale."""
+        scale = self.scale
+        return (
+            RatedScale(
+                name=SCALE_NAME,
+                type="points",
+                minimum=scale.minimum,
+                maximum=scale.maximum,
+                step=1,
+                reverse=False,
+                not_applicable=False,
+                question=scale.question,
+                low=scale.low,
+                high=scale.high,
+                member="response",
+            ),
         )
 
 
