@@ -1,19 +1,16 @@
 """Apply the exclusion rules an experiment declared before its data; every one named with its reason."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Literal, assert_never
+from typing import assert_never
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from analysis.read.study_ratings import StudyRatings
 from experiments import rules
 from experiments.definition import Experiment
-
-Mask = NDArray[np.bool_]
+from experiments.rules.exclusion import LeavesOutRuns, LeavesOutTrials, RunTrials, Source
 
 
 @dataclass(frozen=True)
@@ -90,17 +87,35 @@ def _participant_reasons(
     not_applied: list[str] = []
     for run, why in _by_hand(rows):
         reasons.setdefault(run, []).append(why)
+    sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
     for rule in experiment.exclusions:
-        finder = _finder(rule)
-        if isinstance(finder, _OfTrials):
+        if not isinstance(rule, LeavesOutRuns):
             continue
-        if finder.needed not in rows.columns:
-            not_applied.append(f"{rule.rule}: the data have no column '{finder.needed}'")
+        missing = next((name for name in rule.needed if name not in rows.columns), None)
+        if missing is not None:
+            not_applied.append(f"{rule.rule}: the data have no column '{missing}'")
             continue
-        source = {"rows": rows, "plays": plays, "attention": attention}[finder.source]
-        for run, why in finder.find(source):
-            reasons.setdefault(run, []).append(f"{rule.rule}: {why}")
+        for run, trials in _by_run(sources[rule.source], rule.needed):
+            reason = _why(rule, trials)
+            if reason is not None:
+                reasons.setdefault(run, []).append(f"{rule.rule}: {reason}")
     return reasons, not_applied
+
+
+def _by_run(rows: pd.DataFrame, names: tuple[str, ...]) -> Iterator[tuple[str, RunTrials]]:
+    """Each run's values of some columns."""
+    values = {name: rows[name].to_numpy() for name in names}
+    for run, places in rows.groupby("run", observed=True).indices.items():
+        yield str(run), RunTrials({name: column[places].tolist() for name, column in values.items()})
+
+
+def _why(rule: rules.ExclusionRule, trials: RunTrials) -> str | None:
+    """The rule's own word on a run; a rule that is of neither sort, or has no method, fails type-checking."""
+    if isinstance(rule, LeavesOutRuns):
+        return rule.excludes(trials)
+    if isinstance(rule, LeavesOutTrials):
+        return None
+    assert_never(rule)
 
 
 def _by_hand(rows: pd.DataFrame) -> list[tuple[str, str]]:
@@ -112,83 +127,6 @@ def _by_hand(rows: pd.DataFrame) -> list[tuple[str, str]]:
         (str(run), f"by hand: {why or 'no reason given'}")
         for run, why in zip(chosen["run"], given, strict=True)
     ]
-
-
-Finding = list[tuple[str, str]]
-
-
-def _incomplete(_: rules.ExcludeIncomplete, rows: pd.DataFrame) -> Finding:
-    runs = rows[["run", "run_status"]].drop_duplicates()
-    return [
-        (str(run), f"run is {status}")
-        for run, status in runs.itertuples(index=False)
-        if status not in {"complete", ""}
-    ]
-
-
-def _attention(rule: rules.ExcludeAttention, rows: pd.DataFrame) -> Finding:
-    asked = rows[~np.isnan(rows["expected_response"].to_numpy())]
-    failed = asked[(asked["response"] != asked["expected_response"]).to_numpy()]
-    counts = failed["run"].value_counts()
-    return [(str(run), f"{n} failed") for run, n in counts.items() if n > rule.more_than]
-
-
-def _playback(rule: rules.ExcludePlayback, rows: pd.DataFrame) -> Finding:
-    poor = rows["verdict"].isin(["flagged", "failed"]).to_numpy()
-    shares = pd.Series(poor, index=rows.index).groupby(rows["run"], observed=True).mean()
-    return [
-        (str(run), f"{share:.0%} of plays were flagged or failed")
-        for run, share in shares.items()
-        if share > rule.more_than
-    ]
-
-
-def _straight(rule: rules.ExcludeStraightLining, rows: pd.DataFrame) -> Finding:
-    counts = rows.groupby(["run", "response"], observed=True).size().groupby(level=0, observed=True)
-    share = counts.max() / counts.sum()
-    return [(str(run), f"{s:.0%} of answers are the same") for run, s in share.items() if s > rule.more_than]
-
-
-def _fast(rule: rules.ExcludeFast, rows: pd.DataFrame) -> Finding:
-    medians = rows["rt"].groupby(rows["run"], observed=True).median()
-    return [(str(run), f"median {rt:.0f} ms") for run, rt in medians.items() if rt < rule.below_ms]
-
-
-@dataclass(frozen=True)
-class _OfRuns:
-    """Finds runs to leave out among all rows, main plays or attention checks; needs one column for it."""
-
-    needed: str
-    source: Literal["rows", "plays", "attention"]
-    find: Callable[[pd.DataFrame], Finding]
-
-
-@dataclass(frozen=True)
-class _OfTrials:
-    """Finds trials to leave out among those that remain; needs one column for it."""
-
-    needed: str
-    find: Callable[[pd.DataFrame], Mask]
-
-
-def _finder(rule: rules.ExclusionRule) -> _OfRuns | _OfTrials:
-    match rule:
-        case rules.ExcludeIncomplete():
-            return _OfRuns("run_status", "rows", partial(_incomplete, rule))
-        case rules.ExcludeAttention():
-            return _OfRuns("expected_response", "attention", partial(_attention, rule))
-        case rules.ExcludePlayback():
-            return _OfRuns("verdict", "plays", partial(_playback, rule))
-        case rules.ExcludeStraightLining():
-            return _OfRuns("response", "plays", partial(_straight, rule))
-        case rules.ExcludeFast():
-            return _OfRuns("rt", "plays", partial(_fast, rule))
-        case rules.DropFailedPlays():
-            return _OfTrials("verdict", _failed)
-        case rules.DropSlowTrials():
-            return _OfTrials("rt", partial(_slow, rule))
-        case _:
-            assert_never(rule)
 
 
 def _later_runs(people: dict[str, str], reasons: dict[str, list[str]], ratings: StudyRatings) -> None:
@@ -209,22 +147,13 @@ def _drop_trials(
     dropped: list[DroppedTrials] = []
     missing: list[str] = []
     for rule in experiment.exclusions:
-        finder = _finder(rule)
-        if isinstance(finder, _OfRuns):
+        if not isinstance(rule, LeavesOutTrials):
             continue
-        if finder.needed not in rows.columns:
-            missing.append(f"{rule.rule}: the data have no column '{finder.needed}'")
+        if rule.needed not in rows.columns:
+            missing.append(f"{rule.rule}: the data have no column '{rule.needed}'")
             continue
-        bad = finder.find(rows)
+        bad = np.array([rule.drops(value) for value in rows[rule.needed].tolist()], dtype=bool)
         if bad.any():
             dropped.append(DroppedTrials(rule.rule, int(bad.sum()), int(rows["run"][bad].nunique())))
         rows = rows[~bad]
     return rows, tuple(dropped), missing
-
-
-def _failed(rows: pd.DataFrame) -> Mask:
-    return (rows["verdict"] == "failed").to_numpy()
-
-
-def _slow(rule: rules.DropSlowTrials, rows: pd.DataFrame) -> Mask:
-    return (rows["rt"] > rule.above_ms).to_numpy()

@@ -1,7 +1,8 @@
 """Rules declared before the data, one file a rule: playback, attention checks, screening, exclusions.
 
-A new rule is its file and its place in a union below. Every use matches the union to its end
-(`assert_never`), so type-checking names the uses that do not know it.
+A new rule is its file and its place in a union below. An exclusion rule judges by a method of its own; every
+use of screening rules matches the union to its end (`assert_never`). Type-checking names a rule that nothing
+applies.
 """
 
 from typing import Annotated

@@ -11,27 +11,56 @@ from tests.conftest import REPOSITORY
 
 NEW = '''from typing import Literal
 
-from experiments.base import Declaration
+from {module} import {base}
 
 
-class NewRule(Declaration):
+class NewRule({base}):
     """A rule that nothing applies."""
 
     rule: Literal["new_rule"] = "new_rule"
 '''
+BASE, EXCLUSION = "experiments.base", "experiments.rules.exclusion"
 SETTINGS = "[mypy]\nfollow_imports = skip\nignore_missing_imports = True\n"
 PYDANTIC = "from typing import Any\nclass BaseModel: ...\ndef __getattr__(name: str) -> Any: ...\n"
 """Enough of it for the classes to be classes; the whole would take the checker ten seconds."""
 
 
 @pytest.mark.parametrize(
-    ("union", "user"),
+    ("union", "user", "module", "base", "complaint"),
     [
-        ("ExclusionRule = Annotated[", "analysis/plans/exclusions.py"),
-        ("ScreeningRule = Annotated[", "server/participants/screening.py"),
+        (
+            "ExclusionRule = Annotated[",
+            "analysis/plans/exclusions.py",
+            BASE,
+            "Declaration",
+            'Argument 1 to "assert_never"',
+        ),
+        (
+            "ExclusionRule = Annotated[",
+            "analysis/plans/exclusions.py",
+            EXCLUSION,
+            "LeavesOutRuns",
+            'has no attribute "excludes"',
+        ),
+        (
+            "ExclusionRule = Annotated[",
+            "analysis/plans/exclusions.py",
+            EXCLUSION,
+            "LeavesOutTrials",
+            'has no attribute "drops"',
+        ),
+        (
+            "ScreeningRule = Annotated[",
+            "server/participants/screening.py",
+            BASE,
+            "Declaration",
+            'Argument 1 to "assert_never"',
+        ),
     ],
 )
-def test_a_rule_without_its_finder_fails_type_checking(tmp_path: Path, union: str, user: str) -> None:
+def test_a_rule_without_its_finder_fails_type_checking(
+    tmp_path: Path, union: str, user: str, module: str, base: str, complaint: str
+) -> None:
     for folder in ("rules", "definition"):
         shutil.copytree(REPOSITORY / "experiments" / folder, tmp_path / "experiments" / folder)
     for needed in ("base", "errors", "__init__"):
@@ -41,14 +70,14 @@ def test_a_rule_without_its_finder_fails_type_checking(tmp_path: Path, union: st
     (tmp_path / user).parent.mkdir(parents=True)
     shutil.copy(REPOSITORY / user, tmp_path / user)
     rules = tmp_path / "experiments" / "rules" / "__init__.py"
-    (rules.parent / "new_rule.py").write_text(NEW)
+    (rules.parent / "new_rule.py").write_text(NEW.format(module=module, base=base))
     text = rules.read_text(encoding="utf-8")
     assert union in text
     text = text.replace(union, f"{union}NewRule | ", 1)
     rules.write_text(f"from experiments.rules.new_rule import NewRule\n{text}")
     complaints = unhandled(tmp_path, user)
     assert len(complaints) == 1
-    assert 'Argument 1 to "assert_never"' in complaints[0]
+    assert complaint in complaints[0]
 
 
 def unhandled(folder: Path, user: str) -> list[str]:

@@ -1,5 +1,7 @@
 """A declared experiment from its export and its database: exclusions by name, checks, the same numbers."""
 
+from typing import ClassVar, Literal
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -13,6 +15,7 @@ from analysis.report.left_out import left_out
 from experiments import rules
 from experiments.errors import InputError
 from experiments.load import load_experiment, locate, parse_experiment
+from experiments.rules.exclusion import LeavesOutRuns, RunTrials
 from tests.analysis.ratings_file import change, rows_of, simulate, write_export
 from tests.analysis.study_database import make_database
 
@@ -68,6 +71,26 @@ def test_a_participant_rule_excludes_by_name_with_its_reason(tmp_path, rows, rul
     assert excluded.participant == "P03"
     assert excluded.reasons[0].startswith(reason)
     assert any("participant P03 (run run3) excluded" in line for line in left_out(analysis.exclusions))
+
+
+class ExcludeAnswersInTurn(LeavesOutRuns):
+    """A rule that neither the analysis nor anything else knows."""
+
+    rule: Literal["answers_in_turn"] = "answers_in_turn"
+    needed: ClassVar[tuple[str, ...]] = ("response",)
+
+    def excludes(self, run: RunTrials) -> str | None:
+        given = run.given("response")
+        return "1 and 2 in turn" if given == [1 + place % 2 for place in range(len(given))] else None
+
+
+def test_a_new_rule_is_applied_by_its_own_file_alone(tmp_path, rows) -> None:
+    mine = [row for row in rows if row["run"] == "run4"]
+    in_turn = {row["trial_index"]: 1 + place % 2 for place, row in enumerate(mine)}
+    rows = [row | {"response": in_turn[row["trial_index"]]} if row in mine else row for row in rows]
+    analysis = analyse(tmp_path, rows, with_rules(ExcludeAnswersInTurn()))
+    (excluded,) = analysis.exclusions.runs
+    assert (excluded.participant, excluded.reasons) == ("P04", ("answers_in_turn: 1 and 2 in turn",))
 
 
 def test_failed_attention_checks_exclude(tmp_path, rows) -> None:
