@@ -95,7 +95,7 @@ class LoadRater:
         self.tally.rating_at.append(began)
         self.tally.rating_ms.append(1000 * (time.perf_counter() - began))
         if status in (200, 201):
-            self.tally.acknowledged[rating_id] = body["response"]
+            self.tally.acknowledged[rating_id] = body["answer"]["answers"]["rating"]["response"]
 
     async def insist(
         self, method: str, path: str, body: Any = None, *, keep: bool = True

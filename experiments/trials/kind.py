@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from experiments.assignment.trial import Trial
 from experiments.base import Declaration
@@ -40,6 +40,22 @@ class TrialDeclaration(Declaration):
         return None
 
 
+class Answer(Declaration):
+    """What a participant answers to one trial; each kind adds its own keys, and a constant as its `kind`."""
+
+    kind: str
+    """Kind of the trial that is answered."""
+
+    @property
+    def given(self) -> bool:
+        """True where something was answered; a clip that could not be shown goes without."""
+        return any(value is not None for name, value in self if name != "kind")
+
+    def stored(self) -> dict[str, Any]:
+        """The payload of `trial_ratings`."""
+        return self.model_dump(mode="json", exclude={"kind"})
+
+
 def nothing_more(experiment: "Experiment") -> tuple[str, ...]:
     """What a plan says of a kind whose trials the cells and exemplars tell already."""
     del experiment
@@ -53,7 +69,7 @@ class Kind:
     Attributes
     ----------
     declaration: the model of the TOML's [trial]; the constant of its `kind` is the name.
-    answer: the model of what a participant answers to one trial.
+    answer: the model of what a participant answers to one trial, and how that is stored.
     view: the rows it exports.
     roles: the clips a trial shows, in the order of their places (`shown`; `left`, `right`).
     effects: what an edit of each key of the declaration does to stored answers, by path below [trial].
@@ -68,7 +84,7 @@ class Kind:
     """
 
     declaration: type[TrialDeclaration]
-    answer: type[BaseModel]
+    answer: type[Answer]
     view: View
     roles: tuple[str, ...]
     effects: Mapping[str, Effect]
@@ -79,7 +95,7 @@ class Kind:
     example: str
     further_examples: tuple[str, ...] = ()
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
-    check_response: Callable[[Mapping[str, Any]], int | None] = lambda payload: payload.get("response")
+    check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     shares_clips: bool = False
 
     @property

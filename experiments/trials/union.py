@@ -1,23 +1,34 @@
-"""The type of the TOML's [trial], and of what a page is told of it: whichever kind its key `kind` names."""
+"""Types that are of whichever kind their key `kind` names: a [trial], what a page is told, an answer."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from experiments.base import Declaration
 from experiments.trials import KINDS
-from experiments.trials.kind import TrialDeclaration
+from experiments.trials.kind import Answer, Kind, TrialDeclaration
 
 
+@dataclass(frozen=True)
 class ByKind:
-    """Annotation: a union over the registry, told apart by `kind`, also where there is one kind only."""
+    """Annotation: a union over the registry, told apart by `kind`, also where there is one kind only.
+
+    Attributes
+    ----------
+    model: a kind's member of the union. implied: whether the first kind is meant where none is named.
+    """
+
+    model: Callable[[Kind], type[BaseModel]]
+    implied: bool = False
 
     def __get_pydantic_core_schema__(self, _source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """A tagged union of the registered declarations."""
-        choices = {name: handler.generate_schema(kind.declaration) for name, kind in KINDS.items()}
+        """A tagged union of the registered models."""
+        choices = {name: handler.generate_schema(self.model(kind)) for name, kind in KINDS.items()}
         union = core_schema.tagged_union_schema(choices, discriminator="kind")
-        return core_schema.no_info_before_validator_function(_with_kind, union)
+        return core_schema.no_info_before_validator_function(_with_kind, union) if self.implied else union
 
 
 def _with_kind(value: Any) -> Any:
@@ -26,16 +37,6 @@ def _with_kind(value: Any) -> Any:
     return value
 
 
-AnyTrial = Annotated[TrialDeclaration, ByKind()]
-
-
-class PageByKind:
-    """Annotation: a union over what the pages of the registered kinds are told, told apart by `kind`."""
-
-    def __get_pydantic_core_schema__(self, _source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """A tagged union of the page models."""
-        choices = {name: handler.generate_schema(kind.page) for name, kind in KINDS.items()}
-        return core_schema.tagged_union_schema(choices, discriminator="kind")
-
-
-AnyPage = Annotated[Declaration, PageByKind()]
+AnyTrial = Annotated[TrialDeclaration, ByKind(lambda kind: kind.declaration, implied=True)]
+AnyPage = Annotated[Declaration, ByKind(lambda kind: kind.page)]
+AnyAnswer = Annotated[Answer, ByKind(lambda kind: kind.answer)]

@@ -50,7 +50,7 @@ class StoredAnswer(NamedTuple):
 
 def answers(session: Session, run: StudyRun) -> list[StoredAnswer]:
     """The answers of a run; of a rating only what is judged, since its frame log is large."""
-    rated = (Rating.trial_index, Rating.play, Rating.payload, Rating.rt, Rating.saved_at)
+    rated = (Rating.trial_index, Rating.play, Rating.kind, Rating.payload, Rating.rt, Rating.saved_at)
     query = select(*rated).where(Rating.study_run_id == run.id).order_by(Rating.id)
     trials, shown, evidence = _trials(session, run), _with_clips(session, run), _stored(session, run)
     return [

@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.trials import KINDS
 from server.evidence import repository
 from server.evidence.signals import JudgedAnswer
 from server.evidence.verdict import NOT_JUDGED, Judgement, judge
@@ -22,6 +23,8 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
 def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
     evidence, trial = row.evidence, row.trial
     response = _response(row.rating.payload)
+    if trial.kind == "attention":
+        response = KINDS[row.rating.kind].check_response(row.rating.payload)
     given = (evidence.interaction if evidence else None) or {}
     unchecked = evidence is not None and evidence.digest is not None and evidence.digest_right is None
     return JudgedAnswer(

@@ -5,6 +5,7 @@ import uuid
 from datetime import datetime, timedelta
 from typing import Any
 
+from experiments.trials.clip_rating.declaration import SCALE_NAME
 from server.clock import now
 from server.context import SIMULATED_TIME
 from server.evidence.clip_bytes import clip_digest
@@ -71,7 +72,8 @@ class Actor(Person):
             self.moment += timedelta(seconds=clip_s + rt / 1000 + READY_S)
         body = self.rating(trial, declared) | {"rt": round(rt, 2)}
         if "scale" in declared:  # other kinds are answered as the rater model does
-            body["response"] = self._response(trial, declared["scale"], body["response"])
+            given = body["answer"]["answers"][SCALE_NAME]
+            given["response"] = self._response(trial, declared["scale"], given["response"])
         body["answered_at_client"] = (self.moment + self.clock_off).isoformat()
         if manner.tickets:
             body["evidence"] = self._evidence(trial)

@@ -123,7 +123,7 @@ class Person:
         return {
             "trial_index": trial["trial_index"],
             "play": trial["plays_done"] + 1,
-            **served(declared["kind"]).simulated(self.rater.likes, trial, declared, rng),
+            "answer": served(declared["kind"]).simulated(self.rater.likes, trial, declared, rng),
             "rt": round(rt, 2),
             "rt_from_first_frame": round(rt + length_ms, 2),
             "time_elapsed": round(self.elapsed_ms, 2),

@@ -1,10 +1,12 @@
 """One rating as the page sends it, and the receipt it gets."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, StrictInt, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from experiments.trials.clip_rating.declaration import SCALE_NAME
+from experiments.trials.union import AnyAnswer
 from server.evidence.schemas import RatingEvidence
 
 Milliseconds = Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)]
@@ -15,7 +17,6 @@ FrameTime = tuple[
 
 
 Role = Literal["shown", "left", "right", "first", "second", "reference"]
-ShortText = Annotated[str, StringConstraints(max_length=40)]
 
 
 class ShownClip(BaseModel):
@@ -26,12 +27,29 @@ class ShownClip(BaseModel):
     frames_missing: Count
 
 
+class ShownClips(BaseModel):
+    """The clips of a trial by their roles; those that its kind does not show are left out."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    shown: ShownClip | None = None
+    left: ShownClip | None = None
+    right: ShownClip | None = None
+    first: ShownClip | None = None
+    second: ShownClip | None = None
+    reference: ShownClip | None = None
+
+    def by_role(self) -> dict[str, ShownClip]:
+        """The clips that are there."""
+        return {role: clip for role, clip in self if clip is not None}
+
+
 class PlaybackLog(BaseModel):
     """What the page measured while the clip played; null where it could not."""
 
     method: Literal["webcodecs", "video", "none"]
     clip_sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
-    clips: dict[Role, ShownClip] | None = Field(
+    clips: ShownClips | None = Field(
         default=None, description="Of each clip, by its role, where a trial shows several."
     )
     key_to_first_frame_ms: Milliseconds | None = None
@@ -56,17 +74,14 @@ class PlaybackLog(BaseModel):
 
 
 class RatingIn(BaseModel):
-    """One play of one trial with its answer: a rating as `response`, of other kinds as `answer`.
+    """One play of one trial with its answer, whose `kind` is that of the study's trials.
 
-    `response` is null where the clip could not be rated.
+    Pages of before send a rating as `response`, a whole number or null.
     """
 
     trial_index: Count
     play: Annotated[int, Field(ge=1, le=100)] = 1
-    response: StrictInt | None
-    answer: dict[ShortText, ShortText | None] | None = Field(
-        default=None, description="The answer of a kind other than clip_rating, as its model has it."
-    )
+    answer: AnyAnswer
     rt: Milliseconds | None = Field(default=None, description="From the clip's last frame to the answer, ms.")
     rt_from_first_frame: Milliseconds | None = None
     time_elapsed: Milliseconds | None = Field(
@@ -77,6 +92,18 @@ class RatingIn(BaseModel):
     answered_at_client: datetime | None = None
     playback: PlaybackLog
     evidence: RatingEvidence | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_an_older_page(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or "response" not in data:
+            return data
+        if data.get("answer") is None:
+            rated = {SCALE_NAME: {"response": data["response"]}}
+            return {**data, "answer": {"kind": "clip_rating", "answers": rated}}
+        if data["response"] is not None:
+            raise ValueError(f"expected an answer alone, got the response {data['response']!r:.40} beside it")
+        return data
 
 
 class Receipt(BaseModel):

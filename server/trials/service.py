@@ -6,7 +6,6 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.definition import Experiment
-from experiments.trials import KINDS
 from server.errors import Conflict, Invalid, NotFound
 from server.evidence.intake import Answer, Intake
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
@@ -59,7 +58,7 @@ def save_rating(
     loaded = versions.get(connection, run.version_id)
     stored = repository.stored_ratings(connection, run.id, rating.trial_index, rating_id)
     kind = loaded.experiment.trial.kind
-    answer = served(kind).payload(rating)
+    answer = rating.answer.stored()
     known = _known(stored, rating_id, rating, answer)
     most = loaded.experiment.playback.max_repeats
     if known is not None:
@@ -69,7 +68,7 @@ def save_rating(
         return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
     _check(run, loaded.experiment, trial.kind, rating)
     if run.evidence == "asked":
-        rated = KINDS[kind].check_response(answer) is not None
+        rated = rating.answer.given
         intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at, rated=rated))
     ruling = served(kind).judge(loaded, trial.clips, rating)
     repository.add_rating(connection, _row(run, rating_id, kind, answer, rating, ruling, saved_at))
@@ -168,7 +167,7 @@ def _row(
         "comment": rating.comment,
         "answered_at_client": _with_zone(rating.answered_at_client),
         **rating.playback.model_dump(exclude={"clips"}),
-        "playback": rating.playback.model_dump(include={"clips"})["clips"],
+        "playback": rating.playback.model_dump(include={"clips"}, exclude_none=True).get("clips"),
         "focus_lost": None if rating.playback.focus_lost is None else rating.playback.focus_lost > 0,
         "px_per_mm": run.px_per_mm,
         "viewing_distance_mm": run.viewing_distance_mm,

@@ -172,7 +172,9 @@ class Participant:
         assert self.request("PUT", "/consent", {"agreed": True}).status_code == 200
         return self
 
-    def rate(self, trial: Any, response: int | None = 4, rating_id: str | None = None, **changes: Any) -> Any:
+    def rate(
+        self, trial: Any, response: float | None = 4, rating_id: str | None = None, **changes: Any
+    ) -> Any:
         """Send one rating; `changes` replace parts of the body, `playback` those of the play."""
         playback = {**good_playback(trial), **changes.pop("playback", {})}
         body = {"trial_index": trial["trial_index"], "play": 1, "response": response, "rt": 700.5}

@@ -76,7 +76,7 @@ def test_no_acknowledged_rating_is_lost_or_doubled(
                 status, answer = client.call("PUT", f"/api/run/ratings/{rating_id}", body)
                 assert status in (200, 201)
                 sent += 1
-                acknowledged[answer["receipt"]["rating_id"]] = body["response"]
+                acknowledged[answer["receipt"]["rating_id"]] = body["answer"]["answers"]["rating"]["response"]
             client.close()
     finally:
         os.killpg(process.pid, signal.SIGTERM)

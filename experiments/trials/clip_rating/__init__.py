@@ -1,7 +1,7 @@
 """One clip after another, each rated on a scale."""
 
 from experiments.schema.effects import Effect
-from experiments.trials.clip_rating.answer import RatingAnswer
+from experiments.trials.clip_rating.answer import RatingAnswer, check_response
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import ClipRating
 from experiments.trials.clip_rating.page import ShownClipRating, shown
@@ -47,4 +47,5 @@ CLIP_RATING = Kind(
     plan=plan,
     shares_clips=True,
     example=EXAMPLE,
+    check_response=check_response,
 )

@@ -1439,6 +1439,17 @@ export interface components {
             table: "two_level_factors" | "pairs_and_interactions" | "one_factor";
         };
         /**
+         * Answer
+         * @description What a participant answers to one trial; each kind adds its own keys, and a constant as its `kind`.
+         */
+        Answer: {
+            /**
+             * Kind
+             * @description Kind of the trial that is answered.
+             */
+            kind: string;
+        };
+        /**
          * Assignment
          * @description Which clips of their cells participants see; without a key everybody sees every clip.
          *
@@ -1922,6 +1933,24 @@ export interface components {
              * @description Answers per scale point, from the lowest.
              */
             counts: number[];
+        };
+        /**
+         * ComparisonAnswer
+         * @description The clip chosen, or a tie; None where the pair could not be shown.
+         *
+         *     `left` is the first of two clips in turn, and the upper of two stacked ones. arrangement: how the two were
+         *     in fact shown, which differs from the declaration where two clips beside one another did not fit.
+         */
+        ComparisonAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "paired_comparison";
+            /** Winner */
+            winner: ("left" | "right" | "tie") | null;
+            /** Arrangement */
+            arrangement?: ("side_by_side" | "stacked" | "one_after_the_other") | null;
         };
         /**
          * Completion
@@ -3427,13 +3456,8 @@ export interface components {
             method: "webcodecs" | "video" | "none";
             /** Clip Sha256 */
             clip_sha256?: string | null;
-            /**
-             * Clips
-             * @description Of each clip, by its role, where a trial shows several.
-             */
-            clips?: {
-                [key: string]: components["schemas"]["ShownClip"];
-            } | null;
+            /** @description Of each clip, by its role, where a trial shows several. */
+            clips?: components["schemas"]["ShownClips"] | null;
             /** Key To First Frame Ms */
             key_to_first_frame_ms?: number | null;
             /** Frames Drawn */
@@ -3564,6 +3588,21 @@ export interface components {
             message: string;
         };
         /**
+         * RatingAnswer
+         * @description The answers to one clip by the name of their scale; a [trial.scale] is called `rating`.
+         */
+        RatingAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "clip_rating";
+            /** Answers */
+            answers: {
+                [key: string]: components["schemas"]["ScaleAnswer"];
+            };
+        };
+        /**
          * RatingEvidence
          * @description What a rating brings along to show how it came about.
          */
@@ -3581,9 +3620,9 @@ export interface components {
         };
         /**
          * RatingIn
-         * @description One play of one trial with its answer: a rating as `response`, of other kinds as `answer`.
+         * @description One play of one trial with its answer, whose `kind` is that of the study's trials.
          *
-         *     `response` is null where the clip could not be rated.
+         *     Pages of before send a rating as `response`, a whole number or null.
          */
         RatingIn: {
             /** Trial Index */
@@ -3593,15 +3632,8 @@ export interface components {
              * @default 1
              */
             play?: number;
-            /** Response */
-            response: number | null;
-            /**
-             * Answer
-             * @description The answer of a kind other than clip_rating, as its model has it.
-             */
-            answer?: {
-                [key: string]: string | null;
-            } | null;
+            /** Answer */
+            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"];
             /**
              * Rt
              * @description From the clip's last frame to the answer, ms.
@@ -4212,6 +4244,24 @@ export interface components {
             };
         };
         /**
+         * ScaleAnswer
+         * @description The answer on one scale; neither a number nor `not_applicable` where the clip could not be shown.
+         */
+        ScaleAnswer: {
+            /** Response */
+            response: number | null;
+            /**
+             * Not Applicable
+             * @default false
+             */
+            not_applicable?: boolean;
+            /**
+             * Rt
+             * @description From the clip's last frame to this answer, in ms; where there is one scale it is that of the trial.
+             */
+            rt?: number | null;
+        };
+        /**
          * ScreenAttention
          * @description Screen out as soon as more than `more_than` attention checks were answered otherwise than asked.
          */
@@ -4454,6 +4504,18 @@ export interface components {
             comment: boolean;
             /** Expected Seconds */
             expected_seconds: number;
+        };
+        /**
+         * ShownClips
+         * @description The clips of a trial by their roles; those that its kind does not show are left out.
+         */
+        ShownClips: {
+            shown?: components["schemas"]["ShownClip"] | null;
+            left?: components["schemas"]["ShownClip"] | null;
+            right?: components["schemas"]["ShownClip"] | null;
+            first?: components["schemas"]["ShownClip"] | null;
+            second?: components["schemas"]["ShownClip"] | null;
+            reference?: components["schemas"]["ShownClip"] | null;
         };
         /**
          * ShownPairedComparison
@@ -5167,6 +5229,7 @@ export interface components {
 export type AccountOut = components['schemas']['AccountOut'];
 export type AllPairs = components['schemas']['AllPairs'];
 export type AnalysisPlan = components['schemas']['AnalysisPlan'];
+export type Answer = components['schemas']['Answer'];
 export type Assignment = components['schemas']['Assignment'];
 export type AttentionChecks = components['schemas']['AttentionChecks'];
 export type AuditOut = components['schemas']['AuditOut'];
@@ -5190,6 +5253,7 @@ export type ChoiceField = components['schemas']['ChoiceField'];
 export type ClipOut = components['schemas']['ClipOut'];
 export type ClipRating = components['schemas']['ClipRating'];
 export type ClipResult = components['schemas']['ClipResult'];
+export type ComparisonAnswer = components['schemas']['ComparisonAnswer'];
 export type Completion = components['schemas']['Completion'];
 export type ConfirmCode = components['schemas']['ConfirmCode'];
 export type ConfirmPassword = components['schemas']['ConfirmPassword'];
@@ -5260,6 +5324,7 @@ export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
 export type Practice = components['schemas']['Practice'];
 export type ProblemOut = components['schemas']['ProblemOut'];
+export type RatingAnswer = components['schemas']['RatingAnswer'];
 export type RatingEvidence = components['schemas']['RatingEvidence'];
 export type RatingIn = components['schemas']['RatingIn'];
 export type RatingSaved = components['schemas']['RatingSaved'];
@@ -5280,6 +5345,7 @@ export type RunState = components['schemas']['RunState'];
 export type RunSummary = components['schemas']['RunSummary'];
 export type Saved = components['schemas']['Saved'];
 export type Scale = components['schemas']['Scale'];
+export type ScaleAnswer = components['schemas']['ScaleAnswer'];
 export type ScreenAttention = components['schemas']['ScreenAttention'];
 export type ScreenDevice = components['schemas']['ScreenDevice'];
 export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
@@ -5292,6 +5358,7 @@ export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
 export type ShownClip = components['schemas']['ShownClip'];
 export type ShownClipRating = components['schemas']['ShownClipRating'];
+export type ShownClips = components['schemas']['ShownClips'];
 export type ShownPairedComparison = components['schemas']['ShownPairedComparison'];
 export type ShownReference = components['schemas']['ShownReference'];
 export type SideBySide = components['schemas']['SideBySide'];

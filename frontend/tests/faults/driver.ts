@@ -59,7 +59,8 @@ function watched(run_id: string) {
 
 function note(run_id: string, path: string, body: RatingBody, answer: Answer): void {
   if (answer.status === 200 || answer.status === 201) {
-    acknowledged.push({ rating_id: path.slice(RATING.length), run_id, trial_index: body.trial_index, response: body.response ?? 0 });
+    const response = body.answer.kind === "clip_rating" ? (body.answer.answers["rating"]?.response ?? 0) : 0;
+    acknowledged.push({ rating_id: path.slice(RATING.length), run_id, trial_index: body.trial_index, response });
   } else if (!isTemporary(answer.status)) refused.push({ path, status: answer.status, body: answer.body });
 }
 
@@ -114,8 +115,7 @@ function ratingOf(trial: RunState["trials"][number]): RatingBody {
   return {
     trial_index: trial.trial_index,
     play: 1,
-    response: 1 + Math.floor(Math.random() * 7),
-    answer: null,
+    answer: { kind: "clip_rating", answers: { rating: { response: 1 + Math.floor(Math.random() * 7) } } },
     rt: 500,
     rt_from_first_frame: 1_500,
     time_elapsed: 1_000 * (trial.trial_index + 1),

@@ -7,9 +7,11 @@ import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from experiments.definition import Experiment
+from experiments.trials.kind import Answer
+from server.errors import Invalid
 from server.trials.schemas import RatingIn
 from server.trials.verdict import Ruling
 
@@ -32,18 +34,35 @@ class Served:
 
     Attributes
     ----------
-    payload: the answer as it is stored; refuses what is none of this kind.
     validate: refuses (by an `Invalid`) an answer that the declaration does not allow in this part.
     judge: the verdict on the views of the clips with these ids by role (none for an attention check), by
         the declared playback rules.
-    simulated: the answer of a simulated person (`response`, `answer`) to a trial as the page gets it, with
-        the declaration as the page gets it.
+    simulated: the answer of a simulated person to a trial as the page gets it, with the declaration as the
+        page gets it.
     """
 
-    payload: Callable[[RatingIn], dict[str, Any]]
     validate: Callable[[Experiment, Part, RatingIn], None]
     judge: "Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]"
     simulated: Callable[[Preference, Mapping[str, Any], Mapping[str, Any], random.Random], dict[str, Any]]
+
+
+class AnswerOfOtherKind(Invalid):
+    """The answer belongs to trials of another kind than the study's."""
+
+    code = "answer_of_other_kind"
+
+
+A = TypeVar("A", bound=Answer)
+
+
+def answer_of(rating: RatingIn, model: type[A]) -> A:
+    """The answer, which is one of this kind; AnswerOfOtherKind where it is not."""
+    if not isinstance(rating.answer, model):
+        kind = str(get_args(model.model_fields["kind"].annotation)[0])
+        raise AnswerOfOtherKind(
+            f"Expected an answer of the kind {kind}, as this study declares it; got {rating.answer.kind}."
+        )
+    return rating.answer
 
 
 _SERVED: dict[str, Served] = {}

@@ -5,9 +5,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.clip_rating.answer import RatingAnswer, ScaleAnswer
+from experiments.trials.clip_rating.declaration import SCALE_NAME, clip_rating_of
+from experiments.trials.scales import RatedScale, scales_of
 from server.errors import Invalid
-from server.trials.kinds import Part, Preference, Served, asked_in
+from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
 from server.trials.schemas import PlaybackLog, RatingIn
 from server.trials.verdict import Playback, Ruling, frames_in_log
 from server.trials.verdict import judge as judge_play
@@ -32,25 +34,43 @@ class RatingMissing(Invalid):
     code = "rating_missing"
 
 
-def payload(rating: RatingIn) -> dict[str, Any]:
-    """The rating, as its model has it."""
-    return {"response": rating.response}
+class NoSuchScale(Invalid):
+    """The study does not declare a scale of this name."""
+
+    code = "no_such_scale"
 
 
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
-    """Refuse a rating beyond the scale, and a check without an answer."""
-    scale = clip_rating_of(experiment).scale
-    if rating.response is not None and not scale.minimum <= rating.response <= scale.maximum:
-        raise RatingOutOfScale(
-            f"Expected a whole number from {scale.minimum} to {scale.maximum}, got {rating.response}."
+    """Refuse other scales than those declared, a rating that is off its scale, and some but not all."""
+    answer = answer_of(rating, RatingAnswer)
+    asked = {scale.name: scale for scale in scales_of(experiment)}
+    for name in answer.answers:
+        if name not in asked:
+            raise NoSuchScale(f"Expected answers on the scales {', '.join(asked)}; got one on {name}.")
+    missing = [name for name in asked if name not in answer.answers or not answer.answers[name].given]
+    failed = len(missing) == len(asked) and part != "attention"
+    if missing and not failed:
+        raise RatingMissing(
+            f"Expected an answer on {missing[0]}, got none; only a clip that failed may go without."
         )
-    if rating.response is None and part == "attention":
-        raise RatingMissing("Expected an answer, got none; only a clip that failed may go without.")
+    for name, given in answer.answers.items():
+        _check(asked[name], given)
+
+
+def _check(scale: RatedScale, given: ScaleAnswer) -> None:
+    if given.not_applicable and not scale.not_applicable:
+        raise RatingOutOfScale(f"Expected a number on {scale.name}, got not_applicable, which it has not.")
+    if given.response is not None and not scale.admits(given.response):
+        numbers = "a whole number" if scale.step == 1 else f"a number in steps of {scale.step:g}"
+        raise RatingOutOfScale(
+            f"Expected {numbers} from {scale.minimum:g} to {scale.maximum:g} on {scale.name}, "
+            f"got {given.response}."
+        )
 
 
 def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on one play over all its views, and the rule that gave it."""
-    rules, rated = loaded.experiment.playback, rating.response is not None
+    rules, rated = loaded.experiment.playback, rating.answer.given
     if not clips:
         return judge_play(rules, playback_of(rating.playback), None, 0, 0.0, rated=rated)
     clip = loaded.clips[clips["shown"]]
@@ -82,10 +102,14 @@ def simulated(
     """The rating of a simulated person: the liking around the middle of the scale, rounded into it."""
     minimum, maximum = declared["scale"]["minimum"], declared["scale"]["maximum"]
     if not trial["clips"]:
-        return {"response": asked_in(trial["prompt"])}
+        return _one_answer(asked_in(trial["prompt"]))
     middle, unit = (minimum + maximum) / 2, (maximum - minimum) / 6
     value = middle + unit * (preference(trial["clips"][0]["clip_sha256"]) + rng.gauss(0, TRIAL_SD))
-    return {"response": min(maximum, max(minimum, round(value)))}
+    return _one_answer(min(maximum, max(minimum, round(value))))
 
 
-SERVED = Served(payload, validate, judge, simulated)
+def _one_answer(response: int) -> dict[str, Any]:
+    return {"kind": "clip_rating", "answers": {SCALE_NAME: {"response": response}}}
+
+
+SERVED = Served(validate, judge, simulated)

@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
 from experiments.definition import Experiment
 from experiments.trials.paired_comparison.answer import CODES, ComparisonAnswer
 from experiments.trials.paired_comparison.declaration import OneAfterTheOther, paired_comparison_of
 from server.errors import Invalid
-from server.trials.kinds import Part, Preference, Served, asked_in
+from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
 from server.trials.kinds.clip_rating import RatingMissing, playback_of
-from server.trials.schemas import RatingIn, ShownClip
+from server.trials.schemas import RatingIn
 from server.trials.verdict import Ruling
 from server.trials.verdict import judge as judge_play
 
@@ -32,28 +30,9 @@ class NoComparison(Invalid):
     code = "no_comparison"
 
 
-def payload(rating: RatingIn) -> dict[str, Any]:
-    """The answer as its model has it."""
-    return _answer(rating).model_dump()
-
-
-def _answer(rating: RatingIn) -> ComparisonAnswer:
-    try:
-        return ComparisonAnswer.model_validate(rating.answer)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "answer"
-        raise NoComparison(
-            "Expected an answer with a winner (left, right, tie or none) and an arrangement; got a fault in "
-            f"{place}: {first['msg']}."
-        ) from error
-
-
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
     """Refuse a tie where none is declared, an arrangement that is not, and a check without an answer."""
-    declared, answer = paired_comparison_of(experiment), _answer(rating)
-    if rating.response is not None:
-        raise NoComparison(f"Expected an answer to a pair, got the rating {rating.response}.")
+    declared, answer = paired_comparison_of(experiment), answer_of(rating, ComparisonAnswer)
     if answer.winner == "tie" and declared.ties is None:
         raise NoComparison("Expected left or right, got tie; this study declares no ties.")
     if answer.winner is None and part == "attention":
@@ -71,13 +50,12 @@ def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -
     Clips at once are drawn by one clock: a frame of the log is one of each clip, and the longest counts. In
     turn, and for a reference, the log has one clip after the other.
     """
-    rules, answer = loaded.experiment.playback, _answer(rating)
-    rated = answer.winner is not None
+    rules, rated = loaded.experiment.playback, rating.answer.given
     playback = playback_of(rating.playback)
     if not clips:
         return judge_play(rules, playback, None, 0, 0.0, rated=rated)
     assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
-    shown: dict[str, ShownClip] = dict((rating.playback.clips or {}).items())
+    shown = rating.playback.clips.by_role() if rating.playback.clips else {}
     if playback.method != "none" and {role: one.clip_sha256 for role, one in shown.items()} != {
         role: clip.sha256 for role, clip in assigned.items()
     }:
@@ -101,12 +79,12 @@ def simulated(
     """The answer of a simulated person, by Davidson's model of ties with the odds of the two likings."""
     if not trial["clips"]:
         winner = list(CODES)[asked_in(trial["prompt"]) - 1]
-        return {"response": None, "answer": {"winner": winner, "arrangement": None}}
+        return {"kind": "paired_comparison", "winner": winner}
     left, right = (math.exp(2 * preference(clip["clip_sha256"])) for clip in trial["clips"][:2])
     tie = TIE_SHARE * math.sqrt(left * right) if declared["tie"] else 0.0
     winner = rng.choices(list(CODES), weights=[left, right, tie])[0]
     arrangement = declared["presentation"]["arrangement"]
-    return {"response": None, "answer": {"winner": winner, "arrangement": arrangement}}
+    return {"kind": "paired_comparison", "winner": winner, "arrangement": arrangement}
 
 
-SERVED = Served(payload, validate, judge, simulated)
+SERVED = Served(validate, judge, simulated)

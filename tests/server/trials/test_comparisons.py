@@ -28,6 +28,8 @@ ties = { label = { en = "Neither", de = "Keiner" } }
     + SHORT[SHORT.index("[[exclusions]]") :]
 )
 
+LEFT = {"kind": "paired_comparison", "winner": "left", "arrangement": "side_by_side"}
+
 
 @pytest.fixture
 def pairs(services: Services, tmp_path: Path) -> StudyInDatabase:
@@ -61,8 +63,7 @@ def compare(
     body = {
         "trial_index": trial["trial_index"],
         "play": 1,
-        "response": None,
-        "answer": {"winner": winner, "arrangement": "side_by_side"},
+        "answer": {"kind": "paired_comparison", "winner": winner, "arrangement": "side_by_side"},
         "rt": 700.5,
         "playback": play_of(trial),
         **changes,
@@ -103,11 +104,14 @@ def test_the_same_again_is_stored_once_and_another_answer_refused(judge: Partici
 @pytest.mark.parametrize(
     ("changes", "code"),
     [
-        ({"answer": {"winner": "middle", "arrangement": "side_by_side"}}, "no_comparison"),
-        ({"answer": {"winner": "left", "arrangement": "one_after_the_other"}}, "no_comparison"),
-        ({"answer": {"winner": "left", "arrangement": "side_by_side", "more": "x"}}, "no_comparison"),
-        ({"answer": None}, "no_comparison"),
-        ({"response": 3}, "no_comparison"),
+        ({"answer": {**LEFT, "winner": "middle"}}, "invalid"),
+        ({"answer": {**LEFT, "arrangement": "one_after_the_other"}}, "no_comparison"),
+        ({"answer": {**LEFT, "more": "x"}}, "invalid"),
+        ({"answer": None}, "invalid"),
+        ({"answer": {**LEFT, "kind": "no_such_kind"}}, "invalid"),
+        ({"response": 3}, "invalid"),
+        ({"answer": None, "response": 3}, "answer_of_other_kind"),
+        ({"answer": {"kind": "clip_rating", "answers": {"x": {"response": 3}}}}, "answer_of_other_kind"),
     ],
 )
 def test_what_is_no_answer_to_a_pair_is_refused_in_one_line(

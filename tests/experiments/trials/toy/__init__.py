@@ -14,7 +14,7 @@ from experiments.assignment.trial import Shown, Trial
 from experiments.base import Declaration, Translated
 from experiments.columns import Column, View, base
 from experiments.columns.tables import rows_of
-from experiments.trials.kind import Kind, TrialDeclaration
+from experiments.trials.kind import Answer, Kind, TrialDeclaration
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -38,7 +38,8 @@ def shown(experiment: "Experiment") -> ShownSameOrNot:
     return ShownSameOrNot(question=experiment.trial.question)
 
 
-class SameAnswer(Declaration):
+class SameAnswer(Answer):
+    kind: Literal["same_or_not"]
     same: bool
 
 

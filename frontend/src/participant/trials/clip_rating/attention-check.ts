@@ -59,8 +59,7 @@ function store(session: Session, trial: TrialInfo, shown_at_ms: number, rated: R
   return saveRating(session, trial, {
     trial_index: trial.trial_index,
     play: 1,
-    response: rated.response,
-    answer: null,
+    answer: { kind: "clip_rating", answers: { rating: { response: rated.response } } },
     rt: Math.round((rated.answered_at_ms - shown_at_ms) * 100) / 100,
     rt_from_first_frame: null,
     time_elapsed: session.clock.elapsed(),

@@ -69,7 +69,8 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Clip
   await saveRating(session, trial, body);
   if (trial.clip_sha256 && trial.clip_sha256 !== parameters.next?.clip_sha256) session.player.release(trial.clip_sha256);
   const { frames_missing, key_to_first_frame_ms } = body.playback;
-  return { response: body.response, rt: body.rt, frames_missing, key_to_first_frame_ms, again: parameters.play > 1 };
+  const response = body.answer.kind === "clip_rating" ? (body.answer.answers["rating"]?.response ?? null) : null;
+  return { response, rt: body.rt, frames_missing, key_to_first_frame_ms, again: parameters.play > 1 };
 }
 
 function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
@@ -132,8 +133,7 @@ function ratingBody(session: Session, { trial, play }: ClipRatingParameters, sho
   return {
     trial_index: trial.trial_index,
     play,
-    response: rated.response,
-    answer: null,
+    answer: { kind: "clip_rating", answers: { rating: { response: rated.response } } },
     rt: since(last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms),
     rt_from_first_frame: since(last?.drawn[0]?.[1]),
     time_elapsed: session.clock.elapsed(),
@@ -148,8 +148,7 @@ function emptyBody(session: Session, { trial, play }: ClipRatingParameters): Rat
   return {
     trial_index: trial.trial_index,
     play,
-    response: null,
-    answer: null,
+    answer: { kind: "clip_rating", answers: { rating: { response: null } } },
     rt: null,
     rt_from_first_frame: null,
     time_elapsed: session.clock.elapsed(),

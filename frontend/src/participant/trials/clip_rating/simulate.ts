@@ -13,8 +13,7 @@ export async function simulatedRating(session: Session, { trial, play }: ClipRat
   const body: RatingBody = {
     trial_index: trial.trial_index,
     play,
-    response,
-    answer: null,
+    answer: { kind: "clip_rating", answers: { rating: { response } } },
     rt,
     rt_from_first_frame: rt + 1_500,
     time_elapsed: session.clock.elapsed(),

@@ -1,6 +1,6 @@
 /** From what was shown of a pair to what the server is sent. */
 import type { TrialInfo } from "../../../api/schema";
-import type { ShownClip } from "../../../api/schema";
+import type { ShownClips } from "../../../api/schema";
 import type { PlaybackRecord, Showing } from "../../playback/record";
 import type { RatingBody } from "../rating";
 import type { Winner } from "./answer-keys";
@@ -13,7 +13,7 @@ export interface RolesShown {
 }
 
 /** Frames of each clip that were drawn: one of a shorter clip holds its last frame while the longer goes on. */
-export function clipsOf(trial: TrialInfo, shown: readonly RolesShown[]): Record<string, ShownClip> {
+export function clipsOf(trial: TrialInfo, shown: readonly RolesShown[]): ShownClips {
   return Object.fromEntries(
     trial.clips.map((clip) => {
       const log = shown.find(({ roles }) => roles.includes(clip.role))?.showing.drawn ?? [];
@@ -35,8 +35,7 @@ export function comparisonBody(trial: TrialInfo, play: number, given: Given, pla
   return {
     trial_index: trial.trial_index,
     play,
-    response: null,
-    answer: { winner: given.winner, arrangement: given.arrangement },
+    answer: { kind: "paired_comparison", winner: given.winner, arrangement: given.arrangement },
     rt: given.rt,
     rt_from_first_frame: given.rt_from_first_frame,
     time_elapsed: given.time_elapsed,

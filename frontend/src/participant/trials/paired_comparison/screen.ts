@@ -68,7 +68,8 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Comp
   });
   await saveRating(session, trial, body);
   releasePair(session, trial, next);
-  return { winner: body.answer?.["winner"] ?? null, rt: body.rt, again: play > 1 };
+  const winner = body.answer.kind === "paired_comparison" ? body.answer.winner : null;
+  return { winner, rt: body.rt, again: play > 1 };
 }
 
 async function watchAndCompare(session: Session, display: HTMLElement, parameters: ComparisonParameters): Promise<RatingBody> {
