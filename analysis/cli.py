@@ -14,6 +14,7 @@ app = typer.Typer(
 
 
 def _gather() -> None:
+    from analysis.commands.anova import register as register_anova
     from analysis.commands.check_paper import register as register_check_paper
     from analysis.commands.models import register as register_models
     from analysis.commands.opinion import register as register_opinion
@@ -22,6 +23,7 @@ def _gather() -> None:
     from analysis.commands.thresholds import register as register_thresholds
 
     register_run(app)
+    register_anova(app)
     register_check_paper(app)
     register_models(app)
     register_pairs(app)

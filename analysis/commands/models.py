@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, names_in, save_json, show_tables, working
+from analysis.commands.output import JsonOption, names_in, save_json, saying, show_tables
 
 if TYPE_CHECKING:
     from analysis.read.model_csv import ModelInput
@@ -75,7 +75,7 @@ def mixed(
     from analysis.report.model_tables import mixed_components_table, mixed_effects_table, mixed_text
 
     data = _read(file, participant, rating, within, item)
-    with working("fitting"):
+    with saying("fitting"):
         result = fit_mixed(data.rows, participant, rating, data.within, data.item, slopes.value)
     _show(file, data, mixed_text(result))
     named = (result, file.stem, data.synthetic)
@@ -103,7 +103,7 @@ def ordinal(
     from analysis.report.model_tables import ordinal_coefficients_table, ordinal_effects_table, ordinal_text
 
     data = _read(file, participant, rating, within, item)
-    with working("fitting"):
+    with saying("fitting"):
         result = fit_ordinal(data.rows, participant, rating, data.within, data.item)
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
@@ -114,7 +114,7 @@ def ordinal(
 def _read(file: Path, participant: str, rating: str, within: str, item: str) -> "ModelInput":
     from analysis.read.model_csv import read_model_input
 
-    with working("reading ratings"):
+    with saying("reading ratings"):
         return read_model_input(file, participant, rating, names_in(within), names_in(item))
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, show_tables, working
+from analysis.commands.output import JsonOption, save_json, saying, show_tables
 
 
 class RepeatsChoice(StrEnum):
@@ -44,7 +44,7 @@ def opinion(
     from analysis.opinion.scores import fit_opinion, read_votes
     from analysis.report.opinion_tables import opinion_text, raters_table, scores_table
 
-    with working("reading votes"):
+    with saying("reading votes"):
         votes = read_votes(file, item, participant, rating)
     result = fit_opinion(votes, repeats.value)
     typer.echo(opinion_text(result, file.stem, votes.synthetic))

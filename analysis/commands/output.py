@@ -1,16 +1,31 @@
 """What the commands on models and synthetic data share: tables, JSON, a spinner."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from experiments.errors import InputError
+
 if TYPE_CHECKING:
+    from analysis.report.contents import Contents
     from analysis.report.formats import Table
 
-JsonOption = Annotated[Path | None, typer.Option(help="Write every number to this JSON file.")]
+
+def _writable(path: Path | None) -> Path | None:
+    """Refuse, before the work, a file that cannot be written."""
+    from experiments.files import check_targets
+
+    check_targets([path])
+    return path
+
+
+JsonOption = Annotated[
+    Path | None, typer.Option(help="Write every number to this JSON file.", callback=_writable)
+]
 
 
 def names_in(text: str) -> list[str]:
@@ -26,26 +41,70 @@ def show_tables(*tables: "Table") -> None:
         typer.echo("\n" + as_text(table))
 
 
-def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool) -> None:
-    """Write numbers to a JSON file, whole or not at all; nothing where no path is given."""
+def show(contents: "Contents") -> None:
+    """Print who was left out and the tables, at most 80 columns wide."""
+    from analysis.report.formats import as_text, wrap
+
+    lines = [contents.title, f"{contents.n_participants} participants, from {contents.source}"]
+    if contents.synthetic:
+        lines.append(f"SYNTHETIC DATA: no person gave these {contents.given}")
+    said = [*contents.left_out, *contents.decisions]
+    lines += [part for text in said for part in wrap(f"- {text}")]
+    typer.echo("\n".join(lines))
+    for part in contents.parts:
+        if part.title:
+            typer.echo(f"\n{part.title}")
+        for table in part.tables:
+            if table.folded:
+                typer.echo(f"\n{table.title}: {len(table.rows)} rows, in the report and the JSON file")
+            else:
+                typer.echo("\n" + as_text(table))
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse, before the work, a folder that could not be made or written to."""
+    place = folder
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir():
+        raise InputError(f"{folder}: expected a folder, {place} is a file")
+    if not os.access(place, os.W_OK):
+        raise InputError(f"{folder}: the folder {place} cannot be written to")
+
+
+def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None = None) -> None:
+    """Write numbers to a JSON file, whole or not at all; nothing where no path is given.
+
+    `synthetic` is put before numbers that do not say it.
+    """
     from experiments.files import whole_file
     from experiments.json import json_text
 
     if path is None:
         return
+    said = {} if synthetic is None else {"synthetic": synthetic}
     with whole_file(path) as temporary:
-        temporary.write_text(json_text({"synthetic": synthetic, **numbers}), encoding="utf-8")
+        temporary.write_text(json_text({**said, **numbers}), encoding="utf-8")
     typer.echo(f"\nwritten: {path}")
 
 
+def save_report(contents: "Contents", folder: Path, more: bool = False) -> None:
+    """Write the report; `more` adds what takes long."""
+    from analysis.report.write import write_report
+
+    with saying("writing") as say:
+        paths = write_report(contents, folder, more, say)
+    typer.echo(f"\nwritten to {folder}: {', '.join(path.name for path in paths)}")
+
+
 @contextmanager
-def working(what: str) -> Iterator[None]:
-    """A spinner on a terminal, silence elsewhere."""
+def saying(what: str) -> Iterator[Callable[[str], None]]:
+    """A spinner on a terminal, silence elsewhere; gives a function that says which step is being taken."""
     from rich.console import Console
 
     console = Console(stderr=True)
-    if console.is_terminal:
-        with console.status(what):
-            yield
-    else:
-        yield
+    if not console.is_terminal:
+        yield lambda _: None
+        return
+    with console.status(what) as status:
+        yield lambda step: status.update(f"{what}: {step}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, show_tables, working
+from analysis.commands.output import JsonOption, save_json, saying, show_tables
 
 
 class MethodChoice(StrEnum):
@@ -70,12 +70,12 @@ def pairs(
     from analysis.pairs.likelihood import Method
     from analysis.report.pairs_tables import abilities_table, contrasts_table, factors_table, pairs_text
 
-    with working("reading comparisons"):
+    with saying("reading comparisons"):
         comparisons = read_comparisons(file, left, right, winner, tie, participant)
         design = None if factors is None else read_item_factors(factors)
     usual: Method = "davidson" if comparisons.ties else "bradley-terry"
     chosen: Method = method.value if method else usual
-    with working("fitting"):
+    with saying("fitting"):
         result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
     typer.echo(pairs_text(result, file.stem, comparisons.synthetic))
     show_tables(abilities_table(result, file.stem, comparisons.synthetic))

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from analysis.commands.output import JsonOption, save_json, show_tables, working
+from analysis.commands.output import JsonOption, save_json, saying, show_tables
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def synthesise_command(
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder {out.parent} does not exist; make it first")
     plan = make_plan(experiment, n, mean or (), effect or ())
-    with working("searching"):
+    with saying("searching"):
         made = synthesise(plan, seed)
     rows = write_ratings(made, out)
     _say_synthetic(made, len(plan.published.invented_means))

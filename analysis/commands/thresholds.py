@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, show_tables, working
+from analysis.commands.output import JsonOption, save_json, saying, show_tables
 
 
 class FunctionChoice(StrEnum):
@@ -61,9 +61,9 @@ def thresholds(
     if not 0 <= guess < 1:
         raise InputError(f"expected --guess from 0 to below 1, got {guess:g}")
     upper = _lapse(lapse, guess)
-    with working("reading trials"):
+    with saying("reading trials"):
         answers = read_answers(file, x, response, participant, by)
-    with working("fitting"):
+    with saying("fitting"):
         result = fit_thresholds(answers, function.value, guess, upper)
     typer.echo(threshold_text(result, file.stem, answers.synthetic))
     show_tables(threshold_table(result, file.stem, answers.synthetic))

@@ -7,7 +7,7 @@ from typing import assert_never
 import numpy as np
 import pandas as pd
 
-from analysis.read.study_ratings import StudyRatings
+from analysis.read.study_answers import StudyAnswers
 from experiments import rules
 from experiments.definition import Experiment
 from experiments.rules.exclusion import LeavesOutRuns, LeavesOutTrials, RunTrials, Source
@@ -43,7 +43,7 @@ class Exclusions:
     rows: pd.DataFrame = field(repr=False)
 
 
-def apply_exclusions(experiment: Experiment, ratings: StudyRatings) -> Exclusions:
+def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusions:
     """Set aside what is no main trial, then apply every declared rule.
 
     Rules about participants see all their main trials; rules about trials see those of who remains. A
@@ -129,7 +129,7 @@ def _by_hand(rows: pd.DataFrame) -> list[tuple[str, str]]:
     ]
 
 
-def _later_runs(people: dict[str, str], reasons: dict[str, list[str]], ratings: StudyRatings) -> None:
+def _later_runs(people: dict[str, str], reasons: dict[str, list[str]], ratings: StudyAnswers) -> None:
     """Of several runs of a participant that no rule excludes, keep the first."""
     order = sorted(
         (run for run in people if run not in reasons), key=lambda r: (ratings.first_seen.get(r, ""), r)

@@ -5,10 +5,10 @@ from math import isfinite
 from typing import Any
 
 from analysis.plans.result import Analysis
+from analysis.report.captions import caption
+from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
-from analysis.report.tables import caption
-from analysis.report.write import Section
 from experiments.errors import InputError
 
 PRIOR_SCALE = 2**0.5 / 2

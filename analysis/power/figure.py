@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analysis.power.simulate import PowerResult
-from analysis.report.figures import COLOURS, MARKERS
+from analysis.report.pictures import COLOURS, MARKERS
 from experiments.errors import InputError
 from experiments.files import whole_file
 

@@ -1,4 +1,4 @@
-"""Rows of the SQL view `ratings`, read in portions straight into columns of codes."""
+"""Rows of the SQL view of a kind of trial, read in portions straight into columns of codes."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
 from analysis.errors import NoRatingsError
-from analysis.read.run_columns import RUN_FLAGS, RUN_TEXTS
+from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, Reading
 from analysis.read.text_table import categorical
 from experiments.errors import InputError
 
@@ -30,10 +30,11 @@ def default_url() -> str:
     return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
 
 
-class RatingsQuery:
-    """A read-only look at the ratings of one experiment."""
+class AnswersQuery:
+    """A read-only look at the answers of one experiment."""
 
-    def __init__(self, url: str, experiment: str, study: str | None) -> None:
+    def __init__(self, url: str, reading: Reading, experiment: str, study: str | None) -> None:
+        self._reading, self._view = reading, reading.view.name
         self.name = _describe(url)
         self._values = {"experiment": experiment, **({"study": study} if study else {})}
         self._where = "experiment = :experiment" + (" AND study = :study" if study else "")
@@ -49,8 +50,10 @@ class RatingsQuery:
             )
         try:
             connection = self._engine.connect()
-            if "ratings" not in inspect(connection).get_view_names():
-                raise NoRatingsError(f"{self.name} has no view 'ratings'; start the server once to make it")
+            if self._view not in inspect(connection).get_view_names():
+                raise NoRatingsError(
+                    f"{self.name} has no view '{self._view}'; start the server once to make it"
+                )
         except DBAPIError as error:
             raise InputError(f"cannot read {self.name}: {_first_line(error)}") from error
         return connection
@@ -60,23 +63,26 @@ class RatingsQuery:
         self._connection.close()
         self._engine.dispose()
 
-    def rows(self, texts: Sequence[str], numbers: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
+    def rows(self, further: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
         """Main and attention rows: text as categories, numbers float, a column a factor, a run's columns.
 
         The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once a run, not once a row.
         """
-        names = [*texts, *numbers, "levels"]
-        codes = {name: _Codes() for name in (*texts, "levels")}
+        texts, numbers = self._reading.all_texts, (*self._reading.all_numbers, *further)
+        levels = ("levels",) if self._reading.has_levels else ()
+        names = [*texts, *numbers, *levels]
+        codes = {name: _Codes() for name in (*texts, *levels)}
         values = {name: _Numbers() for name in numbers}
         kinds = ", ".join(f"'{kind}'" for kind in KINDS)
         for portion in self._portions(
-            f"{', '.join(names)} FROM ratings WHERE {self._where} AND kind IN ({kinds})"
+            f"{', '.join(names)} FROM {self._view} WHERE {self._where} AND kind IN ({kinds})"
         ):
             for name, column in zip(names, zip(*portion, strict=True), strict=True):
                 (codes if name in codes else values)[name].add(column)
         columns: dict[str, Any] = {name: codes[name].column() for name in texts}
         columns |= {name: values[name].column() for name in numbers}
-        columns |= _factor_columns(codes["levels"].column(), factors)
+        if levels:
+            columns |= _factor_columns(codes["levels"].column(), factors)
         return pd.DataFrame(columns | self._of_runs(columns["run"]))
 
     def _of_runs(self, run: "pd.Categorical[str]") -> dict[str, Any]:
@@ -84,7 +90,7 @@ class RatingsQuery:
         names = ["run", *RUN_TEXTS, *RUN_FLAGS]
         found = [
             row
-            for rows in self._portions(f"DISTINCT {', '.join(names)} FROM ratings WHERE {self._where}")
+            for rows in self._portions(f"DISTINCT {', '.join(names)} FROM {self._view} WHERE {self._where}")
             for row in rows
         ]
         of_run = {str(row[0]): row[1:] for row in found}
@@ -99,7 +105,7 @@ class RatingsQuery:
 
     def first_seen(self) -> dict[str, str]:
         """When the first row of each run was stored."""
-        found = self._portions(f"run, MIN(saved_at) FROM ratings WHERE {self._where} GROUP BY run")
+        found = self._portions(f"run, MIN(saved_at) FROM {self._view} WHERE {self._where} GROUP BY run")
         return {str(run): str(moment) for rows in found for run, moment in rows}
 
     def _portions(self, selection: str) -> Iterator[Sequence[Any]]:

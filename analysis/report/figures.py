@@ -2,38 +2,24 @@
 every participant visible behind them. The same data give the same bytes."""
 
 from dataclasses import dataclass
-from io import BytesIO
 from itertools import combinations
-from typing import Any, Literal
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import special
 
 from analysis.plans.result import Analysis
+from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, write_note
 from analysis.within.marginal_means import level_combinations, margin
 from experiments.error_bars import within_participant_errors
 from experiments.trials.clip_rating.declaration import clip_rating_of
 
 Floats = NDArray[np.float64]
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#444444")
-"""Okabe and Ito's palette, told apart with every common colour vision; markers tell levels apart as well."""
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "svg.hashsalt": "palpebra",
-    "svg.fonttype": "path",
-    "axes.linewidth": 0.8,
-}
-_BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
 _SPREAD = 0.62
 """Width of a group of conditions on an axis where groups are 1 apart."""
 
@@ -86,27 +72,14 @@ def figures_of(analysis: Analysis) -> tuple[FigureSpec, ...]:
 
 def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
     """Draw one figure."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(7.2, 4.4), dpi=150, layout="constrained")
-        FigureCanvasAgg(figure)
+    with mpl.rc_context(STYLE):
+        figure = new_figure()
         axes = figure.add_subplot()
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
         bars = "Points and thin lines: participants. Bars: 95% CI within participants (Cousineau-Morey)."
-        note = f"N = {analysis.n_participants}. {bars}"
-        if analysis.synthetic:
-            note = "SYNTHETIC DATA: no person gave these ratings.\n" + note
-        figure.supxlabel(note, fontsize=7, color="#8a1c1c" if analysis.synthetic else "#555555")
+        write_note(figure, f"N = {analysis.n_participants}. {bars}", analysis.synthetic)
     return figure
-
-
-def as_bytes(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
-    """The figure as PNG or SVG without anything that differs from run to run."""
-    buffer = BytesIO()
-    metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-    with mpl.rc_context(_STYLE):
-        figure.savefig(buffer, format=kind, metadata=metadata)
-    return buffer.getvalue()
 
 
 def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
@@ -194,4 +167,4 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_axisbelow(True)
     if spec.colour:
         title = analysis.labels.factor(spec.colour)
-        axes.legend(title=title, frameon=False, fontsize=8, title_fontsize=8, **_BESIDE)
+        axes.legend(title=title, frameon=False, fontsize=8, title_fontsize=8, **BESIDE)

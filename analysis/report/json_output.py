@@ -6,18 +6,12 @@ from typing import TYPE_CHECKING, Any
 from analysis.plans.result import Analysis
 from analysis.within.effect_tests import Effect
 from analysis.within.homogeneity import levene_tests
-from experiments.json import json_text
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
 
 
 _OF_SIMPLE = ("univariate", "multivariate", "mauchly", "eta_sq_partial", "eta_sq_partial_ci")
-
-
-def as_json(analysis: Analysis) -> str:
-    """Indented JSON text, the same bytes for the same analysis; what does not exist is null."""
-    return json_text(as_data(analysis))
 
 
 def as_data(analysis: Analysis) -> dict[str, Any]:
@@ -80,7 +74,7 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
         ],
         "constant_participants": list(cells.constant),
         "decisions": list(analysis.decisions),
-        "exclusions": None if analysis.exclusions is None else _exclusions(analysis.exclusions),
+        "exclusions": None if analysis.exclusions is None else exclusions_data(analysis.exclusions),
     }
 
 
@@ -110,7 +104,8 @@ def _effect(effect: Effect) -> dict[str, Any]:
     }
 
 
-def _exclusions(exclusions: "Exclusions") -> dict[str, Any]:
+def exclusions_data(exclusions: "Exclusions") -> dict[str, Any]:
+    """Who and what was left out."""
     return {
         "runs": [asdict(run) for run in exclusions.runs],
         "trials": [asdict(dropped) for dropped in exclusions.trials],

@@ -2,9 +2,9 @@
 
 from analysis.models.mixed import MixedResult
 from analysis.models.ordinal import OrdinalResult
+from analysis.report.captions import caption
 from analysis.report.formats import Table
 from analysis.report.numbers import fixed, p_value
-from analysis.report.tables import caption
 
 
 def mixed_effects_table(result: MixedResult, name: str, synthetic: bool) -> Table:

@@ -1,9 +1,9 @@
 """Opinion scores as tables and words."""
 
 from analysis.opinion.scores import OpinionResult
+from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, share
-from analysis.report.pairs_tables import SYNTHETIC_MARK
 
 
 def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> Table:
@@ -22,7 +22,7 @@ def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
     )
     header = ("Item", "MOS", "SD", "n", "95% CI", "Recovered", "SE")
     notes = ("Recovered: biases taken off, votes weighted by consistency (alternating projection).",)
-    title = f"{SYNTHETIC_MARK if synthetic else ''}Mean opinion scores, {name}"
+    title = caption("Mean opinion scores", name, synthetic)
     return Table("opinion", title, header, rows, 1, notes)
 
 
@@ -40,7 +40,7 @@ def raters_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
         for person in sorted(result.participants, key=lambda one: (-abs(one.bias), one.name))
     )
     header = ("Person", "Votes", "Bias", "Inconsistency", "r with MOS", "BT.500")
-    title = f"{SYNTHETIC_MARK if synthetic else ''}People, {name}"
+    title = caption("People", name, synthetic)
     return Table("opinion-people", title, header, rows, 1, (), True)
 
 
@@ -48,7 +48,7 @@ def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> s
     """What was computed, in words; nobody is left out by the screening."""
     rejected = [person.name for person in result.participants if person.rejected_bt500]
     said = [
-        f"{SYNTHETIC_MARK if synthetic else ''}{name}: {result.n_votes} votes on {len(result.items)} items "
+        f"{marked(name, synthetic)}: {result.n_votes} votes on {len(result.items)} items "
         f"by {len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
     ]
     if rejected:

@@ -1,10 +1,9 @@
 """Paired comparisons as tables and words."""
 
 from analysis.pairs.abilities import PairsResult
+from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import apa_p, fixed, p_value
-
-SYNTHETIC_MARK = "[SYNTHETIC DATA] "
 
 
 def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
@@ -22,7 +21,7 @@ def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> 
     if robust:
         header.insert(4, "robust SE")
     notes = (f"Abilities in {result.scale}; '{result.reference}' is 0.",)
-    title = f"{_mark(synthetic)}Abilities, {name}"
+    title = caption("Abilities", name, synthetic)
     return Table("abilities", title, tuple(header), tuple(rows), 2, notes)
 
 
@@ -32,7 +31,7 @@ def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> 
         (f"{c.first} - {c.second}", fixed(c.difference, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_holm))
         for c in result.contrasts
     )
-    title = f"{_mark(synthetic)}Differences between items, {name}"
+    title = caption("Differences between items", name, synthetic)
     return Table("pair-contrasts", title, ("Items", "Difference", "SE", "z", "p (Holm)"), rows, 1, (), True)
 
 
@@ -45,7 +44,7 @@ def factors_table(result: PairsResult, name: str, synthetic: bool = False) -> Ta
             rows.append(
                 (f"  {level} - {test.reference}", "", "", "", f"{fixed(estimate, 3)} ({fixed(se, 3)})")
             )
-    title = f"{_mark(synthetic)}Factors of the items, {name}"
+    title = caption("Factors of the items", name, synthetic)
     return Table("pair-factors", title, ("Factor", "chi2", "df", "p", "b (SE)"), tuple(rows), 1)
 
 
@@ -53,7 +52,7 @@ def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
     """What was fitted and how well it holds, in words."""
     people = "" if result.n_participants is None else f" by {result.n_participants} raters"
     said = [
-        f"{_mark(synthetic)}{name}: {result.method}{' with Firth penalty' if result.firth else ''}, "
+        f"{marked(name, synthetic)}: {result.method}{' with Firth penalty' if result.firth else ''}, "
         f"{result.n_comparisons} comparisons of {len(result.items)} items{people}, {result.n_ties} ties."
     ]
     fit = result.goodness
@@ -68,7 +67,3 @@ def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
     if triples.triples:
         said.append(f"{triples.weak_violations} of {triples.triples} triples break weak transitivity.")
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
-
-
-def _mark(synthetic: bool) -> str:
-    return SYNTHETIC_MARK if synthetic else ""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from analysis.plans.result import Analysis
+from analysis.report.captions import caption
 from analysis.report.formats import Table
 from analysis.report.numbers import (
     DASH,
@@ -19,7 +20,6 @@ from analysis.within.homogeneity import levene_tests
 from analysis.within.simple_effects import SIGNIFICANCE
 
 TIMES = " × "
-SYNTHETIC_MARK = " [SYNTHETIC DATA]"
 
 
 def all_tables(analysis: Analysis) -> tuple[Table, ...]:
@@ -58,11 +58,6 @@ def uses_multivariate(analysis: Analysis) -> bool:
     planned = analysis.experiment is None or analysis.experiment.analysis.statistic == "multivariate"
     tests = [effect.multivariate for effect in analysis.anova.effects]
     return planned and all(test is not None and test.exact for test in tests)
-
-
-def caption(what: str, name: str, synthetic: bool) -> str:
-    """Title of a table: what it shows, of which data, and that they are synthetic where they are."""
-    return f"{what}, {name}{SYNTHETIC_MARK if synthetic else ''}"
 
 
 def _title(analysis: Analysis, what: str) -> str:

@@ -1,8 +1,8 @@
 """Thresholds as tables and words."""
 
+from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
-from analysis.report.pairs_tables import SYNTHETIC_MARK
 from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.people import ThresholdsResult
 
@@ -39,7 +39,7 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
     notes = (
         ("All trials pooled, so that differences between people flatten the slope.",) if result.means else ()
     )
-    title = f"{SYNTHETIC_MARK if synthetic else ''}Thresholds, {name}"
+    title = caption("Thresholds", name, synthetic)
     return Table("thresholds", title, header, tuple(rows), 1, notes)
 
 
@@ -57,7 +57,7 @@ def people_table(result: ThresholdsResult, name: str, synthetic: bool = False) -
         )
         for one in result.people
     )
-    title = f"{SYNTHETIC_MARK if synthetic else ''}Thresholds by person, {name}"
+    title = caption("Thresholds by person", name, synthetic)
     header = ("Person", "Condition", "Threshold", "95% CI", "Spread")
     return Table("threshold-people", title, header, rows, 2, (), True)
 
@@ -67,7 +67,7 @@ def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False)
     first = next(iter(result.pooled.values()))
     lapse = "fitted lapse rate" if first.lapse_fitted else f"lapse rate {first.lapse:g}"
     said = [
-        f"{SYNTHETIC_MARK if synthetic else ''}{name}: {first.shape} psychometric function, guess rate "
+        f"{marked(name, synthetic)}: {first.shape} psychometric function, guess rate "
         f"{first.guess:g}, {lapse}, {result.n_trials} trials; profile likelihood intervals."
     ]
     for condition, fit in result.pooled.items():

@@ -1,112 +1,83 @@
-"""One report of an analysis: HTML and Markdown, LaTeX tables, figures, and the results as JSON."""
+"""One report: HTML and Markdown, LaTeX tables, figures, and the results as JSON."""
 
-from base64 import b64encode
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
-from analysis.plans.result import Analysis
+from analysis.report.contents import Contents, Picture, Progress, Section
 from analysis.report.formats import Table, as_latex, as_markdown
-from analysis.report.json_output import as_json
-from analysis.report.left_out import left_out
-from analysis.report.sentences import sentences
-from analysis.report.tables import all_tables
 from experiments.errors import InputError
 from experiments.files import whole_file
+from experiments.json import json_text
 
 
 @dataclass(frozen=True)
-class Section:
-    """A further part of the report: sensitivity analyses, published figures beside ours."""
+class DrawnPart:
+    """A part with its figures drawn and its further sections made, as the templates print it."""
 
     title: str
-    text: str
-    tables: tuple[Table, ...] = ()
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A drawn figure: its file stem, its caption, and its bytes in both formats."""
-
-    key: str
-    caption: str
-    svg: bytes
-    png: bytes
-
-    @property
-    def data_url(self) -> str:
-        """The SVG as a data URL, so that the page stands alone."""
-        return "data:image/svg+xml;base64," + b64encode(self.svg).decode("ascii")
-
-
-BETWEEN_METHODS = (
-    " Groups (sum-to-zero contrasts) and covariates enter the multivariate linear model of the cell means; "
-    "sums of squares are of type {kind}. Means weigh groups equally and are those of a participant with the "
-    "mean of every covariate. Error df are participants less coefficients."
-)
-
-METHODS = (
-    "Cell means are unweighted means of a participant's trials; participants with an empty cell are dropped "
-    "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
-    "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. Marginal means "
-    "and their errors come from participants' own marginal means. Pairs are t tests, paired within "
-    "participants. Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
-)
+    first: Table
+    tables: tuple[Table, ...]
+    sentences: tuple[str, ...]
+    self_check: str
+    pictures: tuple[Picture, ...]
+    sections: tuple[Section, ...]
 
 
 def write_report(
-    analysis: Analysis,
-    folder: Path,
-    sections: tuple[Section, ...] = (),
-    progress: Callable[[str], None] = lambda _: None,
+    contents: Contents, folder: Path, more: bool = False, progress: Progress = lambda _: None
 ) -> list[Path]:
     """Write every file of the report into `folder`, each whole or not at all; give back their paths.
 
-    Files: report.html, report.md, tables.tex, results.json, and figure-*.png and .svg.
+    Files: report.html, report.md, tables.tex, results.json, and figure-*.png and .svg. `more` adds the
+    sections that take long.
     """
-    _make(folder)
+    make_folder(folder)
     progress("figures")
-    pictures = draw_all(analysis)
+    parts = tuple(
+        DrawnPart(
+            part.title,
+            part.tables[0],
+            part.tables[1:],
+            part.sentences,
+            self_check(part.sentences),
+            part.draw(),
+            part.more(progress) if more else (),
+        )
+        for part in contents.parts
+    )
     progress("report")
     files: dict[str, bytes] = {}
-    for picture in pictures:
+    for picture in (picture for part in parts for picture in part.pictures):
         files[f"{picture.key}.svg"], files[f"{picture.key}.png"] = picture.svg, picture.png
-    tables = (*all_tables(analysis), *(table for section in sections for table in section.tables))
-    files["tables.tex"] = _latex(analysis, tables).encode()
-    files["results.json"] = as_json(analysis).encode()
-    files["report.md"] = _render("report.md.j2", analysis, pictures, sections).encode()
-    files["report.html"] = _render("report.html.j2", analysis, pictures, sections).encode()
+    files["tables.tex"] = _latex(contents, parts).encode()
+    files["results.json"] = json_text(contents.numbers).encode()
+    files["report.md"] = _render("report.md.j2", contents, parts).encode()
+    files["report.html"] = _render("report.html.j2", contents, parts).encode()
     for name, content in files.items():
         with whole_file(folder / name) as temporary:
             temporary.write_bytes(content)
     return [folder / name for name in sorted(files)]
 
 
-def _make(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
+    """Make the folder of a report; InputError where it cannot be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make the folder {folder}: {error.strerror}") from error
 
 
-def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
-    """Draw every figure of the analysis."""
-    # matplotlib takes a second to import, which commands that draw nothing need not pay
-    from analysis.report.figures import as_bytes, draw, figures_of
-
-    pictures = []
-    for spec in figures_of(analysis):
-        figure = draw(analysis, spec)
-        pictures.append(Picture(spec.key, spec.title, as_bytes(figure, "svg"), as_bytes(figure, "png")))
-    return tuple(pictures)
-
-
-def _latex(analysis: Analysis, tables: tuple[Table, ...]) -> str:
-    mark = "% SYNTHETIC DATA: no person gave these ratings\n" if analysis.synthetic else ""
-    head = f"% {analysis.title}\n{mark}% needs \\usepackage{{booktabs}}\n\n"
+def _latex(contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
+    mark = f"% SYNTHETIC DATA: no person gave these {contents.given}\n" if contents.synthetic else ""
+    head = f"% {contents.title}\n{mark}% needs \\usepackage{{booktabs}}\n\n"
+    tables = (
+        table
+        for part in parts
+        for table in (part.first, *part.tables, *(t for section in part.sections for t in section.tables))
+    )
     return head + "\n".join(as_latex(table) for table in tables)
 
 
@@ -120,9 +91,7 @@ def self_check(said: tuple[str, ...]) -> str:
     )
 
 
-def _render(
-    template: str, analysis: Analysis, pictures: tuple[Picture, ...], sections: tuple[Section, ...]
-) -> str:
+def _render(template: str, contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
     # as with matplotlib: commands that only print tables need not pay for the import
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -135,21 +104,6 @@ def _render(
         keep_trailing_newline=True,
     )
     environment.filters["markdown_table"] = as_markdown
-    tables = all_tables(analysis)
     return environment.get_template(template).render(
-        analysis=analysis,
-        first=tables[0],
-        tables=tables[1:],
-        sentences=sentences(analysis),
-        self_check=self_check(sentences(analysis)),
-        left_out=left_out(analysis.exclusions) if analysis.exclusions else (),
-        pictures=pictures,
-        sections=sections,
-        methods=METHODS
-        + (
-            BETWEEN_METHODS.format(kind={2: "II", 3: "III"}[analysis.anova.sum_of_squares])
-            if analysis.anova.between.terms[1:]
-            else ""
-        ),
-        version=version("palpebra"),
+        contents=contents, parts=parts, version=version("palpebra")
     )

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.plans.study import analyse_study
-from analysis.read.study_ratings import load_csv, load_database
+from analysis.plans.clip_rating import READING, analyse_study
+from analysis.read.study_answers import load_csv, load_database
 from analysis.report.tables import all_tables
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
@@ -25,7 +25,7 @@ EXP1, EXP2 = load_experiment("exp1"), load_experiment("exp2")
 def rows(tmp_path_factory) -> pd.DataFrame:
     path = tmp_path_factory.mktemp("bench") / "exp1.csv"
     write_export(path, EXP1, rows_of(EXP1, simulate(EXP1, 32, trials=20)))
-    return load_csv(path, EXP1).rows
+    return load_csv(path, EXP1, READING).rows
 
 
 def all_tests(rows: pd.DataFrame):
@@ -64,7 +64,7 @@ def test_a_million_ratings_from_sql_to_tables(benchmark, tmp_path) -> None:
     url = make_database(tmp_path / "m.sqlite", EXP2, ratings, participants=[f"P{i:05d}" for i in range(n)])
     start = time.process_time()
     tables = benchmark.pedantic(
-        lambda: all_tables(analyse_study(EXP2, load_database(url, EXP2))), rounds=1, iterations=1
+        lambda: all_tables(analyse_study(EXP2, load_database(url, EXP2, READING))), rounds=1, iterations=1
     )
     cpu = time.process_time() - start
     assert len(tables) >= 6

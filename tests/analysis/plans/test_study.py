@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from analysis.errors import NoRatingsError
-from analysis.plans.study import analyse_study
+from analysis.plans.clip_rating import READING, analyse_study
 from analysis.read.pool import Origin, Pool
-from analysis.read.study_ratings import load_csv, load_database
+from analysis.read.study_answers import load_csv, load_database
 from analysis.report.json_output import as_data
 from analysis.report.left_out import left_out
 from experiments import rules
@@ -29,7 +29,7 @@ def rows() -> list[dict]:
 
 def analyse(path, rows, experiment=EXP3, pool=Pool()):
     written = write_export(path / "r.csv", experiment, rows)
-    return analyse_study(experiment, load_csv(written, experiment), pool)
+    return analyse_study(experiment, load_csv(written, experiment, READING), pool)
 
 
 def with_rules(*chosen):
@@ -48,7 +48,7 @@ def test_means_are_the_ratings_own(tmp_path, rows) -> None:
 def test_export_and_database_give_the_same_numbers(tmp_path, rows) -> None:
     ratings = simulate(EXP3, 8, trials=5)
     url = make_database(tmp_path / "d.sqlite", EXP3, ratings, participants=[f"P{i:02d}" for i in range(8)])
-    stored = as_data(analyse_study(EXP3, load_database(url, EXP3)))
+    stored = as_data(analyse_study(EXP3, load_database(url, EXP3, READING)))
     exported = as_data(analyse(tmp_path, rows))
     for key in ("effects", "marginal_means", "pairwise", "n_participants", "participants", "synthetic"):
         assert stored[key] == exported[key], key
@@ -148,7 +148,7 @@ def test_a_rule_whose_column_is_missing_is_said_not_skipped(tmp_path, rows) -> N
     path = tmp_path / "few.csv"
     lines = [f"{row['participant']},{row['response']},{row['lower_lid']}" for row in rows]
     path.write_text("participant,response,lower_lid\n" + "\n".join(lines))
-    analysis = analyse_study(EXP3, load_csv(path, EXP3))
+    analysis = analyse_study(EXP3, load_csv(path, EXP3, READING))
     assert analysis.n_participants == 8
     assert "incomplete: the data have no column 'run_status'" in analysis.exclusions.not_applied
 
@@ -182,39 +182,39 @@ def test_other_studies_and_experiments_are_told_apart(tmp_path, rows) -> None:
     two = rows + change(rows, lambda row: True, study="t", run="z")
     path = write_export(tmp_path / "two.csv", EXP3, two)
     with pytest.raises(InputError, match="holds 2 studies; choose one with --study: s, t"):
-        load_csv(path, EXP3)
-    ratings = load_csv(path, EXP3, "s")
+        load_csv(path, EXP3, READING)
+    ratings = load_csv(path, EXP3, READING, "s")
     assert len(ratings.rows) == len(rows)
     assert "left aside" in ratings.decisions[0]
     other = write_export(tmp_path / "o.csv", EXP3, change(rows, lambda row: True, experiment="exp1"))
     with pytest.raises(InputError, match="holds experiment exp1, not 'exp3'"):
-        load_csv(other, EXP3)
+        load_csv(other, EXP3, READING)
 
 
 def test_nothing_to_analyse_is_told_from_bad_input(tmp_path, rows) -> None:
     with pytest.raises(NoRatingsError, match="no ratings yet"):
-        load_csv(write_export(tmp_path / "e.csv", EXP3, []), EXP3)
+        load_csv(write_export(tmp_path / "e.csv", EXP3, []), EXP3, READING)
     with pytest.raises(NoRatingsError, match="no ratings of origin 'participant'"):
         analyse(tmp_path, rows, pool=Pool(Origin.PARTICIPANT))
     with pytest.raises(NoRatingsError, match="no participant remains"):
         analyse(tmp_path, change(rows, lambda row: True, run_status="withdrawn"))
     with pytest.raises(NoRatingsError, match="there is no database"):
-        load_database(f"sqlite:///{tmp_path}/none.sqlite", EXP3)
+        load_database(f"sqlite:///{tmp_path}/none.sqlite", EXP3, READING)
     empty = make_database(tmp_path / "x.sqlite", EXP3, np.full((2, 4, 1), 3), participants=["a", "b"])
     with pytest.raises(NoRatingsError, match="experiment 'exp1' has no ratings yet"):
-        load_database(empty, load_experiment("exp1"))
+        load_database(empty, load_experiment("exp1"), READING)
 
 
 @pytest.mark.parametrize("url", ["nonsense", "mysterysql://x/y"])
 def test_an_unusable_database_address_is_refused(url) -> None:
     with pytest.raises(InputError, match="is no database URL"):
-        load_database(url, EXP3)
+        load_database(url, EXP3, READING)
 
 
 def test_a_file_that_is_no_database_is_refused(tmp_path) -> None:
     (tmp_path / "f.sqlite").write_text("not a database, but a rather long text that SQLite cannot read")
     with pytest.raises(InputError, match=r"cannot read f\.sqlite"):
-        load_database(f"sqlite:///{tmp_path}/f.sqlite", EXP3)
+        load_database(f"sqlite:///{tmp_path}/f.sqlite", EXP3, READING)
 
 
 def two_groups(tmp_path, rows):

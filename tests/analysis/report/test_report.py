@@ -9,16 +9,18 @@ import pytest
 
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
+from analysis.plans.clip_rating import READING, analyse_study
 from analysis.plans.result import Analysis, analyse_cells
 from analysis.plans.sensitivity import bayes_factors
-from analysis.plans.study import analyse_study
-from analysis.read.study_ratings import StudyRatings, load_csv
+from analysis.read.study_answers import StudyAnswers, load_csv
 from analysis.report.formats import Table, as_latex, as_markdown, as_text, latex_text, wrap
-from analysis.report.json_output import as_data, as_json
+from analysis.report.json_output import as_data
 from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables, paper_table
+from analysis.report.within_contents import contents_of
 from analysis.report.write import self_check, write_report
+from experiments.json import json_text
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
@@ -26,7 +28,9 @@ from tests.analysis.ratings_file import rows_of, simulate, write_export
 def analysis_of(name: str, folder, participants: int) -> Analysis:
     experiment = load_experiment(name)
     rows = rows_of(experiment, simulate(experiment, participants, trials=2))
-    ratings: StudyRatings = load_csv(write_export(folder / f"{name}.csv", experiment, rows), experiment)
+    ratings: StudyAnswers = load_csv(
+        write_export(folder / f"{name}.csv", experiment, rows), experiment, READING
+    )
     return analyse_study(experiment, ratings)
 
 
@@ -78,7 +82,7 @@ def test_the_report_finds_no_fault_with_its_own_sentences(analysis) -> None:
 
 
 def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:
-    data = json.loads(as_json(analysis), parse_constant=pytest.fail)
+    data = json.loads(json_text(as_data(analysis)), parse_constant=pytest.fail)
     effect = data["effects"][0]
     assert set(effect["univariate"]) == {
         *("ss", "ss_error", "df_effect", "df_error", "f_value", "p_value"),
@@ -102,7 +106,7 @@ def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:
 def test_report_is_whole_marked_self_contained_and_byte_stable(tmp_path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     for folder in (one, two):
-        write_report(analysis_of("exp3", tmp_path, 6), folder)
+        write_report(contents_of(analysis_of("exp3", tmp_path, 6)), folder)
     names = sorted(path.name for path in one.iterdir())
     assert names == [
         *("figure-lower-lid.png", "figure-lower-lid.svg", "report.html", "report.md"),
@@ -143,7 +147,7 @@ def test_names_are_escaped_everywhere(tmp_path) -> None:
     y = np.random.default_rng(0).normal(4, 1, (6, 2))
     cells = CellTable(tuple("abcdef"), ("f<b>",), (("<i>&", "x_y|%"),), y, np.ones((6, 2), dtype=np.int64))
     analysis = analyse_cells(cells, name="n", title="<script>", source="s", rating="r")
-    write_report(analysis, tmp_path)
+    write_report(contents_of(analysis), tmp_path)
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<script>" not in html
     assert "&lt;i&gt;&amp;" in html

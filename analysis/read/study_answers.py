@@ -1,4 +1,4 @@
-"""The ratings of a study, from a CSV export or from the database's view `ratings`, in one shape."""
+"""The answers of a study, from a CSV export or the database's view of its kind of trial, in one shape."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -9,24 +9,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.errors import NoRatingsError
-from analysis.read.run_columns import RUN_FLAGS, RUN_TEXTS
+from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, TRIAL_PLACES, Reading
 from analysis.read.text_table import numbers, read_text_table
-from experiments.columns import names_of
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.trials.clip_rating.columns import RATINGS
-
-ROW_TEXTS = names_of(RATINGS.pick("run", "kind", "verdict"))
-ROW_NUMBERS = names_of(RATINGS.pick("response", "expected_response", "rt"))
-CSV_NUMBERS = (*names_of(RATINGS.pick("trial_index", "play", "exemplar")), *ROW_NUMBERS)
-"""What the analysis reads of the columns that experiments/columns declares, besides the factors.
-
-`trial_index` and `play` only find repeated rows, which the database's unique index rules out.
-"""
 
 
 @dataclass(frozen=True)
-class StudyRatings:
+class StudyAnswers:
     """Every row of one study, in columns of text (categorical), numbers (float) and flags (bool).
 
     A column the source does not have is absent here. `first_seen` is when each run's first row was stored.
@@ -43,23 +33,24 @@ class StudyRatings:
         return "synthetic" in self.rows.columns and bool(self.rows["synthetic"].any())
 
 
-def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> StudyRatings:
-    """Read a CSV export, or any table with columns `participant`, `response` and one a factor.
+def load_csv(path: Path, experiment: Experiment, reading: Reading, study: str | None = None) -> StudyAnswers:
+    """Read a CSV export, or any table with `participant`, the columns of `reading` and one a factor.
 
     Raises
     ------
     NoRatingsError
         A header and no rows.
     InputError
-        As `read_text_table`; ratings that are text; another experiment's data.
+        As `read_text_table`; numbers that are text; another experiment's data.
     """
-    factors = list(experiment.factor_names)
-    optional = [*ROW_TEXTS, *RUN_TEXTS, *CSV_NUMBERS, *RUN_FLAGS, "saved_at"]
+    factors = experiment.factor_names if reading.has_levels else ()
+    read_as_numbers = (*TRIAL_PLACES, *reading.further, *reading.all_numbers)
+    optional = [*reading.all_texts, *RUN_TEXTS, *read_as_numbers, *RUN_FLAGS, "saved_at"]
     if _has_no_rows(path):
         raise NoRatingsError(f"{path.name} has a header but no ratings yet")
-    table = read_text_table(path, ["participant", "response", *factors], optional)
+    table = read_text_table(path, ["participant", *reading.texts, *reading.numbers, *factors], optional)
     rows = table.columns
-    for name in CSV_NUMBERS:
+    for name in read_as_numbers:
         if name in rows.columns:
             rows[name] = numbers(table, name)
     for name in RUN_FLAGS:
@@ -68,13 +59,13 @@ def load_csv(path: Path, experiment: Experiment, study: str | None = None) -> St
     seen = _first_seen(rows)
     rows = rows.drop(columns="saved_at", errors="ignore")
     rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
-    return StudyRatings(rows, path.name, (*table.decisions, *chosen), seen)
+    return StudyAnswers(rows, path.name, (*table.decisions, *chosen), seen)
 
 
 def load_database(
-    url: str, experiment: Experiment, study: str | None = None, exemplars: bool = False
-) -> StudyRatings:
-    """Read the study's rows from the SQL view `ratings`; `exemplars` adds which exemplar was rated.
+    url: str, experiment: Experiment, reading: Reading, study: str | None = None, whole: bool = False
+) -> StudyAnswers:
+    """Read the study's rows from the SQL view of its kind; `whole` adds what only slow parts need.
 
     Raises
     ------
@@ -84,17 +75,16 @@ def load_database(
         A URL that cannot be used, or several studies and no `study` to choose one.
     """
     # SQLAlchemy takes as long to import as numpy, and a CSV needs none of it
-    from analysis.read.database import RatingsQuery
+    from analysis.read.database import AnswersQuery
 
-    query = RatingsQuery(url, experiment.name, study)
+    query = AnswersQuery(url, reading, experiment.name, study)
     try:
-        numbers = (*ROW_NUMBERS, "exemplar") if exemplars else ROW_NUMBERS
-        rows = query.rows(ROW_TEXTS, numbers, experiment.factor_names)
+        rows = query.rows(reading.further if whole else (), experiment.factor_names)
         if rows.empty:
             named = f"study '{study}'" if study else f"experiment '{experiment.name}'"
             raise NoRatingsError(f"{named} has no ratings yet in {query.name}")
         rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
-        return StudyRatings(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
+        return StudyAnswers(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
     finally:
         query.close()
 

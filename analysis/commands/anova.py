@@ -1,0 +1,143 @@
+"""`analysis anova`: anyone's long table."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.commands.output import (
+    JsonOption,
+    check_folder,
+    names_in,
+    save_json,
+    save_report,
+    saying,
+    show,
+)
+from experiments.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="anova")(anova)
+
+
+def anova(
+    file: Annotated[Path, typer.Argument(help="CSV file, one row a trial (or one a cell).")],
+    participant: Annotated[str, typer.Option(help="Column that names the participant.")],
+    rating: Annotated[str, typer.Option(help="Column with the number measured.")],
+    within: Annotated[
+        str, typer.Option(help="Columns of factors within participants, separated by commas.")
+    ] = "",
+    between: Annotated[
+        str, typer.Option(help="Columns of factors between participants, separated by commas.")
+    ] = "",
+    covariate: Annotated[
+        str, typer.Option(help="Columns of numbers that belong to participants, separated by commas.")
+    ] = "",
+    type: Annotated[int, typer.Option(help="Type of sums of squares, 2 or 3.", min=2, max=3)] = 3,
+    centre: Annotated[bool, typer.Option(help="Centre covariates at their mean over participants.")] = True,
+    covariate_by_group: Annotated[
+        bool, typer.Option("--covariate-by-group", help="Let slopes of covariates differ between groups.")
+    ] = False,
+    json: JsonOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write figures and the whole report to this folder.")
+    ] = None,
+    trial: Annotated[
+        str | None, typer.Option(help="Column that numbers a participant's trials; repeats are found by it.")
+    ] = None,
+    scale: Annotated[str | None, typer.Option(help="Refuse ratings outside, e.g. 1:7.")] = None,
+    two_factor_pairs: Annotated[
+        bool, typer.Option("--two-factor-pairs", help="Also compare all cells of every two-factor margin.")
+    ] = False,
+    equivalence: Annotated[
+        str | None,
+        typer.Option(help="Bounds within which pairs count as equal, in rating units: 0.5 or -0.3,0.5."),
+    ] = None,
+    contrast: Annotated[
+        list[str] | None,
+        typer.Option(help="Weights of a factor's levels in their order: face:1,-1,0. Repeatable."),
+    ] = None,
+) -> None:
+    """ANOVA of a long table: factors within and between participants, covariates, groups of any sizes.
+
+    Examples:
+
+      analysis anova ratings.csv --participant id --rating score --within face,blur
+
+      analysis anova ratings.csv --participant id --rating score --within face,blur --json results.json
+
+      analysis anova long.csv --participant id --rating score --within phase --between group --covariate age
+
+    The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants: docs/analysis.md.
+    """
+    from analysis.plans.result import analyse_cells
+    from analysis.read.long_csv import read_long_table
+    from analysis.read.participant_columns import design_of
+    from analysis.report.within_contents import contents_of
+    from analysis.within.cell_means import cell_table
+
+    factors, groups, covariates = names_in(within), names_in(between), names_in(covariate)
+    if not [*factors, *groups, *covariates]:
+        raise InputError("no factor named; expected e.g. --within face,blur or --between group")
+    if out is not None:
+        check_folder(out)
+    with saying("reading ratings"):
+        data = read_long_table(file, participant, rating, factors, trial, _scale(scale), groups, covariates)
+        cells = cell_table(data.rows, participant, rating, factors)
+        people = cells.participants
+        analysis = analyse_cells(
+            cells,
+            between=design_of(data.rows, participant, people, groups, covariates, centre, covariate_by_group),
+            sum_of_squares=2 if type == 2 else 3,
+            name=file.stem,
+            title=f"Analysis of {file.name}",
+            source=data.source,
+            rating=rating,
+            synthetic=data.synthetic,
+            two_factor_pairs=two_factor_pairs,
+            equivalence_bounds=_bounds(equivalence),
+            planned_contrasts=[_contrast(text) for text in contrast or ()],
+            decisions=data.decisions,
+        )
+    contents = contents_of(analysis)
+    show(contents)
+    save_json(json, contents.numbers)
+    if out is not None:
+        save_report(contents, out)
+
+
+def _bounds(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        given = [float(part) for part in text.split(",")]
+    except ValueError:
+        given = []
+    if len(given) == 1:
+        given = [-abs(given[0]), abs(given[0])]
+    if len(given) != 2 or not given[0] < 0 < given[1]:
+        raise InputError(f"--equivalence should be like 0.5 or -0.3,0.5, got '{text}'")
+    return given[0], given[1]
+
+
+def _contrast(text: str) -> tuple[str, list[float]]:
+    factor, _, weights = text.rpartition(":")
+    try:
+        return factor.strip(), [float(weight) for weight in weights.split(",")]
+    except ValueError:
+        raise InputError(f"--contrast should be like face:1,-1,0, got '{text}'") from None
+
+
+def _scale(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    low, _, high = text.partition(":")
+    try:
+        bounds = float(low), float(high)
+    except ValueError:
+        bounds = (1.0, 0.0)
+    if not bounds[0] < bounds[1]:
+        raise InputError(f"--scale should be like 1:7, got '{text}'")
+    return bounds

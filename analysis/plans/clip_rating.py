@@ -1,0 +1,112 @@
+"""The analysis of single-clip ratings: cell means, their tests, and models beside them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.plans.plan import Plan
+from analysis.plans.prepare import Prepared, prepare, refuse_unknown, where
+from analysis.plans.result import Analysis, Labels, analyse_cells
+from analysis.read.pool import Pool
+from analysis.read.reading import Reading
+from analysis.read.study_answers import StudyAnswers
+from analysis.report.contents import Contents, Progress, Section
+from analysis.within.between import BetweenDesign, between_design
+from analysis.within.cell_means import cell_table
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.clip_rating.declaration import clip_rating_of
+
+READING = Reading(RATINGS, numbers=("response",), further=("exemplar",))
+
+
+def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
+    """Refuse a rating off the declared scale, and an unknown level."""
+    scale = clip_rating_of(experiment).scale
+    given = rows["response"].to_numpy()
+    off = ~np.isnan(given) & ((given < scale.minimum) | (given > scale.maximum) | (given != np.round(given)))
+    if off.any():
+        at = int(np.argmax(off))
+        raise InputError(
+            f"{source}: {where(rows, at)}: expected a whole rating from {scale.minimum} to {scale.maximum}, "
+            f"got {given[at]:g}"
+        )
+    for factor in experiment.factors:
+        known = [level.name for level in factor.levels]
+        refuse_unknown(rows, factor.name, known, f"level of '{factor.name}'", source)
+
+
+def analyse_study(experiment: Experiment, answers: StudyAnswers, pool: Pool = Pool()) -> Analysis:
+    """Check, exclude by the declared rules, average, and test; raises as `prepare`."""
+    return analyse(prepare(experiment, PLAN, answers, pool))
+
+
+def analyse(prepared: Prepared) -> Analysis:
+    """Average and test."""
+    experiment, rows = prepared.experiment, prepared.rows
+    factors = experiment.analysis.factors or experiment.factor_names
+    levels = {f.name: [level.name for level in f.levels] for f in experiment.factors}
+    within = [name for name in factors if not experiment.factor(name).between]
+    cells = cell_table(rows, "participant", "response", within, levels)
+    between = [name for name in factors if name not in within]
+    return analyse_cells(
+        cells,
+        name=experiment.name,
+        title=experiment.title,
+        source=prepared.source,
+        rating="response",
+        synthetic=prepared.synthetic,
+        decisions=prepared.decisions,
+        labels=labels_of(experiment),
+        between=groups_of(rows, cells.participants, between, levels) if between else None,
+        experiment=experiment,
+        exclusions=prepared.exclusions,
+    )
+
+
+def contents(prepared: Prepared) -> Contents:
+    """What the report says."""
+    from analysis.report.within_contents import contents_of
+
+    analysis = analyse(prepared)
+
+    def more(progress: Progress) -> tuple[Section, ...]:
+        from analysis.plans.sensitivity import sensitivity_sections
+
+        return sensitivity_sections(analysis, progress)
+
+    return contents_of(analysis, more)
+
+
+def groups_of(
+    rows: pd.DataFrame,
+    participants: Sequence[str],
+    factors: Sequence[str],
+    levels: Mapping[str, Sequence[str]],
+) -> BetweenDesign:
+    """The groups of these participants; InputError where one has rows of two."""
+    codes = np.zeros((len(participants), len(factors)), np.int64)
+    for column, name in enumerate(factors):
+        level_of: dict[str, str] = {}
+        pairs = rows[["participant", name]].astype(str).drop_duplicates()
+        for who, level in pairs.itertuples(index=False):
+            if level_of.setdefault(who, level) != level:
+                raise InputError(
+                    f"participant {who} has ratings of '{level_of[who]}' and '{level}', but '{name}' is "
+                    "declared between participants"
+                )
+        codes[:, column] = [levels[name].index(level_of[who]) for who in participants]
+    return between_design(factors, [levels[name] for name in factors], codes)
+
+
+def labels_of(experiment: Experiment) -> Labels:
+    """The labels an experiment declares."""
+    return Labels(
+        factors={f.name: f.label for f in experiment.factors},
+        levels={(f.name, level.name): level.label for f in experiment.factors for level in f.levels},
+    )
+
+
+PLAN = Plan(READING, check, contents)

@@ -1,0 +1,117 @@
+"""From a study's rows to those that count, whatever the kind of trial: one pool, declared exclusions."""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from analysis.errors import NoRatingsError
+from analysis.plans.exclusions import Exclusions, apply_exclusions
+from analysis.plans.plan import Plan, plan_of
+from analysis.read.pool import Pool, pooled
+from analysis.read.study_answers import StudyAnswers
+from experiments.definition import Experiment
+from experiments.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from analysis.report.contents import Contents
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a plan analyses: the main trials that count, what was left out, and every decision on the way."""
+
+    experiment: Experiment
+    source: str
+    synthetic: bool
+    exclusions: Exclusions
+    decisions: tuple[str, ...]
+
+    @property
+    def rows(self) -> pd.DataFrame:
+        """Main trials with an answer, of the runs that remain."""
+        return self.exclusions.rows
+
+
+def study_contents(experiment: Experiment, answers: StudyAnswers, pool: Pool = Pool()) -> "Contents":
+    """Analyse a study by the plan of its kind of trial."""
+    plan = plan_of(experiment.trial.kind)
+    return plan.analyse(prepare(experiment, plan, answers, pool))
+
+
+def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Pool = Pool()) -> Prepared:
+    """Check and exclude by the declared rules.
+
+    Raises
+    ------
+    NoRatingsError
+        No main trial of this origin, or nobody left after exclusion.
+    InputError
+        An answer that the declaration does not allow, a trial stored twice with different data.
+    """
+    chosen, pooling = pooled(answers.rows, pool, answers.source)
+    rows, repeats = _without_repeats(chosen, plan.keys, answers.source)
+    rows = plan.numbered(rows)
+    main = _main(rows)
+    plan.check(experiment, main, answers.source)
+    if (main["participant"] == "").any():
+        raise InputError(
+            f"{answers.source}: 'participant' is empty in {(main['participant'] == '').sum()} rows"
+        )
+    checked = replace(answers, rows=rows)
+    exclusions = apply_exclusions(experiment, checked)
+    _refuse_nobody(exclusions, answers.source, pool)
+    decisions = (*answers.decisions, *pooling, *repeats)
+    return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions)
+
+
+def _main(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows[(rows["kind"] == "main").to_numpy()] if "kind" in rows.columns else rows
+
+
+def where(rows: pd.DataFrame, position: int) -> str:
+    """The participant and trial of a row, in words."""
+    row = rows.iloc[position]
+    trial = f", trial {row['trial_index']:g}" if "trial_index" in rows.columns else ""
+    return f"participant {row['participant']}{trial}"
+
+
+def refuse_unknown(rows: pd.DataFrame, column: str, known: list[str], what: str, source: str) -> None:
+    """Refuse a name that is not `known`, with the nearest one; `what` says what it should have been."""
+    for name in pd.unique(rows[column]):
+        if name not in known:
+            at = int(np.argmax((rows[column] == name).to_numpy()))
+            raise InputError(
+                f"{source}: {where(rows, at)}: '{name}' is no {what}{did_you_mean(str(name), known)}"
+            )
+
+
+def _without_repeats(
+    rows: pd.DataFrame, within: tuple[str, ...], source: str
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Count a trial stored twice once where its data agree; refuse it where they do not."""
+    if "trial_index" not in rows.columns:
+        return rows, ()
+    who = "run" if "run" in rows.columns else "participant"
+    keys = [who, "trial_index", *(name for name in ("play", *within) if name in rows.columns)]
+    again = rows.duplicated(keys).to_numpy()
+    if not again.any():
+        return rows, ()
+    differ = again & ~rows.duplicated().to_numpy()
+    if differ.any():
+        raise InputError(
+            f"{source}: {where(rows, int(np.argmax(differ)))} stands there twice with different data; "
+            "remove the wrong row"
+        )
+    return rows[~again], (f"{again.sum()} repeated rows of trials already there, counted once",)
+
+
+def _refuse_nobody(exclusions: Exclusions, source: str, pool: Pool) -> None:
+    if not exclusions.n_runs:
+        aside = f" (set aside: {'; '.join(exclusions.set_aside)})" if exclusions.set_aside else ""
+        wanted = f" of origin '{pool.origin}'" if pool.origin else ""
+        raise NoRatingsError(f"{source} has no ratings{wanted} yet{aside}")
+    if exclusions.rows.empty:
+        who = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
+        raise NoRatingsError(f"{source}: no participant remains after the declared exclusions: {who}")

@@ -1,0 +1,52 @@
+"""Which columns the analysis reads of the rows of a kind of trial."""
+
+from dataclasses import dataclass
+
+from experiments.columns import View, names_of
+from experiments.columns.base import EXCLUSION, LEVELS, ORIGIN, RUN, STUDY
+
+_NOT_ASKED = ("run", "language")
+_OF_A_RUN = tuple(column for column in (*STUDY, *RUN, *EXCLUSION, *ORIGIN) if column.name not in _NOT_ASKED)
+RUN_TEXTS = names_of(_OF_A_RUN, "text", "integer")
+RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
+"""Columns that are the same for all rows of a run."""
+
+TRIAL_TEXTS = ("run", "kind", "verdict")
+TRIAL_NUMBERS = ("expected_response", "rt")
+TRIAL_PLACES = ("trial_index", "play")
+"""These only find repeated rows, which the database's unique index rules out: a CSV alone has to be asked."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The columns a plan needs beside those of every study.
+
+    Attributes
+    ----------
+    view: of the kind. Its columns beside, that each must be there:
+    texts, numbers: read as names, and as numbers with NaN for none.
+    further: numbers that only the slow parts of a report need; absent from a database unless asked for.
+    """
+
+    view: View
+    texts: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
+    further: tuple[str, ...] = ()
+
+    @property
+    def has_levels(self) -> bool:
+        """Whether a row is of one clip, so that it has a level of each factor."""
+        return LEVELS.name in self.view.names
+
+    @property
+    def all_texts(self) -> tuple[str, ...]:
+        """Text columns of a trial that the view has."""
+        return self._there((*TRIAL_TEXTS, *self.texts))
+
+    @property
+    def all_numbers(self) -> tuple[str, ...]:
+        """Columns of numbers of a trial that the view has."""
+        return self._there((*self.numbers, *TRIAL_NUMBERS))
+
+    def _there(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for name in names if name in self.view.names))

@@ -1,0 +1,86 @@
+"""What a report says, whatever the kind of trial: who was left out, and tables, sentences and figures."""
+
+from base64 import b64encode
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from analysis.report.formats import Table
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A further piece of the report: sensitivity analyses, checks."""
+
+    title: str
+    text: str
+    tables: tuple[Table, ...] = ()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn figure: its file stem, its caption, what it shows in words, and its bytes in both formats."""
+
+    key: str
+    caption: str
+    alt: str
+    svg: bytes
+    png: bytes
+
+    @property
+    def data_url(self) -> str:
+        """The SVG as a data URL, so that the page stands alone."""
+        return "data:image/svg+xml;base64," + b64encode(self.svg).decode("ascii")
+
+
+def _no_pictures() -> tuple[Picture, ...]:
+    return ()
+
+
+def _no_sections(_: Progress) -> tuple[Section, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Part:
+    """The answer to one question: of a study's only scale, or of one of several.
+
+    Attributes
+    ----------
+    title: empty where the report has one part.
+    tables: the first leads, the others are every test.
+    draw: makes the figures, which takes time. more: makes further sections, which takes more.
+    """
+
+    tables: tuple[Table, ...]
+    sentences: tuple[str, ...]
+    title: str = ""
+    draw: Callable[[], tuple[Picture, ...]] = _no_pictures
+    more: Callable[[Progress], tuple[Section, ...]] = _no_sections
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Everything a report says.
+
+    Attributes
+    ----------
+    lead: how many participants, and what was asked of them.
+    numbers: every number, as the JSON file has it.
+    given: what people gave (ratings, comparisons), for the mark of synthetic data.
+    """
+
+    name: str
+    title: str
+    lead: str
+    source: str
+    synthetic: bool
+    n_participants: int
+    left_out: tuple[str, ...]
+    decisions: tuple[str, ...]
+    parts: tuple[Part, ...]
+    methods: str
+    numbers: dict[str, Any] = field(repr=False)
+    given: str = "answers"

@@ -1,0 +1,78 @@
+"""The report of means and their tests: what `analysis anova` and a study of ratings say."""
+
+from collections.abc import Callable
+
+from analysis.plans.result import Analysis
+from analysis.report.contents import Contents, Part, Picture, Progress, Section
+from analysis.report.json_output import as_data
+from analysis.report.left_out import left_out
+from analysis.report.sentences import sentences
+from analysis.report.tables import all_tables
+
+BETWEEN_METHODS = (
+    " Groups (sum-to-zero contrasts) and covariates enter the multivariate linear model of the cell means; "
+    "sums of squares are of type {kind}. Means weigh groups equally and are those of a participant with the "
+    "mean of every covariate. Error df are participants less coefficients."
+)
+
+METHODS = (
+    "Cell means are unweighted means of a participant's trials; participants with an empty cell are dropped "
+    "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
+    "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. Marginal means "
+    "and their errors come from participants' own marginal means. Pairs are t tests, paired within "
+    "participants. Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
+)
+
+
+def contents_of(
+    analysis: Analysis, more: Callable[[Progress], tuple[Section, ...]] = lambda _: ()
+) -> Contents:
+    """What the report of one analysis says; `more` makes further sections."""
+    return Contents(
+        name=analysis.name,
+        title=analysis.title,
+        lead=f"{analysis.n_participants} participants, {' × '.join(analysis.anova.factors)}",
+        source=analysis.source,
+        synthetic=analysis.synthetic,
+        n_participants=analysis.n_participants,
+        left_out=left_out(analysis.exclusions) if analysis.exclusions else (),
+        decisions=analysis.decisions,
+        parts=(part_of(analysis, more),),
+        methods=methods_of(analysis),
+        numbers=as_data(analysis),
+        given="ratings",
+    )
+
+
+def part_of(
+    analysis: Analysis,
+    more: Callable[[Progress], tuple[Section, ...]] = lambda _: (),
+    title: str = "",
+) -> Part:
+    """The tables, sentences and figures of one analysis."""
+    return Part(all_tables(analysis), sentences(analysis), title, lambda: draw_all(analysis), more)
+
+
+def methods_of(analysis: Analysis) -> str:
+    """How the numbers came about."""
+    if not analysis.anova.between.terms[1:]:
+        return METHODS
+    return METHODS + BETWEEN_METHODS.format(kind={2: "II", 3: "III"}[analysis.anova.sum_of_squares])
+
+
+def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
+    """Draw every figure of the analysis."""
+    # matplotlib takes a second to import, which commands that draw nothing need not pay
+    from analysis.report.figures import draw, figures_of
+    from analysis.report.pictures import as_bytes
+
+    pictures = []
+    for spec in figures_of(analysis):
+        figure = draw(analysis, spec)
+        shown = (
+            f"{spec.title}: mean ratings with within-participant 95% intervals and every participant's mean"
+        )
+        pictures.append(
+            Picture(spec.key, spec.title, shown, as_bytes(figure, "svg"), as_bytes(figure, "png"))
+        )
+    return tuple(pictures)
