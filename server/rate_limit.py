@@ -7,7 +7,7 @@ from collections.abc import Callable
 from server.errors import TooManyRequests
 
 WINDOW_S = 60.0
-_MOST_KEYS = 10_000
+_MAX_KEYS = 10_000
 
 
 class RateLimit:
@@ -27,7 +27,7 @@ class RateLimit:
             left = min(self.per_minute, left + (moment - seen) * self.per_minute / WINDOW_S)
             # Put back at the end: the dictionary's first key is then the one unused for longest.
             self._buckets[key] = (left - 1 if left >= 1 else left, moment)
-            if len(self._buckets) > _MOST_KEYS:
+            if len(self._buckets) > _MAX_KEYS:
                 del self._buckets[next(iter(self._buckets))]
         if left < 1:
             wait = max(1, round((1 - left) * WINDOW_S / self.per_minute))

@@ -11,7 +11,7 @@ from experiments.definition import Experiment
 from experiments.schema.stored import load_stored
 from server.models import Clip, StudyVersion, VersionClip
 
-_MOST_KEPT = 64
+_MAX_KEPT = 64
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Versions:
             session = source if isinstance(source, Session) else Session(source)
             found = _load(session, version_id)
             with self._lock:
-                while len(self._loaded) >= _MOST_KEPT:
+                while len(self._loaded) >= _MAX_KEPT:
                     del self._loaded[next(iter(self._loaded))]
                 self._loaded[version_id] = found
         return found

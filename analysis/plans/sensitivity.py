@@ -15,10 +15,10 @@ PRIOR_SCALE = 2**0.5 / 2
 """Scale r of the Cauchy prior on effect sizes."""
 
 
-MOST_RATINGS = 50_000
+MAX_RATINGS = 50_000
 """Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
 
-MOST_CELLS = 16
+MAX_CELLS = 16
 """Above this the mixed model of the report has slopes for main effects only, which is said there."""
 
 
@@ -46,8 +46,8 @@ def _no_models(analysis: Analysis) -> str | None:
     rows = analysis.exclusions.rows
     if "exemplar" not in rows.columns or rows["exemplar"].isna().any():
         return "the data do not say which exemplar was rated"
-    if len(rows) > MOST_RATINGS:
-        return f"{len(rows)} ratings are more than {MOST_RATINGS}; use analysis mixed and analysis ordinal"
+    if len(rows) > MAX_RATINGS:
+        return f"{len(rows)} ratings are more than {MAX_RATINGS}; use analysis mixed and analysis ordinal"
     return None
 
 
@@ -70,7 +70,7 @@ def mixed_model(analysis: Analysis) -> Section:
     """The linear mixed model's tests beside those of the ANOVA."""
     from analysis.models.mixed import fit_mixed
 
-    every = len(analysis.cells.cells) <= MOST_CELLS
+    every = len(analysis.cells.cells) <= MAX_CELLS
     result = fit_mixed(**_model_arguments(analysis), slopes="all" if every else "main")
     rows = []
     for effect in result.effects:
@@ -97,7 +97,7 @@ def mixed_model(analysis: Analysis) -> Section:
     )
     if not every:
         text += (
-            f" With more than {MOST_CELLS} cells slopes for every effect take minutes (analysis mixed fits "
+            f" With more than {MAX_CELLS} cells slopes for every effect take minutes (analysis mixed fits "
             "them); without them the p of interactions are too small where people differ in them."
         )
     return Section("Linear mixed model", text, (table,))

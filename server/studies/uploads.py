@@ -16,9 +16,9 @@ from server.studies.probe import NotAFilm, probe
 from server.studies.schemas import UploadedFile, UploadOut
 
 KEEP_S = 24 * 3600
-MOST_FILES = 5000
-MOST_UNPACKED_BYTES = 4 * 1024**3
-MOST_RATIO = 200
+MAX_FILES = 5000
+MAX_UNPACKED_BYTES = 4 * 1024**3
+MAX_RATIO = 200
 FILMS = (".mp4", ".m4v", ".mov", ".webm")
 TABLES = (".csv", ".json")
 CHUNK_BYTES = 1 << 20
@@ -107,15 +107,15 @@ def _is_litter(path: str) -> bool:
 
 
 def _check_members(members: list[zipfile.ZipInfo]) -> None:
-    if len(members) > MOST_FILES:
-        raise UploadTooLarge(f"The zip holds {len(members)} files; {MOST_FILES} is the most.")
+    if len(members) > MAX_FILES:
+        raise UploadTooLarge(f"The zip holds {len(members)} files; {MAX_FILES} is the most.")
     unpacked = sum(member.file_size for member in members)
-    if unpacked > MOST_UNPACKED_BYTES:
+    if unpacked > MAX_UNPACKED_BYTES:
         raise UploadTooLarge(
-            f"The zip unpacks to {unpacked >> 20} MiB; {MOST_UNPACKED_BYTES >> 20} is the most."
+            f"The zip unpacks to {unpacked >> 20} MiB; {MAX_UNPACKED_BYTES >> 20} is the most."
         )
     for member in members:
-        if member.file_size > MOST_RATIO * max(member.compress_size, 1024):
+        if member.file_size > MAX_RATIO * max(member.compress_size, 1024):
             raise Invalid(f"The zip's file '{member.filename[:100]}' unpacks to far more than a film would.")
     names = [safe_name(member.filename) for member in members]
     if repeated := sorted({name for name in names if names.count(name) > 1}):

@@ -22,7 +22,7 @@ from stimuli_builder.blinks.profile import (
 
 SHIPPED_MODEL = Path(__file__).parent / "library" / "model.json"
 MODEL_FORMAT = "palpebra-blink-model-1"
-MOST_DRAWS = 1000
+MAX_DRAWS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,14 +151,14 @@ class BlinkModel:
         without one its length is the drawn one. The same generator state gives the same blink.
         """
         generator = np.random.default_rng() if rng is None else rng
-        for _ in range(MOST_DRAWS):
+        for _ in range(MAX_DRAWS):
             relative = generator.uniform(-1.0, 1.0, self.coefficient_sd.size)
             name = profile_id or "model-" + "-".join(f"{value * 1000:+.0f}" for value in relative)
             blink = self.profile(relative * self.coefficient_sd, name)
             if blink is not None:
                 return blink if duration_frames_30fps is None else resample(blink, duration_frames_30fps)
         raise InputError(
-            f"the model gave {MOST_DRAWS} blinks with a negative distance in a row: fit it to other profiles"
+            f"the model gave {MAX_DRAWS} blinks with a negative distance in a row: fit it to other profiles"
         )
 
     def save(self, path: Path) -> None:

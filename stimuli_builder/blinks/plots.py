@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 BLUE, RED, GREY, AMBER, GREEN = "#2b6cb0", "#c53030", "#8a94a3", "#b7791f", "#2f855a"
 FORMATS = ("png", "svg", "pdf")
 SECONDS_A_ROW = 10.0
-MOST_ROWS = 12
+MAX_ROWS = 12
 
 
 def _figure(width: float, height: float) -> "Figure":
@@ -57,7 +57,7 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
     Ten seconds a row for the first two minutes; a longer recording is drawn in twelve longer rows.
     """
     duration_s = max(eye.smooth.size / eye.series.fps for eye in eyes)
-    row_s = max(SECONDS_A_ROW, duration_s / MOST_ROWS)
+    row_s = max(SECONDS_A_ROW, duration_s / MAX_ROWS)
     rows = max(1, int(np.ceil(duration_s / row_s - 0.05)))
     figure = _figure(12, 0.8 + 1.5 * rows)
     grid = figure.subplots(rows, 1, squeeze=False)[:, 0]

@@ -15,7 +15,7 @@ from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 PAPER_FPS = 300
 DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
 INDEX_COLUMNS = ("frame", "time_s", "valid")
-MOST_BRIDGED_MS = 1000 / 30
+MAX_BRIDGED_MS = 1000 / 30
 """Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
 
 
@@ -163,7 +163,7 @@ def make_series(
     gaps_allowed = (
         column in DISTANCE_COLUMNS and "status" in table.columns if allow_gaps is None else allow_gaps
     )
-    reach = round(MOST_BRIDGED_MS * fps / 1000)
+    reach = round(MAX_BRIDGED_MS * fps / 1000)
     filled, bridged = bridge_gaps(values, reach)
     missing = np.isnan(filled)
     if missing.any() and not gaps_allowed:

@@ -13,7 +13,7 @@ from stimuli_builder.video import Picture
 Values = NDArray[np.float64]
 
 STOP_PX = 0.03
-MOST_ITERATIONS = 30
+MAX_ITERATIONS = 30
 LIMIT_SD = 4.0
 RIDGE = 1e-6
 
@@ -98,37 +98,34 @@ class Fitter:
         model: CoupledModel,
         *,
         stop_px: float = STOP_PX,
-        most: int = MOST_ITERATIONS,
+        max_iterations: int = MAX_ITERATIONS,
         prior: float = 0.0,
     ):
         self.model = model
-        self.stop_px, self.most = stop_px, most
+        self.stop_px, self.max_iterations = stop_px, max_iterations
         algebra = work_out(model)
         mesh, pixels = model.mesh, model.mesh.pixel_count
         diagonal = np.diagonal(algebra.hessian_forms[0])[: len(model.sd)]
-        self._prior = RIDGE * diagonal + prior / np.maximum(model.sd, 1e-9) ** 2
-        self._fixed = (
-            mesh.vertices, model.shape_modes, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y,
-            mesh.eye_of, model.appearance, model.weights, *mesh.neighbours(), algebra.hessian_forms,
-            algebra.directions, self._prior, LIMIT_SD * model.sd, algebra.scales, algebra.centre,
+        prior_of_c = RIDGE * diagonal + prior / np.maximum(model.sd, 1e-9) ** 2
+        self._mesh = kernels.MeshArrays(
+            mesh.vertices, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, mesh.eye_of,
+            *mesh.neighbours(),
         )  # fmt: skip
-        self._pixels = tuple(np.empty(pixels, np.float32) for _ in range(4))
-        self._vertices = np.empty(mesh.vertices.shape, np.float32)
-        self._squares = np.empty(model.eyes)
+        self._arrays = kernels.ModelArrays(
+            model.shape_modes, model.appearance, model.weights, algebra.hessian_forms, algebra.directions,
+            prior_of_c, LIMIT_SD * model.sd, algebra.scales, algebra.centre,
+        )  # fmt: skip
+        self._buffers = kernels.Buffers(
+            *(np.empty(pixels, np.float32) for _ in range(4)),
+            np.empty(mesh.vertices.shape, np.float32),
+            np.empty(model.eyes),
+        )
 
-    def fit(self, picture: Picture, c: Values, pose: Values, most: int | None = None) -> Fit:
+    def fit(self, picture: Picture, c: Values, pose: Values, max_iterations: int | None = None) -> Fit:
         """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""
         c, pose = c.copy(), pose.copy()
         run: Any = kernels.fit
-        iterations = run(
-            picture,
-            c,
-            pose,
-            most or self.most,
-            self.stop_px,
-            *self._fixed,
-            *self._pixels,
-            self._vertices,
-            self._squares,
-        )
-        return Fit(c, pose, self._vertices.copy(), np.sqrt(self._squares), int(iterations))
+        limit = max_iterations or self.max_iterations
+        iterations = run(picture, c, pose, limit, self.stop_px, self._mesh, self._arrays, self._buffers)
+        residuals = np.sqrt(self._buffers.squares)
+        return Fit(c, pose, self._buffers.vertices.copy(), residuals, int(iterations))

@@ -6,6 +6,8 @@ float32 over pixels, float64 over parameters. Everything that calls each other s
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 # ruff: noqa: D103
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from stimuli_builder.compiled import compiled
@@ -235,75 +237,102 @@ def squares_by_eye(error, weights, starts, eye_of, out):
         out[eye] /= counts[eye]
 
 
+class MeshArrays(NamedTuple):
+    """The base mesh of V vertices and N pixels.
+
+    Attributes
+    ----------
+    vertices : float64 (V, 2); triangles : int (T, 3); starts : int (T + 1,), first pixel of each triangle.
+    forms : float32 (T, 3, 3), barycentric coordinates as linear forms in (x, y, 1).
+    x, y : float32 (N,) pixel positions; eye_of : int (T,).
+    left, right, above, below : uint32 (N,) neighbours of each pixel.
+    """
+
+    vertices: Any
+    triangles: Any
+    starts: Any
+    forms: Any
+    x: Any
+    y: Any
+    eye_of: Any
+    left: Any
+    right: Any
+    above: Any
+    below: Any
+
+
+class ModelArrays(NamedTuple):
+    """What the fit needs of a model of l coupled parameters, K = l + 4.
+
+    Attributes
+    ----------
+    shape_modes : float64 (l, V, 2); appearance : float32 (l + 1, N); weights : float32 (N,).
+    hessian_forms : float64 (pairs, K, K); directions : float64 (K, V, 2).
+    prior, limits : float64 (l,); scales : float64 (4,); centre : float64 (2,).
+    """
+
+    shape_modes: Any
+    appearance: Any
+    weights: Any
+    hessian_forms: Any
+    directions: Any
+    prior: Any
+    limits: Any
+    scales: Any
+    centre: Any
+
+
+class Buffers(NamedTuple):
+    """Written by every fit: float32 (N,) four times, float32 (V, 2), and float64 (eyes,)."""
+
+    sampled: Any
+    error: Any
+    gx: Any
+    gy: Any
+    vertices: Any
+    squares: Any
+
+
 @compiled
-def fit(
-    picture,
-    c,
-    pose,
-    most,
-    tolerance,
-    base,
-    shape_modes,
-    triangles,
-    starts,
-    forms,
-    px,
-    py,
-    eye_of,
-    appearance,
-    weights,
-    left,
-    right,
-    above,
-    below,
-    hessian_forms,
-    directions,
-    prior,
-    limits,
-    scales,
-    centre,
-    sampled,
-    error,
-    gx,
-    gy,
-    vertices,
-    squares,
-):
+def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
     """Gauss-Newton on c and the similarity, in place; return the iterations used, 0 if it broke down.
 
-    Stops when no vertex moves by more than `tolerance` pixels. `vertices` and `squares` (mean square error by
-    eye) are left as of the last step and the last evaluation.
+    Stops when no vertex moves by more than `tolerance` pixels. The buffers' `vertices` and `squares` (mean
+    square error by eye) are left as of the last step and the last evaluation.
     """
     size = c.shape[0] + 4
+    sampled, error, vertices = buffers.sampled, buffers.error, buffers.vertices
+    gx, gy = buffers.gx, buffers.gy
+    weights = model.weights
     count = error.shape[0]
     before = np.empty_like(vertices)
     sums = np.empty_like(vertices)
     change = np.empty(size)
     matrix = np.empty((size, size))
-    place(base, shape_modes, c, pose, vertices)
+    place(mesh.vertices, model.shape_modes, c, pose, vertices)
     iteration = 0
-    while iteration < most:
+    while iteration < max_iterations:
         iteration += 1
-        sample(picture, vertices, triangles, starts, forms, px, py, sampled)
+        sample(picture, vertices, mesh.triangles, mesh.starts, mesh.forms, mesh.x, mesh.y, sampled)
         first = 0
         while first < count:
             last = min(first + BLOCK, count)
-            compose(appearance, c, first, last, error)
+            compose(model.appearance, c, first, last, error)
             first = last
-        differentiate(error, left, right, above, below, gx, gy)
+        differentiate(error, mesh.left, mesh.right, mesh.above, mesh.below, gx, gy)
         for x in range(count):
             error[x] = weights[x] * (error[x] - sampled[x])
-        accumulate(error, gx, gy, triangles, starts, forms, px, py, sums)
-        right_side(c, appearance, directions, error, sums, change)
-        hessian(hessian_forms, c, matrix)
+        accumulate(error, gx, gy, mesh.triangles, mesh.starts, mesh.forms, mesh.x, mesh.y, sums)
+        right_side(c, model.appearance, model.directions, error, sums, change)
+        hessian(model.hessian_forms, c, matrix)
         for k in range(c.shape[0]):
-            matrix[k, k] += prior[k]
-            change[k] += prior[k] * c[k]
+            matrix[k, k] += model.prior[k]
+            change[k] += model.prior[k] * c[k]
         if not solve(matrix, change):
             return 0
-        step(c, pose, change, limits, scales, centre)
+        step(c, pose, change, model.limits, model.scales, model.centre)
         before[:] = vertices
-        place(base, shape_modes, c, pose, vertices)
+        place(mesh.vertices, model.shape_modes, c, pose, vertices)
         furthest = np.float32(0)
         for v in range(vertices.shape[0]):
             furthest = max(furthest, abs(vertices[v, 0] - before[v, 0]), abs(vertices[v, 1] - before[v, 1]))
@@ -311,5 +340,5 @@ def fit(
             return 0
         if furthest < tolerance:
             break
-    squares_by_eye(error, weights, starts, eye_of, squares)
+    squares_by_eye(error, weights, mesh.starts, mesh.eye_of, buffers.squares)
     return iteration

@@ -30,7 +30,7 @@ def test_a_request_that_says_it_is_too_large_is_not_read(services: Services, exp
 def test_a_zip_that_unpacks_to_more_than_the_limit_is_refused_unopened(
     services: Services, experimenter: Admin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(uploads, "MOST_UNPACKED_BYTES", 2 << 20)
+    monkeypatch.setattr(uploads, "MAX_UNPACKED_BYTES", 2 << 20)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
         for number in range(3):
