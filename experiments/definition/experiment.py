@@ -2,7 +2,7 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from experiments.assignment import shares
 from experiments.base import Declaration, Language, Name
@@ -116,6 +116,17 @@ class Experiment(Declaration):
                 raise ValueError(f"{key}trials of the kind {self.trial.kind} are dealt by their own design")
         if fault := shares.fault(self):
             raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
+    def _levels_render(self) -> Self:
+        for factor in self.factors:
+            for level in factor.levels:
+                try:
+                    level.render.applied_to(self.render)
+                except ValidationError as error:
+                    reason = error.errors()[0]["msg"].removeprefix("Value error, ")
+                    raise ValueError(f"factors: level '{level.name}' of '{factor.name}': {reason}") from None
         return self
 
     @model_validator(mode="after")

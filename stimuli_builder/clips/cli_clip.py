@@ -36,6 +36,7 @@ def clip_command(
         str, typer.Option(help="photorealistic, cartoon or a character folder.")
     ] = "cartoon",
     duration: Annotated[float | None, typer.Option(help="Blink length in frames at 30 fps.")] = None,
+    duration_ms: Annotated[float | None, typer.Option(help="Blink length in ms, instead.")] = None,
     amplitude: Annotated[
         Amplitude, typer.Option(help="full: the eye shuts (FC); natural: as measured (NC).")
     ] = "full",
@@ -59,6 +60,7 @@ def clip_command(
         character=character,
         profile=profile if profile.endswith(".csv") else "real",
         duration_frames=duration,
+        duration_ms=duration_ms,
         amplitude=amplitude,
         motion_blur=blur,
         lower_lid=lower_lid,

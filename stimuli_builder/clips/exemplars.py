@@ -9,9 +9,10 @@ from experiments.errors import InputError
 from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
 from stimuli_builder.blinks.library import load_library, recorded_rests
-from stimuli_builder.blinks.profile import SAMPLES_PER_CLIP_FRAME, BlinkProfile, resample
+from stimuli_builder.blinks.profile import BlinkProfile, resample
 from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, TextbookKind, textbook_profile
 from stimuli_builder.clips.curves import amplitude_of
+from stimuli_builder.clips.motion_blur import samples_per_frame
 from stimuli_builder.clips.profile_files import read_closure_file
 from stimuli_builder.clips.seeds import generator
 
@@ -39,13 +40,24 @@ def exemplar(
         Folder that profile files are relative to.
     """
     profile, repeated = _blink(settings, family, number, seed, beside)
-    if settings.duration_frames is not None and settings.profile not in TEXTBOOK_KINDS:
-        profile = resample(profile, settings.duration_frames)
+    if settings.profile not in TEXTBOOK_KINDS:
+        profile = of_declared_length(profile, settings)
     if settings.eyes == "alike" and profile.closure_other is not None:
         profile = replace(profile, closure_other=None)
-    phases = generator("phase", seed, family).permutation(SAMPLES_PER_CLIP_FRAME)
+    # As many onsets as samples begin within one frame: 10 at 30 fps, 12 at 24 and 25, 6 at 50, 5 at 60.
+    phases = generator("phase", seed, family).permutation(int(samples_per_frame(settings.fps)))
     phase = int(phases[(number - 1) % len(phases)])
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated, phase)
+
+
+def of_declared_length(profile: BlinkProfile, settings: RenderSettings) -> BlinkProfile:
+    """The blink scaled to the declared duration, or as it is where none is declared."""
+    frames = _frames_30fps(settings)
+    return profile if frames is None else resample(profile, frames)
+
+
+def _frames_30fps(settings: RenderSettings) -> float | None:
+    return None if settings.blink_ms is None else round(settings.blink_ms * 30 / 1000, 9)
 
 
 def recorded_order(
@@ -94,7 +106,7 @@ def _textbook(
     rng = generator("textbook", seed, family, number)
     recorded = load_library()[int(rng.integers(len(load_library())))]
     peak = 1.0 if settings.amplitude == "full" else float(recorded.closure.max())
-    duration = settings.duration_frames or recorded.duration_frames_30fps
+    duration = _frames_30fps(settings) or recorded.duration_frames_30fps
     start, end = min(start, 0.9 * peak), min(end, 0.9 * peak)
     return textbook_profile(kind, duration, start_level=start, end_level=end, peak_closure=peak)
 

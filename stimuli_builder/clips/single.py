@@ -7,11 +7,10 @@ from experiments.errors import InputError, did_you_mean
 from experiments.files import whole_file
 from experiments.rendering import PROFILES, RenderSettings
 from stimuli_builder.blinks.library import load_library
-from stimuli_builder.blinks.profile import resample
 from stimuli_builder.clips.characters import geometry
 from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve, within_reach
 from stimuli_builder.clips.design_clips import Options, check_look, look_of
-from stimuli_builder.clips.exemplars import Exemplar, exemplar
+from stimuli_builder.clips.exemplars import Exemplar, exemplar, of_declared_length
 from stimuli_builder.clips.jobs import ClipJob, render
 from stimuli_builder.clips.motion_blur import samples_per_frame
 
@@ -62,8 +61,7 @@ def _blink(wanted: SingleClip) -> Exemplar:
         names = [*PROFILES, *shipped]
         raise InputError(f"no blink profile '{wanted.profile}'{did_you_mean(wanted.profile, names)}")
     profile = shipped[wanted.profile]
-    if settings.duration_frames is not None:
-        profile = resample(profile, settings.duration_frames)
+    profile = of_declared_length(profile, settings)
     if settings.eyes == "separate" and profile.closure_other is None:
         raise InputError(f"profile {wanted.profile} shows one eye; --eyes separate needs one of both eyes")
     if settings.eyes == "alike":

@@ -4,6 +4,7 @@ import pytest
 
 from experiments import design
 from experiments.load import load_experiment
+from experiments.rendering import RenderOverrides, RenderSettings
 from experiments.trials.counts import expected_minutes, trials_per_participant
 
 # design counts of Trutoiu et al. (2011), sections 4.1-4.3
@@ -44,3 +45,24 @@ def test_levels_override_the_render_settings() -> None:
     settings = design.render_settings(exp2, spec)
     assert (settings.profile, settings.duration_frames, settings.character) == ("AL_ease", 11, "cartoon")
     assert (settings.amplitude, settings.motion_blur) == ("full", True)
+
+
+def test_a_level_may_give_its_length_in_other_units() -> None:
+    exp2 = load_experiment("exp2")
+    of_frames = RenderOverrides(duration_frames=12, duration_frames_fps=60).applied_to(exp2.render)
+    of_time = RenderOverrides(duration_ms=200).applied_to(of_frames)
+    assert (of_frames.blink_ms, of_time.blink_ms, of_time.duration_frames) == (200, 200, None)
+    assert RenderOverrides(duration_frames=6).applied_to(RenderSettings(duration_ms=300)).blink_ms == 200
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"duration_frames": 9, "duration_ms": 300}, "got both; leave one out"),
+        ({"duration_frames": 9, "duration_frames_fps": 240}, "100 to 2000 ms, got duration_frames 9 at 240"),
+        ({"duration_frames": 61}, "at 30 fps, 2033 ms"),
+    ],
+)
+def test_a_length_that_cannot_be_is_refused(values: dict[str, float], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        RenderSettings(**values)

@@ -2358,6 +2358,7 @@ export interface components {
              * @default {
              *       "character": "photorealistic",
              *       "profile": "real",
+             *       "duration_frames_fps": 30,
              *       "amplitude": "full",
              *       "motion_blur": true,
              *       "lower_lid": "none",
@@ -3846,6 +3847,16 @@ export interface components {
              */
             duration_frames: number | null;
             /**
+             * Duration Frames Fps
+             * @description As [render] `duration_frames_fps`, for clips of this level.
+             */
+            duration_frames_fps: number | null;
+            /**
+             * Duration Ms
+             * @description As [render] `duration_ms`, for clips of this level.
+             */
+            duration_ms: number | null;
+            /**
              * Amplitude
              * @description As [render] `amplitude`, for clips of this level.
              */
@@ -3891,9 +3902,21 @@ export interface components {
             profile: string;
             /**
              * Duration Frames
-             * @description Length of the blink, in frames at 30 per second; left out, blinks keep their recorded length.
+             * @description Length of the blink, in frames at `duration_frames_fps`, whatever rate the clip has; left out (and
+             *     `duration_ms` too), blinks keep their recorded length.
              */
             duration_frames: number | null;
+            /**
+             * Duration Frames Fps
+             * @description Rate at which `duration_frames` counts, in frames per second.
+             * @default 30
+             */
+            duration_frames_fps: number;
+            /**
+             * Duration Ms
+             * @description Length of the blink in milliseconds, instead of `duration_frames`.
+             */
+            duration_ms: number | null;
             /**
              * Amplitude
              * @description `full` (FC) closes the eye fully, to closure 1; `natural` (NC) keeps the closure that was measured.

@@ -60,6 +60,25 @@ def test_recorded_and_modelled_blinks_take_a_wanted_length() -> None:
         assert shown.duration_frames_30fps == pytest.approx(9)
 
 
+@pytest.mark.parametrize("fps", [24, 25, 30, 50, 60])
+def test_blinks_begin_anywhere_within_one_frame_at_every_rate(fps: int) -> None:
+    step = 300 / fps
+    phases = [exemplar(settings_for("SL", fps=fps), "key", n, 5).phase_samples for n in range(1, 41)]
+    assert max(phases) < step
+    assert sorted(set(phases)) == list(range(int(step)))
+
+
+@pytest.mark.parametrize("fps", [24, 25, 50, 60])
+@pytest.mark.parametrize("profile", ["real", "AL_ease"])
+def test_a_blink_lasts_as_declared_at_every_rate(profile: str, fps: int) -> None:
+    def length_ms(**declared: float) -> float:
+        return exemplar(settings_for(profile, fps=fps, **declared), "k", 1, 5).profile.duration_ms
+
+    assert length_ms(duration_frames=9) == pytest.approx(300)
+    assert length_ms(duration_frames=15, duration_frames_fps=50) == pytest.approx(300)
+    assert length_ms(duration_ms=300) == pytest.approx(300)
+
+
 def test_eyes_apart_come_from_blinks_seen_in_both() -> None:
     for profile in ("real", "model"):
         shown = exemplar(settings_for(profile, eyes="separate"), "k", 1, 5).profile
