@@ -17,12 +17,12 @@ from stimuli_builder.blinks.blink_model import default_model  # noqa: E402
 from stimuli_builder.blinks.profile import resample, to_full_closure  # noqa: E402
 from stimuli_builder.blinks.textbook import textbook_profile  # noqa: E402
 from stimuli_builder.characters.colour import linear_to_srgb  # noqa: E402
-from stimuli_builder.clips.characters import shipped_names  # noqa: E402
+from stimuli_builder.clips.characters import find_character, shipped_names  # noqa: E402
 from stimuli_builder.clips.curves import Timing, clip_curve  # noqa: E402
 from stimuli_builder.clips.exemplars import exemplar  # noqa: E402
 from stimuli_builder.clips.frames import FramePainter  # noqa: E402
 from stimuli_builder.clips.kernels import FULL_SCALE  # noqa: E402
-from stimuli_builder.clips.levels import LevelSet, load_levels  # noqa: E402
+from stimuli_builder.clips.levels import LevelSet  # noqa: E402
 from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
@@ -38,7 +38,7 @@ def main() -> None:
         if name not in shipped_names():
             print(f"{name} is not baked here: no pictures of it")
             continue
-        character = load_levels(name, SIZE)
+        character = find_character(name).levels(SIZE)
         levels = np.vstack([character.picture(w) for w in CLOSURES])
         save(levels, folder / f"{name}-closures.jpg")
         save(blink_sheet(character), folder / f"{name}-blink.jpg")

@@ -1,4 +1,4 @@
-"""A character as baked pictures: any eyelid closure by linear interpolation in linear light.
+"""A character as baked pictures, decoded: what blends them is `stimuli_builder.clips`.
 
 The atlas holds one full open-eye frame and, for a rising list of closures, the crop that a blink changes.
 """
@@ -8,19 +8,19 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import srgb_to_linear
 from stimuli_builder.characters.declaration import DECLARATION_FILE, Declaration, Picture, read_declaration
 from stimuli_builder.characters.lower_lid_layer import LowerLidLayer
-from stimuli_builder.characters.reading import check_closures, decode_picture, slices
+from stimuli_builder.characters.reading import decode_picture, slices
 
 SHIPPED = Path(__file__).parent / "data"
 
 
-class Character:
-    """One character, decoded as far as it has been asked for.
+class Atlas:
+    """The pictures of one baked character, decoded as far as they have been asked for.
 
     Attributes
     ----------
@@ -81,48 +81,6 @@ class Character:
             levels[index] = srgb_to_linear(self.level_srgb(index))
         return levels
 
-    def level_weights(self, closures: ArrayLike) -> NDArray[np.float32]:
-        """(m, n) weights over levels of m closures; each row has at most two neighbours and sums to 1.
-
-        The mean of rows is the weight vector of motion blur over these closures.
-
-        Raises
-        ------
-        InputError
-            A closure is NaN or outside 0-1.
-        """
-        wanted = check_closures(closures)
-        upper = np.clip(np.searchsorted(self.closures, wanted, side="left"), 1, len(self.closures) - 1)
-        low, high = self.closures[upper - 1], self.closures[upper]
-        share = (wanted - low) / (high - low)
-        weights = np.zeros((len(wanted), len(self.closures)), np.float32)
-        rows = np.arange(len(wanted))
-        weights[rows, upper - 1] = 1.0 - share
-        weights[rows, upper] = share
-        return weights
-
-    def lower_lid_delta(
-        self, closure: float, vertical_mm: float, horizontal_mm: float
-    ) -> NDArray[np.float32]:
-        """(h, w, 3) linear light to add to the crop for a moved lower lid; negative sums clip to 0.
-
-        Parameters
-        ----------
-        closure : float
-            Upper-lid closure of the frame, 0-1: the upper lid and its shadow cover the lower lid.
-        vertical_mm, horizontal_mm : float
-            Lower-lid displacement, up and towards the nose, within the baked range.
-
-        Raises
-        ------
-        InputError
-            The character has no lower-lid layer, or a value is outside its range.
-        """
-        layer = self.lower_lid_layer
-        delta = np.zeros((self.declaration.crop[3], self.declaration.crop[2], 3), np.float32)
-        delta[layer.window] = layer.delta(closure, vertical_mm, horizontal_mm)
-        return delta
-
     @cached_property
     def lower_lid_layer(self) -> LowerLidLayer:
         """The decoded lower-lid layer; InputError where the character has none."""
@@ -140,7 +98,7 @@ class Character:
         return decode_picture(self.folder, picture, tuple(size), what)
 
 
-def load_character(folder: Path) -> Character:
+def load_atlas(folder: Path) -> Atlas:
     """Load a character's declaration; its pictures are decoded when asked for.
 
     Raises
@@ -159,4 +117,4 @@ def load_character(folder: Path) -> Character:
                 f"character '{declaration.name}': {picture.file} is missing from {folder}; bake it again or "
                 f"correct {DECLARATION_FILE}"
             )
-    return Character(folder, declaration)
+    return Atlas(folder, declaration)

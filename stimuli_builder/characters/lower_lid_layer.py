@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import srgb_to_linear
-from stimuli_builder.characters.reading import check_closures, decode_picture, slices
+from stimuli_builder.characters.interpolation import level_weights
+from stimuli_builder.characters.reading import decode_picture, slices
 
 if TYPE_CHECKING:
-    from stimuli_builder.characters.atlas import Character
+    from stimuli_builder.characters.atlas import Atlas
 
 SHADE_LIMITS = (0.2, 1.1)
 SHADE_BLUR_MM = 0.4
@@ -21,11 +22,12 @@ DARKEST = np.float32(2e-3)
 class LowerLidLayer:
     """Poses of the open eye's lower lid, laid under the upper lid of any closure.
 
-    I(w, v, h) = I(w) + (1 - matte(w)) (pose(v, h) - pose(0, 0)) R(w), where R is the blurred brightness of
-    I(w) over that of I(0), clipped: the shade that the upper lid throws on the moved skin.
+    I(w, v, h) = I(w) + (1 - matte(w)) (pose(v, h) - pose(0, 0)) R(w), where w is the closure, v and h the
+    lift and the slide in mm, and R the blurred brightness of I(w) over that of I(0), clipped: the shade that
+    the upper lid throws on the moved skin. `stimuli_builder.clips.lower_lid` adds it to frames.
     """
 
-    def __init__(self, character: "Character") -> None:
+    def __init__(self, character: "Atlas") -> None:
         lower = character.declaration.lower_lid
         if lower is None:
             raise InputError(f"character '{character.name}' has no lower-lid layer: use lower lid 'none'")
@@ -41,39 +43,6 @@ class LowerLidLayer:
         self.matte_closures = np.array([matte.closure for matte in lower.mattes])
         self._factors: dict[int, NDArray[np.float32]] = {}
 
-    @property
-    def vertical_range_mm(self) -> tuple[float, float]:
-        """Lowest and highest vertical displacement that was baked."""
-        return float(self.vertical_mm[0]), float(self.vertical_mm[-1])
-
-    @property
-    def horizontal_range_mm(self) -> tuple[float, float]:
-        """Lowest and highest horizontal displacement that was baked."""
-        return float(self.horizontal_mm[0]), float(self.horizontal_mm[-1])
-
-    def delta(self, closure: float, vertical_mm: float, horizontal_mm: float) -> NDArray[np.float32]:
-        """(h, w, 3) linear light to add to `window` of the crop. See Character.lower_lid_delta."""
-        closure = float(check_closures([closure])[0])
-        row, row_share = _neighbours(self.vertical_mm, vertical_mm, "vertical")
-        column, column_share = _neighbours(self.horizontal_mm, horizontal_mm, "horizontal")
-        change = np.zeros(self.changes.shape[2:], np.float32)
-        for i, across in ((row, 1 - row_share), (row + 1, row_share)):
-            for j, along in ((column, 1 - column_share), (column + 1, column_share)):
-                if across * along > 0:
-                    change += np.float32(across * along) * self.changes[i, j]
-        return change * self._factor(closure)
-
-    def _factor(self, closure: float) -> NDArray[np.float32]:
-        """(h, w, 1 or 3) of visible share times shade at a closure, interpolated between mattes."""
-        if len(self.matte_closures) == 1:
-            return self.factor_at(0)
-        inside = float(np.clip(closure, self.matte_closures[0], self.matte_closures[-1]))
-        index, share = _neighbours(self.matte_closures, inside, "closure")
-        if share == 0.0:
-            return self.factor_at(index)
-        low, high = self.factor_at(index), self.factor_at(index + 1)
-        return (1 - np.float32(share)) * low + np.float32(share) * high
-
     def factor_at(self, index: int) -> NDArray[np.float32]:
         """(h, w, 1 or 3) of visible share times shade at the closure of one matte."""
         if index not in self._factors:
@@ -86,7 +55,7 @@ class LowerLidLayer:
 
     def _shade(self, closure: float) -> NDArray[np.float32]:
         character = self._character
-        weights = character.level_weights([closure])[0]
+        weights = level_weights(character.closures, [closure])[0].astype(np.float32)
         image = np.zeros((self._lower.crop[3], self._lower.crop[2], 3), np.float32)
         for index in np.flatnonzero(weights):
             image += weights[index] * srgb_to_linear(character.level_srgb(int(index)))[self.window]
@@ -110,16 +79,6 @@ class LowerLidLayer:
         return np.stack(
             [np.stack([images[(v, h)] - rest for h in self.horizontal_mm]) for v in self.vertical_mm]
         )
-
-
-def _neighbours(grid: NDArray[np.float64], value: float, axis: str) -> tuple[int, float]:
-    """Index of the grid point at or below `value` (never the last) and the share of the next one."""
-    if not (grid[0] - 1e-9 <= value <= grid[-1] + 1e-9):
-        raise InputError(
-            f"lower lid {axis} displacement must lie between {grid[0]:g} and {grid[-1]:g} mm; it is {value:g}"
-        )
-    index = int(np.clip(np.searchsorted(grid, value, side="right") - 1, 0, len(grid) - 2))
-    return index, float(np.clip((value - grid[index]) / (grid[index + 1] - grid[index]), 0.0, 1.0))
 
 
 def _blur(image: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""What reading a character checks: pictures as declared, closures between 0 and 1."""
+"""Reading a character's pictures: as they were declared, or one clear line."""
 
 import hashlib
 from collections.abc import Sequence
@@ -6,21 +6,11 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from experiments.errors import InputError
 from stimuli_builder.characters.declaration import Picture
-
-
-def check_closures(closures: ArrayLike) -> NDArray[np.float64]:
-    """(m,) closures as floats; InputError where one is NaN or outside 0-1 (1e-9 of rounding is clipped)."""
-    values = np.atleast_1d(np.asarray(closures, dtype=float)).ravel()
-    wrong = ~((values >= -1e-9) & (values <= 1 + 1e-9))
-    if wrong.any():
-        at = int(np.flatnonzero(wrong)[0])
-        raise InputError(f"closure must lie between 0 (open) and 1 (closed); sample {at} is {values[at]:g}")
-    return np.asarray(np.clip(values, 0.0, 1.0), dtype=np.float64)
 
 
 def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: str) -> NDArray[np.uint8]:
@@ -39,8 +29,11 @@ def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: st
             raise
         raise InputError(f"{what} is damaged: cannot decode {picture.file}; bake it again") from error
     if image.size != tuple(size):
-        found, wanted = f"{image.width} x {image.height}", " x ".join(str(n) for n in size)
-        raise InputError(f"{what}: {picture.file} is {found} px, the declaration asks for {wanted} px")
+        declared = " x ".join(str(n) for n in size)
+        raise InputError(
+            f"{what}: {picture.file} is {image.width} x {image.height} px, "
+            f"the declaration asks for {declared} px"
+        )
     return np.asarray(image, dtype=np.uint8)
 
 

@@ -1,18 +1,16 @@
-"""Finding a character by name or folder, its geometry, and the hash of all that decides how it looks."""
+"""What clips need of a character, and finding one by name or folder."""
 
-import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from experiments.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
-    from stimuli_builder.characters.atlas import Character
-    from stimuli_builder.characters.declaration import LowerLid
+    from stimuli_builder.clips.levels import LevelSet
 
-CARTOON = "cartoon"
 SHIPPED_FOLDER = Path(__file__).resolve().parent.parent / "characters" / "data"
 
 
@@ -50,10 +48,25 @@ class Geometry:
         return self.px_per_mm * width_px / self.size_px[0]
 
 
+class Character(Protocol):
+    """What clips need of a character, drawn or baked."""
+
+    @property
+    def geometry(self) -> Geometry:
+        """Size and scale of its whole frame."""
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of everything that decides its pictures."""
+
+    def levels(self, size_px: tuple[int, int]) -> "LevelSet":
+        """Its pictures at a size (width, height), ready to be blended."""
+
+
 def shipped_names() -> tuple[str, ...]:
     """Names of the characters that come with the project."""
     baked = sorted(file.parent.name for file in SHIPPED_FOLDER.glob("*/character.toml"))
-    return (CARTOON, *baked)
+    return (*DRAWN, *baked)
 
 
 def character_folder(name: str, beside: Path | None = None) -> Path:
@@ -77,78 +90,36 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
     )
 
 
-def find_character(name: str, beside: Path | None = None) -> "Character":
-    """Load a baked character by shipped name or folder."""
-    from stimuli_builder.characters.atlas import load_character
-
-    return load_character(character_folder(name, beside))
+def find_character(name: str, beside: Path | None = None) -> Character:
+    """The character of a shipped name, or of a folder relative to `beside`."""
+    if name in DRAWN:
+        return DRAWN[name]()
+    return _baked(character_folder(name, beside))
 
 
 def geometry(name: str, beside: Path | None = None) -> Geometry:
     """Size and scale of a character."""
-    if name == CARTOON:
-        return _cartoon_geometry()
-    return _folder_geometry(character_folder(name, beside))
-
-
-@lru_cache(maxsize=1)
-def _cartoon_geometry() -> Geometry:
-    from stimuli_builder.characters import cartoon
-
-    width = 960
-    size = (width, round(width * cartoon.FRAME_MM[1] / cartoon.FRAME_MM[0]))
-    scale = width / cartoon.FRAME_MM[0]
-    return Geometry(CARTOON, size, scale, cartoon.INTER_OCULAR_MM, cartoon.OPENING_MM, None)
-
-
-@lru_cache(maxsize=16)
-def _folder_geometry(folder: Path) -> Geometry:
-    from stimuli_builder.characters.atlas import load_character
-
-    found = load_character(folder).declaration
-    return Geometry(
-        found.name,
-        found.size_px,
-        found.px_per_mm,
-        found.inter_ocular_mm,
-        found.opening_mm,
-        None if found.lower_lid is None else _ends(found.lower_lid),
-    )
-
-
-def _ends(lid: "LowerLid") -> tuple[tuple[float, float], tuple[float, float]]:
-    vertical, horizontal = lid.vertical_mm, lid.horizontal_mm
-    return (vertical[0], vertical[-1]), (horizontal[0], horizontal[-1])
+    return find_character(name, beside).geometry
 
 
 def fingerprint(name: str, beside: Path | None = None) -> str:
-    """SHA-256 of everything that decides a character's pictures: its files, or the cartoon's source."""
-    if name == CARTOON:
-        return _cartoon_hash()
-    return _folder_hash(character_folder(name, beside))
+    """SHA-256 of everything that decides a character's pictures: its files, or the drawing's source."""
+    return find_character(name, beside).fingerprint
 
 
 @lru_cache(maxsize=1)
-def _cartoon_hash() -> str:
-    from stimuli_builder.characters import cartoon
+def _cartoon() -> Character:
+    from stimuli_builder.clips.cartoon_character import CartoonCharacter
 
-    return cartoon.fingerprint()
+    return CartoonCharacter()
 
 
 @lru_cache(maxsize=16)
-def _folder_hash(folder: Path) -> str:
-    from stimuli_builder.characters.declaration import read_declaration
+def _baked(folder: Path) -> Character:
+    from stimuli_builder.clips.baked_character import BakedCharacter
 
-    declaration = read_declaration(folder)
-    pictures = [declaration.base, *declaration.levels]
-    if declaration.lower_lid is not None:
-        pictures += [*declaration.lower_lid.poses, *declaration.lower_lid.mattes]
-    digest = hashlib.sha256((folder / "character.toml").read_bytes())
-    for picture in pictures:
-        try:
-            digest.update((folder / picture.file).read_bytes())
-        except OSError as error:
-            raise InputError(
-                f"character '{declaration.name}': {picture.file} is missing from {folder}; bake it again"
-            ) from error
-    return digest.hexdigest()
+    return BakedCharacter(folder)
+
+
+DRAWN: Mapping[str, Callable[[], Character]] = {"cartoon": _cartoon}
+"""Characters that are drawn by a program; every other is a folder of pictures."""

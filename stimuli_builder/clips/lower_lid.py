@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stimuli_builder.characters.atlas import Character
+from stimuli_builder.characters.atlas import Atlas
 from stimuli_builder.clips.kernels import FULL_SCALE, add_products
 
 CHANGE_STEP, FACTOR_STEP = 2.0, 2.0**-15
@@ -38,7 +38,7 @@ class LowerLid:
     columns: slice
 
     @classmethod
-    def of_character(cls, character: Character, to_window: Callable[[Picture], Picture]) -> "LowerLid":
+    def of_character(cls, character: Atlas, to_window: Callable[[Picture], Picture]) -> "LowerLid":
         """Decode a character's layer; `to_window` brings a picture of its crop to the size in use."""
         layer = character.lower_lid_layer
         vertical, horizontal, closures = layer.vertical_mm, layer.horizontal_mm, layer.matte_closures

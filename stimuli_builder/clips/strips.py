@@ -12,8 +12,7 @@ import numpy as np
 from PIL import Image
 
 from stimuli_builder.characters.writing import write_bytes
-from stimuli_builder.clips.characters import shipped_names
-from stimuli_builder.clips.levels import load_levels
+from stimuli_builder.clips.characters import find_character, shipped_names
 
 STRIPS_FILE = "strips.json"
 STEPS = 33
@@ -23,7 +22,7 @@ QUALITY = 72
 
 def strip(character: str, size_px: tuple[int, int] = SIZE_PX, steps: int = STEPS) -> bytes:
     """WebP of `steps` frames, closure 0 at the top to 1 at the bottom in equal steps."""
-    levels = load_levels(character, size_px)
+    levels = find_character(character).levels(size_px)
     frames = [levels.picture(float(closure)) for closure in np.linspace(0.0, 1.0, steps)]
     buffer = BytesIO()
     Image.fromarray(np.vstack(frames)).save(buffer, "WEBP", quality=QUALITY, method=4)

@@ -115,11 +115,9 @@ class Fitter:
             model.shape_modes, model.appearance, model.weights, algebra.hessian_forms, algebra.directions,
             prior_of_c, LIMIT_SD * model.sd, algebra.scales, algebra.centre,
         )  # fmt: skip
-        self._buffers = kernels.Buffers(
-            *(np.empty(pixels, np.float32) for _ in range(4)),
-            np.empty(mesh.vertices.shape, np.float32),
-            np.empty(model.eyes),
-        )
+        sampled, error, gx, gy = np.empty((4, pixels), np.float32)
+        vertices = np.empty(mesh.vertices.shape, np.float32)
+        self._buffers = kernels.Buffers(sampled, error, gx, gy, vertices, np.empty(model.eyes))
 
     def fit(self, picture: Picture, c: Values, pose: Values, max_iterations: int | None = None) -> Fit:
         """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""

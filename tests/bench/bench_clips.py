@@ -14,13 +14,13 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from experiments.load import load_experiment
-from stimuli_builder.clips.characters import shipped_names
+from stimuli_builder.clips.characters import find_character, shipped_names
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, planned_clips
 from stimuli_builder.clips.encode import encode_clip
 from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.jobs import render
-from stimuli_builder.clips.levels import LevelSet, load_levels
+from stimuli_builder.clips.levels import LevelSet
 from stimuli_builder.clips.workers import available_cores, run_jobs
 
 SAMPLE = 24
@@ -47,7 +47,7 @@ def some_jobs() -> list:
 def character(request: pytest.FixtureRequest) -> LevelSet:
     if request.param not in shipped_names():
         pytest.skip(f"{request.param} is not baked here")
-    return load_levels(request.param, SIZE)
+    return find_character(request.param).levels(SIZE)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from stimuli_builder.characters.atlas import SHIPPED, Character, load_character
+from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
+from stimuli_builder.characters.interpolation import level_weights
 from stimuli_builder.characters.photorealistic import plan
 from stimuli_builder.characters.photorealistic.assembly import Assembly
 from stimuli_builder.characters.photorealistic.development import psnr_db, to_8_bit
@@ -20,6 +21,7 @@ from stimuli_builder.characters.photorealistic.eyelid_skin import LidPose
 from stimuli_builder.characters.photorealistic.framing import Frame
 from stimuli_builder.characters.photorealistic.parameters import Face
 from stimuli_builder.characters.photorealistic.renderer import Renderer, Shot
+from tests.helpers.lower_lid_change import lower_lid_change
 
 # The last one is where the lids almost meet.
 PLACES = (0.1, 0.4, 0.7, 0.93)
@@ -39,12 +41,12 @@ def midpoints(closures: list[float]) -> list[float]:
     return [(closures[int(step)] + closures[int(step) + 1]) / 2 for step in steps]
 
 
-def picture(character: Character, closure: float) -> np.ndarray:
-    weights = character.level_weights([closure])[0]
+def picture(character: Atlas, closure: float) -> np.ndarray:
+    weights = level_weights(character.closures, [closure])[0].astype(np.float32)
     return sum(weights[i] * linear_level(character, int(i)) for i in np.flatnonzero(weights))
 
 
-def linear_level(character: Character, index: int) -> np.ndarray:
+def linear_level(character: Atlas, index: int) -> np.ndarray:
     return srgb_to_linear(character.level_srgb(index))
 
 
@@ -53,7 +55,7 @@ def say(line: str) -> None:
 
 
 def main() -> None:
-    character = load_character(SHIPPED / "photorealistic")
+    character = load_atlas(SHIPPED / "photorealistic")
     made = character.declaration.provenance
     face = Face.model_validate(made["face"])
     quality = plan.Quality(made["samples"], made["frame_samples"])
@@ -99,7 +101,7 @@ def main() -> None:
         say(f"{closure:7.2f} {11 * (1 - closure):10.2f} {left:6.2f} {right:6.2f}")
 
 
-def report_midpoints(character: Character, assembly: Assembly, what: str, shots: list[Shot]) -> None:
+def report_midpoints(character: Atlas, assembly: Assembly, what: str, shots: list[Shot]) -> None:
     say(f"closure  reference's samples  PSNR in dB (crop), halfway between {what}")
     for shot in shots:
         truth = to_8_bit(assembly.lay(assembly.still, shot))[character.crop]
@@ -107,10 +109,10 @@ def report_midpoints(character: Character, assembly: Assembly, what: str, shots:
         say(f"{shot.pose.closure:.5f} {shot.samples:10d} {psnr_db(made, truth):16.1f}")
 
 
-def report_lower_lid(character: Character, assembly: Assembly, shot: Shot) -> None:
+def report_lower_lid(character: Atlas, assembly: Assembly, shot: Shot) -> None:
     window, pose = character.lower_lid_layer.window, shot.pose
     still = picture(character, pose.closure)
-    made = still + character.lower_lid_delta(pose.closure, pose.vertical_mm, pose.horizontal_mm)
+    made = still + lower_lid_change(character, pose.closure, pose.vertical_mm, pose.horizontal_mm)
     truth = to_8_bit(assembly.lay(assembly.still, shot))[character.crop][window]
     figures = [psnr_db(linear_to_srgb(image)[window], truth) for image in (made, still)]
     place = f"{pose.closure:7.2f} {pose.vertical_mm:5.2f} {pose.horizontal_mm:5.2f}"

@@ -8,14 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.characters.atlas import load_character
+from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import declaration_toml, read_declaration
 from stimuli_builder.characters.example import CROP, draw_crop, write_example_character
+from stimuli_builder.characters.interpolation import level_weights
+from tests.helpers.lower_lid_change import lower_lid_change
 
 
 def test_levels_are_the_pictures_in_linear_light(tiny_character: Path) -> None:
-    character = load_character(tiny_character)
+    character = load_atlas(tiny_character)
     levels = character.levels_linear()
     assert levels.shape == (4, CROP[3], CROP[2], 3)
     assert levels.dtype == np.float32
@@ -36,53 +38,39 @@ def test_every_code_value_survives_linear_light() -> None:
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=8))
 @settings(deadline=None, max_examples=40)
-def test_weights_rebuild_the_closure(tmp_path_factory: pytest.TempPathFactory, closures: list[float]) -> None:
-    folder = tmp_path_factory.getbasetemp() / "weights"
-    if not folder.exists():
-        write_example_character(folder, lower_lid=False)
-    character = load_character(folder)
-    weights = character.level_weights(closures)
-    np.testing.assert_allclose(weights.sum(1), 1, atol=1e-6)
-    np.testing.assert_allclose(weights @ character.closures, closures, atol=1e-6)
+def test_weights_rebuild_the_closure(closures: list[float]) -> None:
+    levels = np.array([0.0, 0.25, 0.5, 1.0])
+    weights = level_weights(levels, closures)
+    np.testing.assert_allclose(weights.sum(1), 1, atol=1e-12)
+    np.testing.assert_allclose(weights @ levels, closures, atol=1e-12)
     assert ((weights > 0).sum(1) <= 2).all()
     assert (weights >= 0).all()
 
 
-@pytest.mark.parametrize("closure", [float("nan"), -0.01, 1.01, float("inf")])
-def test_closure_outside_its_range_is_refused(tiny_character: Path, closure: float) -> None:
-    with pytest.raises(InputError, match="closure must lie between 0"):
-        load_character(tiny_character).level_weights([0.5, closure])
-
-
 def test_resting_lower_lid_changes_nothing(tiny_character: Path) -> None:
-    assert not load_character(tiny_character).lower_lid_delta(0.3, 0.0, 0.0).any()
+    assert not lower_lid_change(load_atlas(tiny_character), 0.3, 0.0, 0.0).any()
 
 
 def test_open_eye_with_raised_lower_lid_is_the_baked_pose(tiny_character: Path) -> None:
-    character = load_character(tiny_character)
-    image = srgb_to_linear(draw_crop(0.0)) + character.lower_lid_delta(0.0, 1.0, 0.0)
+    character = load_atlas(tiny_character)
+    image = srgb_to_linear(draw_crop(0.0)) + lower_lid_change(character, 0.0, 1.0, 0.0)
     np.testing.assert_array_equal(linear_to_srgb(image), draw_crop(0.0, 4))
 
 
 def test_closed_upper_lid_hides_the_lower_lid(tiny_character: Path) -> None:
-    assert not load_character(tiny_character).lower_lid_delta(1.0, 1.0, 1.0).any()
-
-
-def test_lower_lid_beyond_its_range_is_refused(tiny_character: Path) -> None:
-    with pytest.raises(InputError, match=r"between 0 and 1 mm; it is 1\.5"):
-        load_character(tiny_character).lower_lid_delta(0.0, 1.5, 0.0)
+    assert not lower_lid_change(load_atlas(tiny_character), 1.0, 1.0, 1.0).any()
 
 
 def test_character_without_lower_lid_says_so(tmp_path: Path) -> None:
-    character = load_character(write_example_character(tmp_path / "plain", lower_lid=False))
+    character = load_atlas(write_example_character(tmp_path / "plain", lower_lid=False))
     with pytest.raises(InputError, match="has no lower-lid layer"):
-        character.lower_lid_delta(0.0, 0.1, 0.0)
+        _ = character.lower_lid_layer
 
 
 def test_missing_level_is_named_on_loading(tiny_character: Path) -> None:
     (tiny_character / "level_0.50.webp").unlink()
     with pytest.raises(InputError, match=r"level_0\.50\.webp is missing"):
-        load_character(tiny_character)
+        load_atlas(tiny_character)
 
 
 @pytest.mark.parametrize("damage", [b"", b"not a picture", None])
@@ -90,7 +78,7 @@ def test_damaged_level_is_named(tiny_character: Path, damage: bytes | None) -> N
     file = tiny_character / "level_0.50.webp"
     file.write_bytes(file.read_bytes()[:-7] if damage is None else damage)
     with pytest.raises(InputError, match=r"atlas level 2 \(closure 0.5\) is damaged"):
-        load_character(tiny_character).check_files()
+        load_atlas(tiny_character).check_files()
 
 
 @pytest.mark.parametrize(
@@ -111,10 +99,10 @@ def test_wrong_declaration_is_one_clear_line(tiny_character: Path, old: str, new
     assert old in text
     file.write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=message) as caught:
-        load_character(tiny_character)
+        load_atlas(tiny_character)
     assert "\n" not in str(caught.value)
 
 
 def test_folder_without_declaration_is_no_character(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is no character"):
-        load_character(tmp_path)
+        load_atlas(tmp_path)

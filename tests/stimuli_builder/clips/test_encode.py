@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
+from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.encode import encode_clip
 from stimuli_builder.clips.frames import FramePainter
-from stimuli_builder.clips.levels import load_levels
 
 
 @pytest.fixture(scope="module")
 def frames() -> list[np.ndarray]:
     closure = np.concatenate([np.zeros(50), np.linspace(0, 1, 40), np.linspace(1, 0, 60), np.zeros(50)])
     return list(
-        FramePainter(load_levels("cartoon", (320, 120))).frames(ClipCurve(closure, 50, "t"), 30, True)
+        FramePainter(find_character("cartoon").levels((320, 120))).frames(
+            ClipCurve(closure, 50, "t"), 30, True
+        )
     )
 
 

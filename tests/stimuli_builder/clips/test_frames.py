@@ -5,25 +5,27 @@ import pytest
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.characters.atlas import load_character
+from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.colour import encode_srgb
 from stimuli_builder.characters.example import write_example_character
 from stimuli_builder.clips.barcode import read_barcode
+from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.kernels import GAMMA
-from stimuli_builder.clips.levels import LevelSet, atlas_levels, load_levels
+from stimuli_builder.clips.levels import LevelSet
+from tests.helpers.lower_lid_change import lower_lid_change
 
 
 @pytest.fixture(scope="module")
 def cartoon() -> LevelSet:
-    return load_levels("cartoon", (320, 120))
+    return find_character("cartoon").levels((320, 120))
 
 
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> LevelSet:
     folder = write_example_character(tmp_path_factory.mktemp("tiny") / "tiny")
-    return atlas_levels(load_character(folder), (48, 24))
+    return find_character(str(folder)).levels((48, 24))
 
 
 def curve_of(*closure: float, hold: int = 10) -> ClipCurve:
@@ -93,17 +95,17 @@ def lower_curve(closure: float, vertical: float, horizontal: float) -> ClipCurve
 def test_the_lower_lid_is_the_characters_own_layer(
     tiny: LevelSet, tmp_path_factory: pytest.TempPathFactory, pose: tuple[float, float, float]
 ) -> None:
-    character = load_character(write_example_character(tmp_path_factory.mktemp("again") / "tiny"))
+    atlas = load_atlas(write_example_character(tmp_path_factory.mktemp("again") / "tiny"))
     samples, weights = np.arange(10), np.full(10, 0.1)
     painter = FramePainter(tiny)
     moved = painter.light(lower_curve(*pose), samples, weights)
     still = painter.light(ClipCurve(np.full(10, pose[0]), 0, "still"), samples, weights)
     rows, columns = (
         slice(crop.start - start, crop.stop - start)
-        for crop, start in zip(character.crop, (tiny.window.y, tiny.window.x), strict=True)
+        for crop, start in zip(atlas.crop, (tiny.window.y, tiny.window.x), strict=True)
     )
-    wanted = character.lower_lid_delta(*pose)
-    np.testing.assert_allclose((moved - still)[rows, columns] / 65535, wanted, atol=1e-4)
+    expected = lower_lid_change(atlas, *pose)
+    np.testing.assert_allclose((moved - still)[rows, columns] / 65535, expected, atol=1e-4)
 
 
 def test_a_character_without_lower_lid_refuses_one(cartoon: LevelSet) -> None:
@@ -115,8 +117,8 @@ def test_a_character_without_lower_lid_refuses_one(cartoon: LevelSet) -> None:
 def test_other_sizes_are_resampled_with_still_edges(
     tmp_path_factory: pytest.TempPathFactory, size: tuple[int, int]
 ) -> None:
-    character = load_character(write_example_character(tmp_path_factory.mktemp("sized") / "tiny"))
-    levels = atlas_levels(character, size)
+    folder = write_example_character(tmp_path_factory.mktemp("sized") / "tiny")
+    levels = find_character(str(folder)).levels(size)
     assert levels.size_px == size
     assert levels.px_per_mm == pytest.approx(1.5 * size[0] / 48)
     np.testing.assert_array_equal(levels.base[levels.window.slices], levels.levels[0])
@@ -127,6 +129,6 @@ def test_other_sizes_are_resampled_with_still_edges(
 def test_a_size_that_cannot_show_the_blink_is_refused(
     tmp_path_factory: pytest.TempPathFactory, size: tuple[int, int], line: str
 ) -> None:
-    character = load_character(write_example_character(tmp_path_factory.mktemp("bad") / "tiny"))
+    character = find_character(str(write_example_character(tmp_path_factory.mktemp("bad") / "tiny")))
     with pytest.raises(InputError, match=line):
-        atlas_levels(character, size)
+        character.levels(size)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.characters.atlas import load_character
+from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.photorealistic.assembly import Assembly
 from stimuli_builder.characters.photorealistic.bake import BakeOrder, bake
 from stimuli_builder.characters.photorealistic.development import develop, psnr_db
@@ -63,7 +63,7 @@ def test_finished_shots_become_an_atlas_without_rendering(tmp_path: Path) -> Non
     calls: list[tuple[int, int]] = []
     bake(wanted, lambda done, total, _: calls.append((done, total)))
     assert calls == [(36, 36)]
-    character = load_character(wanted.out)
+    character = load_atlas(wanted.out)
     character.check_files()
     assert list(character.closures) == [0.0, 0.5, 1.0]
     assert character.lower_lid_layer.vertical_mm.tolist() == [0, 0.25, 0.5, 0.75, 1]
