@@ -16,13 +16,17 @@ class Shown:
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial as assigned: practice has block 0; attention checks have no clip."""
+    """One trial as assigned: practice has block 0; attention checks have no clip.
+
+    series: name of the adaptive series it belongs to, empty where there is none.
+    """
 
     kind: Literal["practice", "main", "attention"]
     block: int
     block_label: str
     shown: tuple[Shown, ...] = ()
     expected_response: int | None = None
+    series: str = ""
 
     @property
     def clip(self) -> ClipSpec | None:

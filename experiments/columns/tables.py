@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 
 
-def rows_of(kind: str, clips: Mapping[str, str]) -> str:
+def rows_of(kind: str, clips: Mapping[str, str], further: str = "") -> str:
     """The SQL after SELECT of a view of the answers of one kind of trial.
 
     Parameters
     ----------
     kind: as the declaration names it. clips: alias of `version_clips` for each role.
+    further: joins of the kind's own tables.
     """
     joins = "".join(
         f"LEFT JOIN trial_clips {role}_clip ON {role}_clip.study_run_id = t.study_run_id "
@@ -21,5 +22,5 @@ JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.
 JOIN study_runs r ON r.id = t.study_run_id
 JOIN study_versions v ON v.id = r.version_id
 JOIN studies s ON s.id = r.study_id
-{joins}WHERE t.kind = '{kind}' AND r.origin <> 'preview' AND r.erased_at IS NULL
+{joins}{further}WHERE t.kind = '{kind}' AND r.origin <> 'preview' AND r.erased_at IS NULL
 """

@@ -8,8 +8,9 @@ from experiments.columns.view import View
 from experiments.trials.clip_rating import CLIP_RATING
 from experiments.trials.kind import Kind
 from experiments.trials.paired_comparison import PAIRED_COMPARISON
+from experiments.trials.threshold import THRESHOLD
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (CLIP_RATING, PAIRED_COMPARISON)}
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (CLIP_RATING, PAIRED_COMPARISON, THRESHOLD)}
 """Every kind by the name that a TOML gives it; the first is meant where none is given."""
 
 

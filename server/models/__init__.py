@@ -24,6 +24,7 @@ from server.models.runs import (
     View,
     ViewClip,
 )
+from server.models.series import SeriesAnswer, SeriesOffer, SeriesTrial
 from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
 
 __all__ = [
@@ -45,6 +46,9 @@ __all__ = [
     "Link",
     "Rating",
     "RunEvent",
+    "SeriesAnswer",
+    "SeriesOffer",
+    "SeriesTrial",
     "Study",
     "StudyRun",
     "StudyVersion",

@@ -2399,7 +2399,7 @@ export interface components {
              * Trial
              * @description What one trial shows and asks, by its kind.
              */
-            trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"];
+            trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"] | components["schemas"]["Threshold"];
             /**
              * @description Size and surround of the clip, and what the device must offer.
              * @default {
@@ -3589,6 +3589,28 @@ export interface components {
             message: string;
         };
         /**
+         * Range
+         * @description Numbers at even distances, ends included.
+         */
+        Range: {
+            /**
+             * Lowest
+             * @description Lowest number.
+             */
+            lowest: number;
+            /**
+             * Highest
+             * @description Highest number.
+             */
+            highest: number;
+            /**
+             * Steps
+             * @description How many numbers, both ends included.
+             * @default 31
+             */
+            steps: number;
+        };
+        /**
          * RatingAnswer
          * @description The answers to one clip by the name of their scale; a [trial.scale] is called `rating`.
          */
@@ -3634,7 +3656,7 @@ export interface components {
              */
             play?: number;
             /** Answer */
-            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"];
+            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"];
             /**
              * Rt
              * @description From the clip's last frame to the answer, ms.
@@ -4119,7 +4141,7 @@ export interface components {
             /** Forms */
             forms: components["schemas"]["Form"][];
             /** Trial */
-            trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"];
+            trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"];
             display: components["schemas"]["Display"];
             playback: components["schemas"]["PlaybackRules"];
             /** Break Seconds Min */
@@ -4399,6 +4421,24 @@ export interface components {
             ][];
         };
         /**
+         * Series
+         * @description One adaptive series: a level of every factor but that of the stimulus.
+         */
+        Series: {
+            /**
+             * Name
+             * @description Name of the series in the data.
+             */
+            name: string;
+            /**
+             * Levels
+             * @description A level of every other factor of the design.
+             */
+            levels: {
+                [key: string]: string;
+            };
+        };
+        /**
          * SeriesOut
          * @description Versions of a study that measure the same; only their answers may be pooled.
          */
@@ -4486,6 +4526,21 @@ export interface components {
              * @description True where `stimuli build` has made its clips on this server.
              */
             clips_ready: boolean;
+        };
+        /**
+         * ShownAnswer
+         * @description One of the two answers: its name in the data and its label.
+         */
+        ShownAnswer: {
+            /**
+             * Response
+             * @enum {string}
+             */
+            response: "yes" | "no" | "first" | "second";
+            /** Label */
+            label: {
+                [key: string]: string;
+            };
         };
         /**
          * ShownClip
@@ -4579,6 +4634,34 @@ export interface components {
             gap_ms: number;
         };
         /**
+         * ShownThreshold
+         * @description The declared threshold as the page gets it: nothing of stimuli, series or function.
+         */
+        ShownThreshold: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "threshold";
+            /** Question */
+            question: {
+                [key: string]: string;
+            };
+            /** Answers */
+            answers: [
+                components["schemas"]["ShownAnswer"],
+                components["schemas"]["ShownAnswer"]
+            ];
+            /** Gap Ms */
+            gap_ms: number;
+            /** Ahead */
+            ahead: number;
+            /** Pointer Delay Ms */
+            pointer_delay_ms: number;
+            /** Expected Seconds */
+            expected_seconds: number;
+        };
+        /**
          * SideBySide
          * @description Two clips beside one another on one canvas, drawn by one clock.
          *
@@ -4643,6 +4726,53 @@ export interface components {
              * @enum {string}
              */
             stage: "consent" | "forms_before" | "calibration" | "instructions" | "practice" | "trials" | "forms_after" | "debrief" | "done";
+        };
+        /**
+         * Stimulus
+         * @description The factor along which each series looks for its threshold.
+         */
+        Stimulus: {
+            /**
+             * Factor
+             * @description The factor. Its levels are the stimuli that were rendered, and a series moves between them.
+             */
+            factor: string;
+            /**
+             * Values
+             * @description The number of each level; may be left out where the levels are named by their numbers.
+             */
+            values: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * Stop
+         * @description When a series ends: after `trials`, earlier once its estimate is as certain as `sd` and `entropy` say.
+         *
+         *     Where both are given, both must be reached.
+         */
+        Stop: {
+            /**
+             * Trials
+             * @description Most trials of a series. Needed: an estimate need never become as certain as is asked.
+             */
+            trials: number | null;
+            /**
+             * At Least
+             * @description Answers that a series has before its certainty can end it.
+             * @default 10
+             */
+            at_least: number;
+            /**
+             * Sd
+             * @description Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit.
+             */
+            sd: number | null;
+            /**
+             * Entropy
+             * @description Entropy of the posterior over all parameters at which a series ends, in bits.
+             */
+            entropy: number | null;
         };
         /**
          * Strips
@@ -4797,6 +4927,107 @@ export interface components {
              * @default
              */
             screened_out: string;
+        };
+        /**
+         * Threshold
+         * @description Adaptive series by QUEST+: each answer decides which of the rendered stimuli is shown next.
+         *
+         *     A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+         */
+        Threshold: {
+            /**
+             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "threshold";
+            /**
+             * Expected Seconds
+             * @description Expected length of a trial in seconds, for the length of a visit.
+             * @default 5
+             */
+            expected_seconds: number;
+            /**
+             * Question
+             * @description What is asked after the clip or clips, in every language.
+             */
+            question: {
+                [key: string]: string;
+            };
+            /**
+             * Task
+             * @description One clip and yes or no, or two clips and which of them.
+             */
+            task: components["schemas"]["YesNo"] | components["schemas"]["TwoInterval"];
+            /** @description What changes from trial to trial. */
+            stimulus: components["schemas"]["Stimulus"];
+            /**
+             * Series
+             * @description The series, run interleaved; where none is given, one a combination of the other factors' levels.
+             * @default []
+             */
+            series: components["schemas"]["Series"][];
+            /**
+             * Function
+             * @description Shape assumed for the psychometric function. The Weibull needs stimuli above 0.
+             * @default normal
+             * @enum {string}
+             */
+            function: "normal" | "weibull";
+            /**
+             * Direction
+             * @description Whether yes (or right) becomes likelier with the stimulus's number, or less likely.
+             * @default rising
+             * @enum {string}
+             */
+            direction: "rising" | "falling";
+            /**
+             * Lapse
+             * @description Assumed share of wrong answers to what is plain to see: 1 minus the function's upper end.
+             * @default 0.02
+             */
+            lapse: number;
+            /** @description Thresholds considered; where not given, from the lowest stimulus to the highest. */
+            thresholds: components["schemas"]["Range"] | null;
+            /**
+             * @description Considered SDs of the normal function (in the stimulus's unit), or slopes of the Weibull; where not
+             *     given, a twentieth to a half of the stimuli's range, or 1 to 10.
+             */
+            spreads: components["schemas"]["Range"] | null;
+            /** @description When a series ends. */
+            stop: components["schemas"]["Stop"];
+            /**
+             * Ahead
+             * @description Trials of a series that a page without connection may show before the server has the answers to
+             *     earlier ones. Such trials are marked in the data.
+             * @default 3
+             */
+            ahead: number;
+            /**
+             * Pointer Delay Ms
+             * @description Time, in ms, for which a mouse that has not moved since its last press chooses nothing.
+             * @default 1500
+             */
+            pointer_delay_ms: number;
+        };
+        /**
+         * ThresholdAnswer
+         * @description The answer; None where the clips could not be shown.
+         *
+         *     known: how many answers of the series the server's choice of this stimulus rested on, as it said.
+         */
+        ThresholdAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "threshold";
+            /** Chosen */
+            chosen: ("yes" | "no" | "first" | "second") | null;
+            /**
+             * Known
+             * @default 0
+             */
+            known?: number;
         };
         /**
          * Tickets
@@ -5089,6 +5320,42 @@ export interface components {
             answered: boolean;
         };
         /**
+         * TwoInterval
+         * @description Two clips in turn, the stimulus and the standard in either order: in which of them was it?
+         */
+        TwoInterval: {
+            /**
+             * @description Names this task. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            asks: "two_interval";
+            /**
+             * Standard
+             * @description Level of the stimulus factor that every stimulus is shown against; it is not a stimulus itself.
+             */
+            standard: string;
+            /**
+             * First
+             * @description Label of the answer that names the first clip.
+             */
+            first: {
+                [key: string]: string;
+            };
+            /**
+             * Second
+             * @description Label of the answer that names the second clip.
+             */
+            second: {
+                [key: string]: string;
+            };
+            /**
+             * Gap Ms
+             * @description Plain background between the two clips, in ms.
+             * @default 500
+             */
+            gap_ms: number;
+        };
+        /**
          * Unsupported
          * @description A browser or screen that failed a gate before a run began.
          */
@@ -5242,6 +5509,37 @@ export interface components {
              */
             factor: string;
         };
+        /**
+         * YesNo
+         * @description One clip, and whether something was seen in it.
+         */
+        YesNo: {
+            /**
+             * @description Names this task. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            asks: "yes_no";
+            /**
+             * Yes
+             * @description Label of the answer that becomes likelier along the function.
+             */
+            yes: {
+                [key: string]: string;
+            };
+            /**
+             * No
+             * @description Label of the other answer.
+             */
+            no: {
+                [key: string]: string;
+            };
+            /**
+             * Guess
+             * @description Assumed share of yes where there is nothing to be seen: the function's lower end.
+             * @default 0.02
+             */
+            guess: number;
+        };
     };
     responses: never;
     parameters: never;
@@ -5347,6 +5645,7 @@ export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
 export type Practice = components['schemas']['Practice'];
 export type ProblemOut = components['schemas']['ProblemOut'];
+export type Range = components['schemas']['Range'];
 export type RatingAnswer = components['schemas']['RatingAnswer'];
 export type RatingEvidence = components['schemas']['RatingEvidence'];
 export type RatingIn = components['schemas']['RatingIn'];
@@ -5375,24 +5674,31 @@ export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
 export type ScreenOut = components['schemas']['ScreenOut'];
 export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
 export type SeenClip = components['schemas']['SeenClip'];
+export type Series = components['schemas']['Series'];
 export type SeriesOut = components['schemas']['SeriesOut'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
+export type ShownAnswer = components['schemas']['ShownAnswer'];
 export type ShownClip = components['schemas']['ShownClip'];
 export type ShownClipRating = components['schemas']['ShownClipRating'];
 export type ShownClips = components['schemas']['ShownClips'];
 export type ShownPairedComparison = components['schemas']['ShownPairedComparison'];
 export type ShownReference = components['schemas']['ShownReference'];
+export type ShownThreshold = components['schemas']['ShownThreshold'];
 export type SideBySide = components['schemas']['SideBySide'];
 export type SignIn = components['schemas']['SignIn'];
 export type Stacked = components['schemas']['Stacked'];
 export type StageChange = components['schemas']['StageChange'];
+export type Stimulus = components['schemas']['Stimulus'];
+export type Stop = components['schemas']['Stop'];
 export type Strips = components['schemas']['Strips'];
 export type StudyDetail = components['schemas']['StudyDetail'];
 export type StudySummary = components['schemas']['StudySummary'];
 export type TextField = components['schemas']['TextField'];
 export type Texts = components['schemas']['Texts'];
+export type Threshold = components['schemas']['Threshold'];
+export type ThresholdAnswer = components['schemas']['ThresholdAnswer'];
 export type Tickets = components['schemas']['Tickets'];
 export type Ties = components['schemas']['Ties'];
 export type TimeBin = components['schemas']['TimeBin'];
@@ -5405,6 +5711,7 @@ export type TokenOut = components['schemas']['TokenOut'];
 export type TrialClip = components['schemas']['TrialClip'];
 export type TrialDeclaration = components['schemas']['TrialDeclaration'];
 export type TrialInfo = components['schemas']['TrialInfo'];
+export type TwoInterval = components['schemas']['TwoInterval'];
 export type Unsupported = components['schemas']['Unsupported'];
 export type UploadOut = components['schemas']['UploadOut'];
 export type UploadedFile = components['schemas']['UploadedFile'];
@@ -5413,6 +5720,7 @@ export type ViewIn = components['schemas']['ViewIn'];
 export type ViewsIn = components['schemas']['ViewsIn'];
 export type ViewsSaved = components['schemas']['ViewsSaved'];
 export type WithinFactor = components['schemas']['WithinFactor'];
+export type YesNo = components['schemas']['YesNo'];
 export type $defs = Record<string, never>;
 export interface operations {
     healthz: {

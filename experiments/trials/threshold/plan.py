@@ -1,0 +1,122 @@
+"""Which series has its turn when, and what stands there until the server has chosen."""
+
+import random
+from typing import TYPE_CHECKING
+
+from experiments.assignment.order import ordered_blocks, with_attention
+from experiments.assignment.trial import Shown, Trial
+from experiments.design import BlockSpec
+from experiments.trials.threshold.declaration import Series, Stop, threshold_of
+from experiments.trials.threshold.grid import clip_of, model, series_of, standard_of, stimuli
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
+
+
+def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
+    """The trials of one participant in order, as many of each series as it may have.
+
+    Series take turns in rounds, in an order drawn for each. The stimuli are a plan without answers (levels
+    spread evenly over the grid); the server puts its choices in their place, the first before the run begins.
+
+    Parameters
+    ----------
+    seed: of practice, order of series and intervals. slot: place in the counterbalancing, for the blocks.
+    """
+    rng = random.Random(seed)
+    trials = [_practice(experiment, rng) for _ in range(experiment.practice.trials)]
+    done = dict.fromkeys((one.name for one in series_of(experiment)), 0)
+    starts = {name: rng.randrange(experiment.exemplars.per_cell) for name in done}
+    for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
+        main: list[Trial] = []
+        here = _series_in(experiment, block)
+        for _ in range(_trials_a_block(experiment)):
+            if experiment.blocks.trial_order == "random":
+                rng.shuffle(here)
+            for one in here:
+                place = done[one.name]
+                done[one.name] += 1
+                level = _spread(list(stimuli(experiment).values()), place)
+                exemplar = 1 + (starts[one.name] + place) % experiment.exemplars.per_cell
+                shown = _shown(experiment, one, level, exemplar, rng)
+                main.append(Trial("main", number, block.label, shown, series=one.name))
+        if main:
+            trials.extend(with_attention(experiment, main, rng, lambda draw: draw.randint(1, 2)))
+    return trials
+
+
+def _practice(experiment: "Experiment", rng: random.Random) -> Trial:
+    """A stimulus drawn from the whole grid, so that plain and faint ones are met before they count."""
+    one = rng.choice(series_of(experiment))
+    level = rng.choice(list(stimuli(experiment).values()))
+    exemplar = rng.randint(1, experiment.exemplars.per_cell)
+    return Trial("practice", 0, "practice", _shown(experiment, one, level, exemplar, rng))
+
+
+def _shown(
+    experiment: "Experiment", one: Series, level: str, exemplar: int, rng: random.Random
+) -> tuple[Shown, ...]:
+    trial = threshold_of(experiment)
+    standard = standard_of(trial)
+    levels = [level] if standard is None else [level, standard]
+    if rng.random() < 0.5:
+        levels.reverse()
+    clips = [clip_of(experiment, one.levels, name, exemplar) for name in levels]
+    return tuple(Shown(role, clip) for role, clip in zip(trial.roles, clips, strict=True))
+
+
+def _spread(levels: list[str], place: int) -> str:
+    """The levels in van der Corput's order of base 2: any run of places covers the grid evenly."""
+    share, weight = 0.0, 0.5
+    number = place + 1
+    while number:
+        share += weight * (number & 1)
+        number >>= 1
+        weight /= 2
+    return levels[int(share * len(levels))]
+
+
+def _series_in(experiment: "Experiment", block: BlockSpec) -> list[Series]:
+    split = experiment.blocks.split_by
+    every = series_of(experiment)
+    return [one for one in every if split is None or one.levels[split] == block.label]
+
+
+def _trials_a_block(experiment: "Experiment") -> int:
+    """Trials of one series in one block: all of them, divided over the repeated blocks."""
+    return (threshold_of(experiment).stop.trials or 0) // experiment.blocks.repeats
+
+
+def block_size(experiment: "Experiment", block: BlockSpec) -> int:
+    """Most trials of a participant in a block: those of every series in it."""
+    return len(_series_in(experiment, block)) * _trials_a_block(experiment)
+
+
+def plan(experiment: "Experiment") -> tuple[str, ...]:
+    """Series, stimuli, what is looked for and when it ends, in words."""
+    trial, assumed, every = threshold_of(experiment), model(experiment), series_of(experiment)
+    standard = standard_of(trial)
+    task = f"against the standard {standard}" if standard else "yes or no"
+    named = ", ".join(f"{one.name} ({'/'.join(one.levels.values()) or 'all'})" for one in every)
+    numbers = assumed.stimuli
+    return (
+        f"{len(every)} adaptive series, interleaved: {named}",
+        f"each moves along {trial.stimulus.factor}: {len(numbers)} stimuli from {numbers[0]:g} to "
+        f"{numbers[-1]:g}, {task}",
+        f"thresholds from {assumed.thresholds[0]:g} to {assumed.thresholds[-1]:g} are considered; guess "
+        f"{assumed.guess:g}, lapse {assumed.lapse:g}",
+        f"{_length(trial.stop, len(every))}; up to {trial.ahead} trials of a series without connection",
+    )
+
+
+def _length(stop: Stop, series: int) -> str:
+    most = stop.trials or 0
+    rules = [f"SD {stop.sd:g}"] if stop.sd is not None else []
+    rules += [f"entropy {stop.entropy:g} bit"] if stop.entropy is not None else []
+    if not rules:
+        return f"{most} trials a series, {most * series} a participant"
+    least = min(stop.at_least, most)
+    return (
+        f"{least} to {most} trials a series, {least * series} to {most * series} a participant: it ends at "
+        f"{' and '.join(rules)}"
+    )

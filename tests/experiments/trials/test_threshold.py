@@ -1,0 +1,197 @@
+"""Adaptive series as declared: faults in one line, turns, stimuli, blocks, and what `stimuli plan` says."""
+
+import re
+from collections import Counter
+
+import pytest
+
+from experiments import design
+from experiments.definition import Experiment
+from experiments.load import DefinitionError, parse_experiment
+from experiments.trials.counts import block_sizes
+from experiments.trials.threshold import THRESHOLD
+from experiments.trials.threshold.grid import model, series_of, stimuli
+from tests.experiments.trials.test_kinds import text_with
+
+FACTORS = """
+[[factors]]
+name = "duration"
+label = "Duration"
+levels = [
+    { name = "100", label = "100 ms", render = { duration_frames = 3.0 } },
+    { name = "400", label = "400 ms", render = { duration_frames = 12.0 } },
+    { name = "200", label = "200 ms", render = { duration_frames = 6.0 } },
+    { name = "300", label = "300 ms", render = { duration_frames = 9.0 } },
+]
+
+[[factors]]
+name = "asymmetry"
+label = "Asymmetry"
+levels = [{ name = "SL", label = "Symmetric" }, { name = "AL", label = "Asymmetric" }]
+"""
+YES_NO = """
+[trial]
+kind = "threshold"
+question = { en = "Slow?" , de = "Langsam?" }
+stimulus = { factor = "duration" }
+task = { asks = "yes_no", yes = { en = "Yes", de = "Ja" }, no = { en = "No", de = "Nein" } }
+stop = { trials = 12, at_least = 8, sd = 20.0 }
+"""
+TWO = """
+[trial]
+kind = "threshold"
+question = { en = "Which?" , de = "Welcher?" }
+stimulus = { factor = "duration" }
+stop = { trials = 12 }
+
+[trial.task]
+asks = "two_interval"
+standard = "100"
+first = { en = "1", de = "1" }
+second = { en = "2", de = "2" }
+"""
+
+
+def text_of(trial: str = YES_NO) -> str:
+    text = text_with(trial)
+    text = re.sub(r"(?s)\n\[\[factors\]\].*?(?=\n\[exemplars\])", lambda _: FACTORS, text)
+    return re.sub(r"(?s)\n\[analysis\].*?(?=\n\[|\Z)", "\n", text)
+
+
+def declared(trial: str = YES_NO) -> Experiment:
+    return parse_experiment(text_of(trial))
+
+
+def test_stimuli_are_in_the_order_of_their_numbers_and_the_standard_is_none() -> None:
+    assert stimuli(declared()) == {100.0: "100", 200.0: "200", 300.0: "300", 400.0: "400"}
+    assert list(stimuli(declared(TWO))) == [200.0, 300.0, 400.0]
+
+
+def test_what_is_left_out_of_the_function_follows_from_the_stimuli() -> None:
+    assumed = model(declared())
+    assert (assumed.thresholds[0], assumed.thresholds[-1], len(assumed.thresholds)) == (100, 400, 31)
+    assert (assumed.spreads[0], assumed.spreads[-1]) == (15, 150)
+    assert (assumed.guess, assumed.lapse, model(declared(TWO)).guess) == (0.02, 0.02, 0.5)
+
+
+def test_series_are_the_other_factors_levels_where_none_are_declared() -> None:
+    assert [one.levels for one in series_of(declared())] == [{"asymmetry": "SL"}, {"asymmetry": "AL"}]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            'name = "400"',
+            'name = "slow"',
+            "expected a number for every level of 'duration', got the level 'slow'",
+        ),
+        ('name = "400"', 'name = "nan"', "got the level 'nan'"),
+        ('name = "400"', 'name = "200.0"', "levels '200.0' and '200' have the same number 200"),
+        (
+            'factor = "duration"',
+            'factor = "durations"',
+            "no factor is called 'durations'; did you mean 'duration'",
+        ),
+        (
+            'factor = "duration" }',
+            'factor = "duration", values = { "99" = 1 } }',
+            "'duration' has no level '99'",
+        ),
+        ("trials = 12, ", "", "trial.stop.trials: expected the most trials of a series"),
+        ("at_least = 8", "at_least = 12", "sd and entropy never end one"),
+        ("trials = 12", "trials = 13", "13 trials of a series do not divide into 2 blocks"),
+        ("sd = 20.0", "sd = 0.0", "greater than 0"),
+        ("[trial]", "[trial]\nlapse = 0.4", "less than or equal to 0.2"),
+        ('asks = "yes_no"', 'asks = "yes_no", guess = 0.95', "less than or equal to 0.9"),
+        ('asks = "yes_no"', 'asks = "yes_no", guess = 0.9', "guess 0.9 and lapse 0.15 leave nothing"),
+        ("[trial]", '[trial]\nfunction = "weibull"\ndirection = "falling"', "got a falling function"),
+        (
+            "[trial]",
+            "[trial]\nspreads = { lowest = 0, highest = 3 }",
+            "trial.spreads.lowest: expected a number above",
+        ),
+        ("[trial]", "[trial]\nthresholds = { lowest = 5, highest = 3 }", "expected lowest below highest"),
+        ("[trial]", '[trial]\nseries = [{ name = "a" }]', "expected a level of 'asymmetry', got none"),
+        (
+            "[trial]",
+            '[trial]\nseries = [{ name = "a", levels = { asymetry = "SL" } }]',
+            "no factor is called 'asymetry'; did you mean 'asymmetry'",
+        ),
+        ("[trial]", '[trial]\nseries = [{ name = "a", levels = { asymmetry = "S" } }]', "has no level 'S'"),
+        (
+            "[trial]",
+            '[trial]\nseries = [{ name = "a", levels = { asymmetry = "SL", duration = "100" } }]',
+            "is what the series moves along",
+        ),
+        (
+            "[trial]",
+            '[trial]\nseries = [{ name = "a", levels = { asymmetry = "SL" } },'
+            ' { name = "a", levels = { asymmetry = "AL" } }]',
+            "'a' is declared twice",
+        ),
+        ("repeats = 2", 'repeats = 2\nsplit_by = "duration"', "is what each series moves along"),
+        ('yes = { en = "Yes", de = "Ja" }', 'yes = { en = "Yes" }', "task.yes has no text in 'de'"),
+    ],
+)
+def test_what_does_not_fit_is_said_in_one_line(old: str, new: str, said: str) -> None:
+    text = text_of(YES_NO + ("lapse = 0.15\n" if "0.9 and" in said else ""))
+    assert old in text
+    with pytest.raises(DefinitionError) as raised:
+        parse_experiment(text.replace(old, new, 1))
+    assert said in str(raised.value)
+    assert "\n" not in raised.value.problems[0].message
+
+
+def test_an_unknown_standard_is_named() -> None:
+    with pytest.raises(DefinitionError, match="'duration' has no level '101'; did you mean '100'"):
+        declared(TWO.replace('standard = "100"', 'standard = "101"'))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_series_take_turns_and_have_all_their_trials(seed: int) -> None:
+    main = [trial for trial in THRESHOLD.assign(declared(), seed, 0) if trial.kind == "main"]
+    assert Counter(trial.series for trial in main) == {"s1": 12, "s2": 12}
+    for turn in range(0, len(main), 2):
+        assert {trial.series for trial in main[turn : turn + 2]} == {"s1", "s2"}
+    for trial in main:
+        level = {"s1": "SL", "s2": "AL"}[trial.series]
+        assert [shown.clip.level("asymmetry") for shown in trial.shown] == [level]
+
+
+def test_the_plan_without_answers_covers_the_grid() -> None:
+    main = [trial for trial in THRESHOLD.assign(declared(), 1, 0) if trial.series == "s1"]
+    shown = Counter(trial.shown[0].clip.level("duration") for trial in main)
+    assert set(shown) == {"100", "200", "300", "400"}
+    assert max(shown.values()) - min(shown.values()) <= 1
+
+
+def test_two_intervals_hold_the_standard_in_either_order_and_the_same_exemplar() -> None:
+    main = [trial for seed in range(4) for trial in THRESHOLD.assign(declared(TWO), seed, 0) if trial.series]
+    firsts = Counter(trial.shown[0].clip.level("duration") == "100" for trial in main)
+    assert min(firsts.values()) > len(main) / 4
+    for trial in main:
+        one, other = trial.shown
+        assert (one.role, other.role) == ("first", "second")
+        assert {one.clip.level("duration"), other.clip.level("duration")} - {"200", "300", "400"} == {"100"}
+        assert one.clip.exemplar == other.clip.exemplar
+
+
+def test_a_block_a_level_holds_the_series_of_that_level() -> None:
+    experiment = parse_experiment(text_of().replace("repeats = 2", 'repeats = 2\nsplit_by = "asymmetry"'))
+    assert [(block.label, block.trials) for block in block_sizes(experiment)] == [("SL", 6), ("AL", 6)] * 2
+    for trial in THRESHOLD.assign(experiment, 3, 0):
+        if trial.kind == "main":
+            assert trial.block_label == {"s1": "SL", "s2": "AL"}[trial.series]
+
+
+def test_the_plan_tells_series_stimuli_and_length() -> None:
+    told = "\n".join(THRESHOLD.plan(declared()))
+    assert "2 adaptive series, interleaved: s1 (SL), s2 (AL)" in told
+    assert "4 stimuli from 100 to 400" in told
+    assert "8 to 12 trials a series, 16 to 24 a participant: it ends at SD 20" in told
+    assert "against the standard 100" in "\n".join(THRESHOLD.plan(declared(TWO)))
+
+
+def test_clips_are_an_ordinary_grid_of_cells() -> None:
+    assert len(design.cells(declared())) == 8
