@@ -1,4 +1,4 @@
-"""`server database`: bring the database to the newest revision, say which one it has, copy it to another."""
+"""`server database`: bring the database to the newest revision, say which one it has, copy it, count anew."""
 
 import typer
 
@@ -7,6 +7,7 @@ from server.db import open_database
 from server.migrate import current_revision, newest_revision
 from server.operations.cli import copy
 from server.settings import Settings
+from server.tallies.recount import repair
 
 app = typer.Typer(help="The database's tables.", no_args_is_help=True)
 
@@ -37,3 +38,15 @@ def status() -> None:
     database.close()
     advice = "" if found == expected else "; run `server database upgrade`"
     out.print(f"found {found or 'no tables'}, expected {expected}{advice}")
+
+
+@app.command("recount")
+def recount() -> None:
+    """Count every run's ratings anew and mend the counts that differ; the server may go on meanwhile.
+
+    Results, monitor and participants read these counts; `server doctor` says whether they are right.
+    Example: server database recount
+    """
+    with migrated_services() as services:
+        mended, runs = repair(services.database, services.versions)
+    out.print(f"{runs} runs counted, {mended} mended")

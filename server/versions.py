@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from experiments.schema.stored import load_stored
 from server.models import Clip, StudyVersion, VersionClip
+from server.tallies.tally import Place, numbers
 
 _MAX_KEPT = 64
 
@@ -29,12 +30,16 @@ class PlacedClip:
 
 @dataclass(frozen=True)
 class LoadedVersion:
-    """A study version ready for use; `places` finds a clip's id by cell and exemplar."""
+    """A study version ready for use.
+
+    places: finds a clip's id by cell and exemplar. numbered: a clip's number and its cell's, for tallies.
+    """
 
     experiment: Experiment
     inter_ocular_px: float | None
     clips: Mapping[int, PlacedClip]
     places: Mapping[tuple[str, int], int]
+    numbered: Mapping[int, Place]
 
 
 class Versions:
@@ -63,6 +68,7 @@ def _load(session: Session, version_id: int) -> LoadedVersion:
         select(VersionClip.id, VersionClip.cell, VersionClip.exemplar, VersionClip.width_mm, Clip)
         .join(Clip, Clip.sha256 == VersionClip.clip_sha256)
         .where(VersionClip.version_id == version_id)
+        .order_by(VersionClip.id)
     )
     clips: dict[int, PlacedClip] = {}
     places: dict[tuple[str, int], int] = {}
@@ -71,4 +77,5 @@ def _load(session: Session, version_id: int) -> LoadedVersion:
         clips[clip_id] = PlacedClip(clip.sha256, *sizes, width_mm)
         places[cell, exemplar] = clip_id
     experiment = load_stored(version.definition, version.format)
-    return LoadedVersion(experiment, version.inter_ocular_px, clips, places)
+    numbered = numbers([(clip, cell) for (cell, _), clip in places.items()])
+    return LoadedVersion(experiment, version.inter_ocular_px, clips, places, numbered)

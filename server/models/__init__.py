@@ -26,6 +26,7 @@ from server.models.runs import (
 )
 from server.models.series import SeriesAnswer, SeriesOffer, SeriesTrial
 from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
+from server.models.tallies import RunTally
 
 __all__ = [
     "ROLES",
@@ -46,6 +47,7 @@ __all__ = [
     "Link",
     "Rating",
     "RunEvent",
+    "RunTally",
     "SeriesAnswer",
     "SeriesOffer",
     "SeriesTrial",

@@ -49,6 +49,10 @@ class StudyRun(Base):
         UniqueConstraint("link_id", "client_id"),
         Index("ix_study_runs_study_id_status", "study_id", "status"),
         Index("ix_study_runs_version_id_slot", "version_id", "slot"),
+        Index("ix_study_runs_study_id_id", "study_id", "id"),
+        Index(
+            "ix_study_runs_study_id_origin_status", "study_id", "origin", "status", "stage", "completed_at"
+        ),
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)

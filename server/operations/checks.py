@@ -17,6 +17,7 @@ from server.context import Services
 from server.migrate import current_revision, newest_revision
 from server.models import Account, Clip, Study
 from server.operations.modes import open_to_others
+from server.tallies.recount import Recount
 
 Verdict = Literal["ok", "warning", "failed"]
 LEAST_FREE_BYTES = 2 * 1024**3
@@ -128,6 +129,20 @@ def _postgres(services: Services) -> Iterator[Finding]:
     yield Finding("connections", "warning" if tight else "ok", f"{most} allowed", advice if tight else "")
 
 
+def counts(services: Services) -> Iterator[Finding]:
+    """What is counted with each rating is what a full count of the ratings gives."""
+    compared = Recount(services.versions)
+    with services.database.snapshot() as session:
+        wrong = sum(1 for _ in compared.differing(session))
+    if wrong:
+        advice = "run: server database recount"
+        yield Finding(
+            "counts", "failed", f"of {wrong} of {compared.runs} runs differ from their ratings", advice
+        )
+    else:
+        yield Finding("counts", "ok", f"of {compared.runs} runs, as their ratings")
+
+
 def clips(services: Services) -> Iterator[Finding]:
     """Every clip that a study names is in the store, with the right length."""
     with services.database.read() as session:
@@ -186,6 +201,7 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     file_modes,
     secret_key,
     database,
+    counts,
     clips,
     pages,
     public_address,

@@ -13,6 +13,7 @@ from server.models import (
     FormAnswer,
     Rating,
     RunEvent,
+    RunTally,
     Study,
     StudyRun,
     StudyVersion,
@@ -117,6 +118,6 @@ def calibrations(session: Session, run: StudyRun) -> list[Calibration]:
 def delete_personal_rows(session: Session, run: StudyRun) -> int:
     """Delete everything a person left in a run; return how many ratings that were."""
     ratings = session.scalar(select(func.count()).select_from(Rating).where(Rating.study_run_id == run.id))
-    for table in (Rating, AnswerEvidence, View, RunEvent, FormAnswer, Calibration):
+    for table in (Rating, RunTally, AnswerEvidence, View, RunEvent, FormAnswer, Calibration):
         session.execute(delete(table).where(table.study_run_id == run.id))
     return int(ratings or 0)

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple, cast
 
 from sqlalchemy import Connection, Table, bindparam, insert, or_, select, update
 
-from server.models import AssignedTrial, Rating, RunEvent, StudyRun, TrialClip
+from server.models import AssignedTrial, Rating, RunEvent, RunTally, StudyRun, TrialClip
+from server.tallies.tally import Tally, tally_of
 from server.trials.kinds import Part
 
 # Tables instead of classes, and statements built once: the ORM would take twice the time of all the rest.
@@ -13,6 +14,7 @@ _runs = cast(Table, StudyRun.__table__)
 _trials = cast(Table, AssignedTrial.__table__)
 _clips = cast(Table, TrialClip.__table__)
 _ratings = cast(Table, Rating.__table__)
+_tallies = cast(Table, RunTally.__table__)
 
 _RUN = (
     select(
@@ -33,8 +35,18 @@ _RUN = (
     .with_for_update()
 )
 _TRIAL = (
-    select(_trials.c.kind, _clips.c.role, _clips.c.version_clip_id)
-    .select_from(_trials.outerjoin(_clips))
+    select(
+        _trials.c.kind,
+        _clips.c.role,
+        _clips.c.version_clip_id,
+        _tallies.c.heat,
+        _tallies.c.not_good,
+        _tallies.c.counts,
+        _tallies.c.answers,
+    )
+    .select_from(
+        _trials.outerjoin(_clips).outerjoin(_tallies, _tallies.c.study_run_id == _trials.c.study_run_id)
+    )
     .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial_index"))
 )
 _STORED = select(
@@ -56,6 +68,12 @@ _CHECKS = (
     .select_from(_ratings.join(_trials))
     .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "attention")
 )
+_ADD_TALLY = insert(_tallies).inline()
+_SET_TALLY = (
+    update(_tallies)
+    .where(_tallies.c.study_run_id == bindparam("run"))
+    .values({name: bindparam(name) for name in ("heat", "not_good", "counts", "answers")})
+)
 _SEEN = (
     update(_runs)
     .where(_runs.c.id == bindparam("run"))
@@ -73,18 +91,24 @@ def run_for_rating(connection: Connection, token_hash: str) -> Any:
 
 
 class StoredTrial(NamedTuple):
-    """A trial as assigned: its part of the run, and its clips' ids by role."""
+    """A trial as assigned: its part of the run, its clips' ids by role, the run's tally (None at first)."""
 
     kind: Part
     clips: dict[str, int]
+    tally: Tally | None
 
 
 def trial(connection: Connection, run: int, trial_index: int) -> StoredTrial | None:
-    """Part and clips of a trial; None where the run has no such trial."""
+    """Part and clips of a trial, with the run's tally; None where the run has no such trial.
+
+    To be asked once the run is locked: another server may have written the tally before.
+    """
     rows = connection.execute(_TRIAL, {"run": run, "trial_index": trial_index}).all()
     if not rows:
         return None
-    return StoredTrial(rows[0].kind, {role: clip for _, role, clip in rows if role is not None})
+    kind, _, _, *stored = rows[0]
+    clips = {row.role: row.version_clip_id for row in rows if row.role is not None}
+    return StoredTrial(kind, clips, None if stored[0] is None else tally_of(*stored))
 
 
 def stored_ratings(connection: Connection, run: int, trial_index: int, rating_id: str) -> list[Any]:
@@ -96,6 +120,14 @@ def stored_ratings(connection: Connection, run: int, trial_index: int, rating_id
 def add_rating(connection: Connection, values: dict[str, Any]) -> None:
     """Store one rating."""
     connection.execute(_INSERT, values)
+
+
+def keep_tally(connection: Connection, run: int, tally: Tally, *, is_new: bool) -> None:
+    """Store the tally of a run."""
+    if is_new:
+        connection.execute(_ADD_TALLY, {"study_run_id": run, **tally.values()})
+    else:
+        connection.execute(_SET_TALLY, {"run": run, **tally.values()})
 
 
 def mark_seen(connection: Connection, run: int, seen: datetime, elapsed_ms: float, answered: int) -> None:

@@ -11,6 +11,7 @@ from server.evidence.intake import Answer, Intake
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
 from server.participants.schemas import RunStatus
 from server.participants.screening import by_attention
+from server.tallies.tally import Play, Tally
 from server.tokens import hash_token
 from server.trials import repository
 from server.trials.kinds import Part, served
@@ -72,6 +73,7 @@ def save_rating(
         intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at, rated=rated))
     ruling = served(kind).judge(loaded, trial.clips, rating)
     repository.add_rating(connection, _row(run, rating_id, kind, answer, rating, ruling, saved_at))
+    _count(connection, run.id, trial, _play(loaded, trial, rating, answer, ruling))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
     before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
     answered = int(settles and not before)
@@ -81,6 +83,35 @@ def save_rating(
     screened = trial.kind == "attention" and by_attention(connection, run.id, loaded.experiment)
     status: RunStatus = "screened_out" if screened else run.status
     return _receipt(rating_id, saved_at, ruling, not settles and not before, left, status), True
+
+
+def _play(
+    loaded: LoadedVersion,
+    trial: repository.StoredTrial,
+    rating: RatingIn,
+    answer: dict[str, Any],
+    ruling: Ruling,
+) -> Play:
+    is_main = trial.kind == "main"
+    places = {role: loaded.numbered[clip] for role, clip in trial.clips.items()}
+    counted = served(loaded.experiment.trial.kind).counted(places, answer) if is_main else ()
+    playback = rating.playback
+    return Play(
+        rating.trial_index,
+        is_main,
+        *ruling,
+        playback.method,
+        rating.rt,
+        playback.key_to_first_frame_ms,
+        tuple(counted),
+    )
+
+
+def _count(connection: Connection, run: int, trial: repository.StoredTrial, play: Play) -> None:
+    """Add a play to the run's tally, in the transaction that stores it."""
+    tally = trial.tally or Tally()
+    tally.add(play)
+    repository.keep_tally(connection, run, tally, is_new=trial.tally is None)
 
 
 def _known(stored: list[Any], rating_id: str, rating: RatingIn, answer: dict[str, Any]) -> Any:

@@ -4,7 +4,7 @@ Nothing else joins them: the name in the declaration finds the file.
 """
 
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 from experiments.definition import Experiment
 from experiments.trials.kind import Answer
 from server.errors import Invalid
+from server.tallies.tally import Counted, Place
 from server.trials.schemas import RatingIn
 from server.trials.verdict import Ruling
 
@@ -39,11 +40,14 @@ class Served:
         the declared playback rules.
     simulated: the answer of a simulated person to a trial as the page gets it, with the declaration as the
         page gets it.
+    counted: what Results counts of a stored answer to a main trial, given the places of its clips by role;
+        empty where there is no answer.
     """
 
     validate: Callable[[Experiment, Part, RatingIn], None]
     judge: "Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]"
     simulated: Callable[[Preference, Mapping[str, Any], Mapping[str, Any], random.Random], dict[str, Any]]
+    counted: Callable[[Mapping[str, Place], Mapping[str, Any]], Iterable[Counted]]
 
 
 class AnswerOfOtherKind(Invalid):

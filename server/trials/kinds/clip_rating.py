@@ -9,6 +9,7 @@ from experiments.trials.clip_rating.answer import RatingAnswer, ScaleAnswer
 from experiments.trials.clip_rating.declaration import SCALE_NAME, clip_rating_of
 from experiments.trials.scales import RatedScale, scales_of
 from server.errors import Invalid
+from server.tallies.tally import Counted, Place
 from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
 from server.trials.schemas import PlaybackLog, RatingIn
 from server.trials.verdict import Playback, Ruling, frames_in_log
@@ -112,4 +113,14 @@ def _one_answer(response: int) -> dict[str, Any]:
     return {"kind": "clip_rating", "answers": {SCALE_NAME: {"response": response}}}
 
 
-SERVED = Served(validate, judge, simulated)
+def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+    """Each number by its scale; it has a mean by cell. "Not applicable" is none."""
+    answers, shown = payload.get("answers", {SCALE_NAME: payload}), places["shown"]
+    return [
+        Counted(name, shown.clip, 0, one["response"], shown.cell)
+        for name, one in answers.items()
+        if one["response"] is not None
+    ]
+
+
+SERVED = Served(validate, judge, simulated, counted)

@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
-from experiments.trials.paired_comparison.answer import CODES, ComparisonAnswer
+from experiments.trials.paired_comparison.answer import CODES, ComparisonAnswer, check_response
 from experiments.trials.paired_comparison.declaration import OneAfterTheOther, paired_comparison_of
 from server.errors import Invalid
+from server.tallies.tally import Counted, Place
 from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
 from server.trials.kinds.clip_rating import RatingMissing, playback_of
 from server.trials.schemas import RatingIn
@@ -87,4 +88,11 @@ def simulated(
     return {"kind": "paired_comparison", "winner": winner, "arrangement": arrangement}
 
 
-SERVED = Served(validate, judge, simulated)
+def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+    """The number of the answer, for left and right or first and second."""
+    code = check_response(payload)
+    pair = [places[role].clip for role in ("left", "first", "right", "second") if role in places]
+    return [] if code is None else [Counted("", pair[0], pair[1], code)]
+
+
+SERVED = Served(validate, judge, simulated, counted)

@@ -9,6 +9,7 @@ from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.operations.restore import restore
 from server.operations.rows import Content, content_of, snapshot, tables_of
 from server.settings import Settings
+from server.tallies.recount import Recount
 from tests.conftest import REPOSITORY
 from tests.helpers.databases import BACKENDS
 
@@ -43,4 +44,6 @@ def test_a_released_revision_is_migrated_with_its_rows(
             name: found.rows for name, found in migrated.items()
         }
     assert current_revision(services.database) == newest_revision()
+    with services.database.read() as session:
+        assert list(Recount(services.versions).differing(session)) == []
     services.database.close()

@@ -10,8 +10,10 @@ from fastapi.testclient import TestClient
 
 from server.context import Services
 from server.export.formats import FORMATS
-from server.models import Study
+from server.models import RunTally, Study
 from server.simulation.person import Person, Rater
+from server.tallies.recount import Recount
+from server.tallies.tally import tally_of, unpacked
 from tests.helpers.comparisons import comparisons
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 
@@ -189,3 +191,21 @@ def test_simulated_people_compare_to_the_end_and_the_csv_has_their_answers(
     assert {"left_cell", "right_cell", "winner", "verdict", "participant"} <= set(lines[0].split(","))
     assert "| winner | text |" in codebook
     assert "Question: Which? Answers: left, right or tie (Neither)." in codebook
+
+
+def test_a_comparison_is_counted_by_its_two_clips(judge: Participant, services: Services) -> None:
+    trials = mains(judge)
+    for trial, winner in zip(trials, ("left", "right", "tie"), strict=False):
+        assert compare(judge, trial, winner).status_code == 201
+    with services.database.read() as session:
+        assert list(Recount(services.versions).differing(session)) == []
+        row = session.query(RunTally).one()
+    tally = tally_of(row.heat, row.not_good, row.counts, row.answers)
+    version = next(iter(services.versions._loaded.values()))
+    hashes = [version.clips[clip].sha256 for clip in version.numbered]
+    counted = [unpacked(code) for code in tally.answers[""]]
+    assert [(hashes[left], hashes[right], value) for left, right, value in counted] == [
+        (trial["clips"][0]["clip_sha256"], trial["clips"][1]["clip_sha256"], value)
+        for trial, value in zip(trials, (1, 2, 3), strict=False)
+    ]
+    assert tally.cells == {}

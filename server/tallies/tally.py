@@ -1,0 +1,200 @@
+"""The counts of one run, as each play changes them, and the two texts they are stored as.
+
+An answer is packed into eight bytes: 18 bits for the clip, 18 for a second clip (0 where a trial shows one)
+and 28 for the value in thousandths. So a million of them are read and counted in a fraction of a second,
+without a package for numbers.
+"""
+
+import json
+import sys
+from array import array
+from base64 import b64decode, b64encode
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+LETTERS = {"good": "g", "uncertain": "u", "flagged": "f", "failed": "x"}
+"""Of a trial in the heat map, by its best verdict; `.` where it was not shown yet."""
+_BETTER = {".": 0, "x": 1, "f": 2, "u": 3, "g": 4}
+RT_MS, ONSET_MS, ONSET_BINS = 250, 10, 11
+"""Widths of the bins of response times and of times from key to first frame; the last of these is open."""
+UNIT = 1000
+"""Values are counted in whole thousandths, so that sums are the same in whatever order answers come."""
+_CLIP_BITS, _VALUE_BITS = 18, 28
+_ZERO = 1 << _VALUE_BITS - 1
+
+
+class Place(NamedTuple):
+    """A clip in its study version: its number among the clips, from 0, and that of its cell."""
+
+    clip: int
+    cell: int
+
+
+def numbers(clips: Iterable[tuple[int, str]]) -> dict[int, Place]:
+    """The place of each clip (its id, its cell) of a version, given in the order of their ids.
+
+    Cells are numbered as they come. A version that was used keeps its clips, so the numbers stay.
+    """
+    cells: dict[str, int] = {}
+    return {
+        clip: Place(number, cells.setdefault(cell, len(cells))) for number, (clip, cell) in enumerate(clips)
+    }
+
+
+class Counted(NamedTuple):
+    """One answer to one trial on one scale.
+
+    Attributes
+    ----------
+    scale: its name; empty where trials are not rated on scales.
+    clip, second: numbers of the clips in the version (`Place`); second is 0 where there is one.
+    value: the answer as a number. cell: of the clip, where the mean of values by cell means something.
+    """
+
+    scale: str
+    clip: int
+    second: int
+    value: float
+    cell: int | None = None
+
+    def packed(self) -> int:
+        """As one number of 64 bits."""
+        return (self.clip << _CLIP_BITS | self.second) << _VALUE_BITS | (self.units + _ZERO)
+
+    @property
+    def units(self) -> int:
+        """The value in whole thousandths, within what 28 bits hold."""
+        return min(_ZERO - 1, max(-_ZERO, round(UNIT * self.value)))
+
+
+def unpacked(code: int) -> tuple[int, int, float]:
+    """Clip, second clip and value of a packed answer."""
+    clip, second = divmod(code >> _VALUE_BITS, 1 << _CLIP_BITS)
+    return clip, second, (code % (1 << _VALUE_BITS) - _ZERO) / UNIT
+
+
+class Play(NamedTuple):
+    """What is counted of one stored play.
+
+    is_main: of a main trial; of others the heat map alone is kept. rt, onset: in ms; None where not measured.
+    answers: empty where none was given.
+    """
+
+    trial_index: int
+    is_main: bool
+    verdict: str
+    rule: str
+    method: str
+    rt: float | None
+    onset: float | None
+    answers: tuple[Counted, ...]
+
+
+PlayKey = str
+"""Verdict, method and rule of plays, with a blank between them."""
+
+
+@dataclass
+class Tally:
+    """The counts of one run.
+
+    Attributes
+    ----------
+    heat: a letter a trial, as far as trials were shown. not_good: plays flagged or failed, of any trial.
+    plays: of main trials. times: bin of 250 ms -> answers. onsets: answers by bins of 10 ms.
+    cells: scale -> answers of cell 0 and their sum in thousandths, then of cell 1, and so on.
+    answers: scale -> packed answers.
+    """
+
+    heat: str = ""
+    not_good: int = 0
+    plays: dict[PlayKey, int] = field(default_factory=dict)
+    times: dict[str, int] = field(default_factory=dict)
+    onsets: list[int] = field(default_factory=list)
+    cells: dict[str, list[int]] = field(default_factory=dict)
+    answers: "dict[str, array[int]]" = field(default_factory=dict)
+
+    def add(self, play: Play) -> None:
+        """Count one more play."""
+        self._mark(play.trial_index, LETTERS[play.verdict])
+        self.not_good += play.verdict in ("flagged", "failed")
+        if not play.is_main:
+            return
+        key = f"{play.verdict} {play.method} {play.rule}"
+        self.plays[key] = self.plays.get(key, 0) + 1
+        if play.verdict == "failed" or not play.answers:
+            return
+        if play.rt is not None:
+            time = str(int(play.rt // RT_MS))
+            self.times[time] = self.times.get(time, 0) + 1
+        if play.onset is not None:
+            self.onsets = self.onsets or [0] * ONSET_BINS
+            self.onsets[min(int(play.onset // ONSET_MS), ONSET_BINS - 1)] += 1
+        for answer in play.answers:
+            self._take(answer)
+
+    def _mark(self, trial: int, letter: str) -> None:
+        heat = self.heat.ljust(trial + 1, ".")
+        if _BETTER[letter] > _BETTER[heat[trial]]:
+            heat = heat[:trial] + letter + heat[trial + 1 :]
+        self.heat = heat
+
+    def _take(self, answer: Counted) -> None:
+        self.answers.setdefault(answer.scale, array("Q")).append(answer.packed())
+        if answer.cell is None:
+            return
+        sums = self.cells.setdefault(answer.scale, [])
+        sums.extend([0] * (2 * answer.cell + 2 - len(sums)))
+        sums[2 * answer.cell] += 1
+        sums[2 * answer.cell + 1] += answer.units
+
+    def values(self) -> dict[str, Any]:
+        """The columns of `RunTally`."""
+        counts = {name: getattr(self, name) for name in ("plays", "times", "onsets", "cells")}
+        packed = {scale: packed_text(codes) for scale, codes in self.answers.items()}
+        return {
+            "heat": self.heat,
+            "not_good": self.not_good,
+            "counts": json.dumps(counts, separators=(",", ":")),
+            "answers": json.dumps(packed, separators=(",", ":")),
+        }
+
+    def same(self, other: "Tally") -> bool:
+        """True where the same was counted, in whatever order."""
+        return self._sorted() == other._sorted()
+
+    def _sorted(self) -> tuple[Any, ...]:
+        answers = {scale: sorted(codes) for scale, codes in self.answers.items()}
+        return self.heat, self.not_good, self.plays, self.times, self.onsets, self.cells, answers
+
+
+def packed_text(codes: "array[int]") -> str:
+    """Packed answers as text (base64), the lowest byte first on every machine."""
+    return b64encode(_little(codes).tobytes()).decode()
+
+
+def packed_codes(texts: Iterable[str]) -> "array[int]":
+    """The packed answers of any number of texts."""
+    codes = array("Q")
+    codes.frombytes(b"".join(map(b64decode, texts)))
+    return _little(codes)
+
+
+def _little(codes: "array[int]") -> "array[int]":
+    if sys.byteorder == "little":
+        return codes
+    turned = array("Q", codes)
+    turned.byteswap()
+    return turned
+
+
+def tally_of(heat: str, not_good: int, counts: str, answers: str) -> Tally:
+    """The tally that was stored as these columns."""
+    packed: Mapping[str, str] = json.loads(answers)
+    return Tally(
+        heat=heat,
+        not_good=not_good,
+        **json.loads(counts),
+        answers={scale: packed_codes([text]) for scale, text in packed.items()},
+    )
