@@ -56,7 +56,8 @@ def show(contents: "Contents") -> None:
             typer.echo(f"\n{part.title}")
         for table in part.tables:
             if table.folded:
-                typer.echo(f"\n{table.title}: {len(table.rows)} rows, in the report and the JSON file")
+                folded = f"{table.title}: {len(table.rows)} rows, in the report and the JSON file"
+                typer.echo("\n" + "\n".join(wrap(folded)))
             else:
                 typer.echo("\n" + as_text(table))
 
@@ -90,11 +91,13 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
 
 def save_report(contents: "Contents", folder: Path, more: bool = False) -> None:
     """Write the report; `more` adds what takes long."""
+    from analysis.report.formats import wrap
     from analysis.report.write import write_report
 
     with saying("writing") as say:
         paths = write_report(contents, folder, more, say)
-    typer.echo(f"\nwritten to {folder}: {', '.join(path.name for path in paths)}")
+    files = ", ".join(path.name for path in paths)
+    typer.echo("\n" + "\n".join(wrap(f"written to {folder}: {files}")))
 
 
 @contextmanager

@@ -28,7 +28,7 @@ class Comparisons:
     Attributes
     ----------
     items : tuple of str
-        Names, sorted as text.
+        Names: sorted as text, or in declared order.
     left, right : (n,) int64
         Index into `items` of what stood on each side (or came first and second).
     outcome : (n,) int64

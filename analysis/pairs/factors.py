@@ -1,6 +1,7 @@
 """Abilities as a linear function of the items' factors."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -33,16 +34,21 @@ class FactorTest:
 
 @dataclass(frozen=True)
 class ItemFactors:
-    """The level of each item in each factor; `lack_of_fit` is tested against free abilities."""
+    """The level of each item in each factor; `orders` has the levels of a factor, the first the reference.
+
+    A factor without an order has its levels sorted as text.
+    """
 
     factors: tuple[str, ...]
     levels: dict[str, tuple[str, ...]]
     source: str
+    orders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def names(self, factor: str) -> tuple[str, ...]:
-        """Levels of a factor, sorted as text."""
+        """Levels of a factor that items have, in order."""
         index = self.factors.index(factor)
-        return tuple(sorted({levels[index] for levels in self.levels.values()}))
+        there = {levels[index] for levels in self.levels.values()}
+        return tuple(name for name in self.orders.get(factor, sorted(there)) if name in there)
 
     def design(self, items: tuple[str, ...], without: str | None = None) -> Array:
         """Return the treatment-coded design (k, p) of the items, without one factor if asked.

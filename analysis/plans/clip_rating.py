@@ -7,7 +7,7 @@ import pandas as pd
 
 from analysis.plans.plan import Plan
 from analysis.plans.prepare import Prepared, prepare, refuse_unknown, where
-from analysis.plans.result import Analysis, Labels, analyse_cells
+from analysis.plans.result import Analysis, analyse_cells, labels_of
 from analysis.read.pool import Pool
 from analysis.read.reading import Reading
 from analysis.read.study_answers import StudyAnswers
@@ -99,14 +99,6 @@ def groups_of(
                 )
         codes[:, column] = [levels[name].index(level_of[who]) for who in participants]
     return between_design(factors, [levels[name] for name in factors], codes)
-
-
-def labels_of(experiment: Experiment) -> Labels:
-    """The labels an experiment declares."""
-    return Labels(
-        factors={f.name: f.label for f in experiment.factors},
-        levels={(f.name, level.name): level.label for f in experiment.factors for level in f.levels},
-    )
 
 
 PLAN = Plan(READING, check, contents)

@@ -34,6 +34,14 @@ class Labels:
         return self.levels.get((factor, name), name)
 
 
+def labels_of(experiment: "Experiment") -> Labels:
+    """The labels an experiment declares."""
+    return Labels(
+        factors={f.name: f.label for f in experiment.factors},
+        levels={(f.name, level.name): level.label for f in experiment.factors for level in f.levels},
+    )
+
+
 @dataclass(frozen=True)
 class Analysis:
     """Cell means, tests, means and pairs of one data set, with every decision taken on the way.

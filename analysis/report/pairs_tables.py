@@ -9,20 +9,16 @@ from analysis.report.numbers import apa_p, fixed, p_value
 def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
     """Items from the ablest down, against the reference."""
     robust = any(item.se_robust is not None for item in result.items)
-    header = ["Rank", "Item", "Ability", "SE", "95% CI", "p", "Won", "Lost", "Tied"]
+    header = ["Item", "Rank", "Ability", "SE", *(["robust SE"] if robust else []), "95% CI", "p", "W/L/T"]
     rows = []
     for item in sorted(result.items, key=lambda one: (one.rank, one.name)):
-        row = [str(item.rank), item.name, fixed(item.ability, 3), fixed(item.se, 3)]
+        errors = [item.se, *([item.se_robust] if item.se_robust is not None else [])]
+        row = [item.name, str(item.rank), fixed(item.ability, 3), *(fixed(error, 3) for error in errors)]
         row += [f"{fixed(item.ci_low)} to {fixed(item.ci_high)}", p_value(item.p)]
-        row += [str(item.wins), str(item.losses), str(item.ties)]
-        if robust and item.se_robust is not None:
-            row.insert(4, fixed(item.se_robust, 3))
-        rows.append(tuple(row))
-    if robust:
-        header.insert(4, "robust SE")
-    notes = (f"Abilities in {result.scale}; '{result.reference}' is 0.",)
+        rows.append((*row, f"{item.wins}/{item.losses}/{item.ties}"))
+    notes = (f"Abilities in {result.scale}; '{result.reference}' is 0. W/L/T: won, lost, tied.",)
     title = caption("Abilities", name, synthetic)
-    return Table("abilities", title, tuple(header), tuple(rows), 2, notes)
+    return Table("abilities", title, tuple(header), tuple(rows), 1, notes)
 
 
 def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:

@@ -138,6 +138,22 @@ def test_tables_without_a_test_are_refused(tmp_path, text, within, message) -> N
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "exp3", "--csv", "nowhere.csv"),
+        ("anova", "nowhere.csv", "--participant", "a", "--rating", "b", "--within", "c"),
+        ("pairs", "nowhere.csv"),
+        ("thresholds", "nowhere.csv"),
+        ("opinion", "nowhere.csv"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_place_for_numbers_that_cannot_be_is_refused_before_the_data_are_read(tmp_path, arguments) -> None:
+    result = call(*arguments, "--json", tmp_path / "no" / "o.json")
+    assert "does not exist; make it first" in str(result.exception)
+
+
 def test_a_folder_that_cannot_hold_the_output_is_refused(tmp_path) -> None:
     (tmp_path / "t.csv").write_text(LONG)
     columns = ("--participant", "id", "--rating", "y", "--within", "face")

@@ -1,0 +1,203 @@
+"""The report of a study of paired comparisons: tables, sentences and figures."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+from analysis.pairs.abilities import PairsResult
+from analysis.pairs.comparisons import Comparisons
+from analysis.pairs.factors import FactorTest
+from analysis.pairs.findings import Findings
+from analysis.plans.prepare import Prepared
+from analysis.plans.result import Labels, labels_of
+from analysis.report.captions import caption
+from analysis.report.contents import Contents, Part, Picture
+from analysis.report.formats import Table
+from analysis.report.json_output import exclusions_data
+from analysis.report.left_out import left_out
+from analysis.report.numbers import fixed, p_value
+from analysis.report.pairs_sentences import sentences
+from analysis.report.pairs_tables import abilities_table, contrasts_table, factors_table
+from experiments.definition import Experiment
+
+METHODS = {
+    "bradley-terry": (
+        "Abilities of the cells by the Bradley-Terry model: the log odds of choosing one of two clips are "
+        "the difference of their abilities. "
+    ),
+    "davidson": (
+        "Abilities of the cells by Davidson's (1970) model, which has ties as a third outcome: a tie is the "
+        "likelier the closer two abilities lie. "
+    ),
+}
+FURTHER = (
+    "Maximum likelihood; robust SE treat each rater's comparisons as one cluster (Liang and Zeger 1986). "
+    "Tests of factors compare likelihoods with and without the factor, all other factors kept; levels are "
+    "compared with the first declared one. The lack of fit tests free abilities against the sum of the "
+    "factors' effects. Differences between items are corrected by Holm. The advantage of the left (first) "
+    "side is a parameter of its own beside free abilities. Transitivity counts triples of items, ties as "
+    "half a choice for each."
+)
+
+
+def item_labels(experiment: Experiment, items: tuple[str, ...]) -> dict[str, str]:
+    """Labels of cells: those of their levels, in the factors in which the cells differ."""
+    names = {item: item.split("/") for item in items}
+    labels = labels_of(experiment)
+    varied = [
+        index
+        for index in range(len(experiment.factors))
+        if len({levels[index] for levels in names.values()}) > 1
+    ]
+    return {
+        item: ", ".join(labels.level(experiment.factors[i].name, levels[i]) for i in varied) or item
+        for item, levels in names.items()
+    }
+
+
+def contents_of(prepared: Prepared, comparisons: Comparisons, findings: Findings) -> Contents:
+    """What the report says."""
+    experiment, items = prepared.experiment, item_labels(prepared.experiment, comparisons.items)
+    shown = labelled(findings, items, labels_of(experiment))
+    name, synthetic = experiment.name, prepared.synthetic
+    people, number = len(comparisons.participants), comparisons.outcome.size
+    method = "" if findings.abilities is None else METHODS[findings.abilities.method]
+    return Contents(
+        name=name,
+        title=experiment.title,
+        lead=f"{people} participants, {number} comparisons of {len(items)} cells",
+        source=prepared.source,
+        synthetic=synthetic,
+        n_participants=people,
+        left_out=left_out(prepared.exclusions),
+        decisions=comparisons.decisions,
+        parts=(
+            Part(
+                tables(shown, name, synthetic),
+                sentences(shown, [items[item] for item in comparisons.items]),
+                draw=lambda: draw_all(shown, synthetic, people),
+            ),
+        ),
+        methods=method + FURTHER,
+        numbers=numbers(prepared, comparisons, findings),
+        given="comparisons",
+    )
+
+
+def labelled(findings: Findings, items: Mapping[str, str], labels: Labels) -> Findings:
+    """The findings with labels in the place of names."""
+
+    def of(result: PairsResult | None) -> PairsResult | None:
+        if result is None:
+            return None
+        return replace(
+            result,
+            reference=items[result.reference],
+            items=tuple(replace(item, name=items[item.name]) for item in result.items),
+            contrasts=tuple(
+                replace(c, first=items[c.first], second=items[c.second]) for c in result.contrasts
+            ),
+            factors=tuple(_labelled_test(test, labels) for test in result.factors),
+        )
+
+    pairs = tuple(
+        replace(pair, first=items[pair.first], second=items[pair.second]) for pair in findings.pairs
+    )
+    return replace(findings, abilities=of(findings.abilities), factors=of(findings.factors), pairs=pairs)
+
+
+def _labelled_test(test: FactorTest, labels: Labels) -> FactorTest:
+    if not test.levels:
+        return test
+    return replace(
+        test,
+        factor=labels.factor(test.factor),
+        reference=labels.level(test.factor, test.reference),
+        levels=tuple(labels.level(test.factor, level) for level in test.levels),
+    )
+
+
+def tables(findings: Findings, name: str, synthetic: bool) -> tuple[Table, ...]:
+    """Abilities first, then factors, every pair, checks, differences; of what could be fitted."""
+    every = pairs_table(findings, name, synthetic)
+    if findings.abilities is None:
+        return (every,)
+    made = [abilities_table(findings.abilities, name, synthetic)]
+    if findings.factors is not None:
+        made.append(factors_table(findings.factors, name, synthetic))
+    made += [every, checks_table(findings, findings.abilities, name, synthetic)]
+    return (*made, contrasts_table(findings.abilities, name, synthetic))
+
+
+def pairs_table(findings: Findings, name: str, synthetic: bool) -> Table:
+    """How often each pair was compared, and what was chosen."""
+    rows = tuple(
+        (f"{p.first} - {p.second}", str(p.n), str(p.first_chosen), str(p.second_chosen), str(p.ties))
+        for p in findings.pairs
+    )
+    header = ("Pair: first - second", "n", "First", "Second", "Tied")
+    title = caption("Choices in each pair", name, synthetic)
+    return Table("pair-choices", title, header, rows, 1, (), folded=len(rows) > 24)
+
+
+def checks_table(findings: Findings, result: PairsResult, name: str, synthetic: bool) -> Table:
+    """How well the model holds: fit of the pairs, side, ties, transitivity."""
+    rows: list[tuple[str, str, str]] = []
+    fit, triples = result.goodness, result.transitivity
+    if fit.df > 0:
+        rows.append(("Fit of the pairs", f"χ²({fit.df}) = {fixed(fit.deviance)}", p_value(fit.p)))
+    if findings.order is not None:
+        side = findings.order
+        rows.append(
+            (
+                "Advantage of the left (first) side",
+                f"{fixed(side.estimate, 3)} (SE {fixed(side.se, 3)})",
+                p_value(side.p),
+            )
+        )
+    if result.tie_probability_max is not None:
+        rows.append(("Probability of a tie between equals", fixed(result.tie_probability_max, 3), ""))
+    for kind in ("weak", "moderate", "strong"):
+        broken = getattr(triples, f"{kind}_violations")
+        rows.append((f"Triples against {kind} transitivity", f"{broken} of {triples.triples}", ""))
+    if triples.raters_with_all_pairs:
+        circles = f"{triples.circular_triads} of {triples.circular_triads_max}"
+        rows.append((f"Circular triads, {triples.raters_with_all_pairs} raters with all pairs", circles, ""))
+    title = caption("Checks of the model", name, synthetic)
+    return Table("pair-checks", title, ("Check", "Value", "p"), tuple(rows), 1)
+
+
+def numbers(prepared: Prepared, comparisons: Comparisons, findings: Findings) -> dict[str, Any]:
+    """The JSON document: cells by their names, as the data have them."""
+    experiment = prepared.experiment
+    factors = () if findings.factors is None else findings.factors.factors
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "kind": experiment.trial.kind,
+        "source": prepared.source,
+        "synthetic": prepared.synthetic,
+        "n_participants": len(comparisons.participants),
+        "n_comparisons": int(comparisons.outcome.size),
+        "labels": item_labels(experiment, comparisons.items),
+        "abilities": None if findings.abilities is None else asdict(findings.abilities),
+        "abilities_reason": findings.abilities_reason,
+        "equal_abilities": None if findings.equal is None else asdict(findings.equal),
+        "order_effect": None if findings.order is None else asdict(findings.order),
+        "factors": [asdict(test) for test in factors],
+        "factors_reason": findings.factors_reason,
+        "pairs": [asdict(pair) for pair in findings.pairs],
+        "decisions": list(comparisons.decisions),
+        "exclusions": exclusions_data(prepared.exclusions),
+    }
+
+
+def draw_all(findings: Findings, synthetic: bool, people: int) -> tuple[Picture, ...]:
+    """Abilities with their intervals, and the share of choices in each pair."""
+    # matplotlib takes a second to import, which commands that draw nothing need not pay
+    from analysis.report.pairs_figures import draw_abilities, draw_choices
+
+    choices = draw_choices(findings.pairs, synthetic, people)
+    if findings.abilities is None:
+        return (choices,)
+    return (draw_abilities(findings.abilities, synthetic, people), choices)

@@ -1,0 +1,194 @@
+"""A study of pairs from its export: the same rules as ratings, abilities, and what cannot be fitted said."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from scipy import stats
+from typer.testing import CliRunner
+
+from analysis.cli import app
+from analysis.plans.paired_comparison import READING
+from analysis.plans.prepare import study_contents
+from analysis.read.pool import Origin, Pool
+from analysis.read.study_answers import load_csv
+from experiments import rules
+from experiments.errors import InputError
+from experiments.load import load_experiment
+from tests.analysis.comparisons_file import compare, row_of, write_comparisons
+from tests.analysis.ratings_file import change
+from tests.conftest import REPOSITORY
+
+DEMO = load_experiment(str(REPOSITORY / "experiments" / "pairs-demo.toml"))
+ABILITIES = {
+    "photorealistic/model": 0.8,
+    "photorealistic/textbook": 0.0,
+    "cartoon/model": 0.4,
+    "cartoon/textbook": -0.3,
+}
+
+
+@pytest.fixture
+def rows() -> list[dict]:
+    return compare(DEMO, ABILITIES, 12)
+
+
+def report(tmp_path, rows, experiment=DEMO, pool=Pool()):
+    path = write_comparisons(tmp_path / "comparisons.csv", rows)
+    return study_contents(experiment, load_csv(path, experiment, READING), pool)
+
+
+def with_rules(*chosen):
+    return DEMO.model_copy(update={"exclusions": chosen})
+
+
+def test_abilities_are_those_of_a_logistic_regression(tmp_path, rows) -> None:
+    numbers = report(tmp_path, rows).numbers
+    cells = list(ABILITIES)[1:]
+
+    def sides(row: dict) -> list[float]:
+        return [float(row["left_cell"] == cell) - float(row["right_cell"] == cell) for cell in cells]
+
+    design = np.array([sides(row) for row in rows])
+    theirs = sm.Logit([row["winner"] == "left" for row in rows], design).fit(disp=0)
+    items = {item["name"]: item for item in numbers["abilities"]["items"]}
+    assert list(items) == list(ABILITIES)
+    assert [items[cell]["ability"] for cell in cells] == pytest.approx(theirs.params, abs=1e-6)
+    assert [items[cell]["se"] for cell in cells] == pytest.approx(theirs.bse, abs=1e-6)
+    equal = 2 * (theirs.llf - len(rows) * np.log(0.5))
+    assert numbers["equal_abilities"]["chi2"] == pytest.approx(equal)
+    assert numbers["equal_abilities"]["p"] == pytest.approx(stats.chi2.sf(equal, 3))
+
+
+def test_factors_have_the_declared_order_of_levels(tmp_path, rows) -> None:
+    tests = {test["factor"]: test for test in report(tmp_path, rows).numbers["factors"]}
+    assert list(tests) == ["character", "blink", "lack of fit"]
+    assert (tests["character"]["reference"], tests["character"]["levels"]) == ("photorealistic", ("cartoon",))
+    assert tests["lack of fit"]["df"] == 1
+
+
+def test_ties_are_davidsons_third_outcome(tmp_path) -> None:
+    rows = compare(DEMO, dict.fromkeys(ABILITIES, 0.0), 12, nu=0.7)
+    numbers = report(tmp_path, rows).numbers
+    ties = np.mean([row["winner"] == "tie" for row in rows])
+    assert numbers["abilities"]["method"] == "davidson"
+    assert 0.1 < numbers["abilities"]["tie_probability_max"] < 0.45
+    equal = len(rows) * (ties * np.log(ties) + (1 - ties) * np.log((1 - ties) / 2))
+    chi2 = 2 * (numbers["abilities"]["log_likelihood"] - equal)
+    assert numbers["equal_abilities"]["chi2"] == pytest.approx(chi2)
+
+
+@pytest.mark.parametrize(
+    ("rule", "values", "reason"),
+    [
+        (rules.ExcludeIncomplete(), {"run_status": "active"}, "incomplete: run is active"),
+        (
+            rules.ExcludeStraightLining(),
+            {"winner": "left"},
+            "same_response_share: 100% of answers are the same",
+        ),
+        (rules.ExcludeFast(below_ms=200), {"rt": 150}, "median_response_time: median 150 ms"),
+        (rules.ExcludePlayback(more_than=0.2), {"verdict": "flagged"}, "poor_playback_share: 100% of plays"),
+    ],
+)
+def test_rules_exclude_as_of_ratings(tmp_path, rows, rule, values, reason) -> None:
+    found = report(tmp_path, change(rows, lambda row: row["run"] == "r3", **values), with_rules(rule))
+    assert found.n_participants == 11
+    (excluded,) = found.numbers["exclusions"]["runs"]
+    assert excluded["participant"] == "P03"
+    assert excluded["reasons"][0].startswith(reason)
+
+
+def test_a_check_is_failed_by_another_answer_than_asked(tmp_path, rows) -> None:
+    checks = [
+        row_of(DEMO, person, 99)
+        | {"kind": "attention", "expected_response": 2, "winner": "right" if person else "left"}
+        for person in range(12)
+    ]
+    found = report(tmp_path, rows + checks, with_rules(rules.ExcludeAttention()))
+    assert [run["participant"] for run in found.numbers["exclusions"]["runs"]] == ["P00"]
+
+
+def test_origins_are_not_pooled(tmp_path, rows) -> None:
+    mixed = change(rows, lambda row: row["run"] == "r1", run_origin="participant", synthetic=0)
+    found = report(tmp_path, mixed)
+    assert (found.n_participants, found.synthetic) == (1, False)
+    assert any("origin participant: 132 rows of other origins left aside" in said for said in found.decisions)
+    assert report(tmp_path, mixed, pool=Pool(Origin.ALL)).n_participants == 12
+
+
+BEST = "photorealistic/model"
+
+
+def always_winning(rows: list[dict]) -> list[dict]:
+    made = []
+    for row in rows:
+        sides = {row["left_cell"]: "left", row["right_cell"]: "right"}
+        made.append(row | {"winner": sides.get(BEST, row["winner"])})
+    return made
+
+
+def test_a_cell_that_always_wins_is_said_and_finite(tmp_path, rows) -> None:
+    found = report(tmp_path, always_winning(rows))
+    assert "Firth's penalty" in found.parts[0].sentences[0]
+    assert found.numbers["abilities"]["items"][0]["rank"] == 1
+    assert found.numbers["equal_abilities"] is None
+
+
+def test_what_cannot_be_fitted_has_its_counts_and_its_reason(tmp_path) -> None:
+    rows = always_winning(compare(DEMO, ABILITIES, 12, nu=0.7))
+    found = report(tmp_path, rows)
+    assert found.numbers["abilities"] is None
+    assert f"{BEST} won every comparison" in found.numbers["abilities_reason"]
+    assert [table.key for table in found.parts[0].tables] == ["pair-choices"]
+    assert sum(pair["n"] for pair in found.numbers["pairs"]) == len(rows)
+
+
+def test_two_clips_of_one_cell_are_left_out_and_said(tmp_path, rows) -> None:
+    same = rows[0] | {"left_cell": "cartoon/model", "right_cell": "cartoon/model", "trial_index": 90}
+    found = report(tmp_path, [*rows, same])
+    assert found.numbers["n_comparisons"] == len(rows)
+    assert any("1 comparisons of two clips of one cell" in said for said in found.decisions)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"winner": "lefft"}, "participant P00, trial 2: 'lefft' is no answer .*did you mean 'left'"),
+        ({"left_cell": "cartoon/modl"}, "'cartoon/modl' is no cell of this experiment; did you mean"),
+        ({"participant": ""}, "'participant' is empty"),
+    ],
+)
+def test_wrong_rows_are_refused_by_participant_and_trial(tmp_path, rows, values, message) -> None:
+    first = rows[0]["trial_index"]
+    wrong = change(rows, lambda row: row["run"] == "r0" and row["trial_index"] == first, **values)
+    with pytest.raises(InputError, match=message):
+        report(tmp_path, wrong)
+
+
+def test_a_tie_that_is_not_declared_is_refused(tmp_path, rows) -> None:
+    strict = DEMO.model_copy(update={"trial": DEMO.trial.model_copy(update={"ties": None})})
+    with pytest.raises(InputError, match="'tie' is no answer"):
+        report(tmp_path, [rows[0] | {"winner": "tie"}, *rows[1:]], strict)
+
+
+def test_every_table_sentence_and_figure_of_simulated_data_says_so(tmp_path, rows) -> None:
+    path = write_comparisons(tmp_path / "comparisons.csv", rows)
+    command = ["run", str(REPOSITORY / "experiments" / "pairs-demo.toml"), "--csv", str(path)]
+    done = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert "SYNTHETIC DATA: no person gave these comparisons" in done.stdout
+    assert max(map(len, done.stdout.replace(str(tmp_path), "").splitlines())) <= 80
+    made = {file.name for file in (tmp_path / "out").iterdir()}
+    assert {"report.html", "report.md", "tables.tex", "results.json", "figure-abilities.svg"} <= made
+    found = report(tmp_path, rows)
+    assert all("[SYNTHETIC DATA]" in table.title for table in found.parts[0].tables)
+    assert "Synthetic data" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "0 do not fit" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+
+
+def test_the_same_comparisons_give_the_same_report(tmp_path, rows) -> None:
+    one, two = (report(tmp_path, rows).parts[0] for _ in range(2))
+    assert dataclasses.replace(one, draw=two.draw, more=two.more) == two
+    assert [picture.svg for picture in one.draw()] == [picture.svg for picture in two.draw()]
