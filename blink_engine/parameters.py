@@ -105,7 +105,7 @@ def _own(instance: Any) -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def default_parameters() -> Parameters:
     """Return the shipped defaults (`defaults.json`, written by `tools/fit_blink_engine.py`)."""
-    return from_json(json.loads(files("blink_engine").joinpath("defaults.json").read_text(encoding="utf-8")))
+    return from_json(json.loads(files(__package__).joinpath("defaults.json").read_text(encoding="utf-8")))
 
 
 def from_json(data: Mapping[str, Any]) -> Parameters:

@@ -6,8 +6,8 @@ import av
 import numpy as np
 import webrtcvad
 
+from blink_engine.speech import Speech, joined
 from experiments.errors import InputError
-from stimuli_builder.performance.speech import Speech, joined
 
 RATE_HZ = 16_000
 FRAME_MS = 30

@@ -8,11 +8,11 @@ import numpy as np
 from rich.console import Console
 
 from blink_engine import Performance, StateName, default_parameters, perform
+from blink_engine.speech import Speech, speech_events, speech_states
 from experiments.errors import InputError, did_you_mean
 from experiments.files import check_targets, whole_text
 from stimuli_builder.blinks.export.curve import AnimationCurve
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
-from stimuli_builder.performance.speech import Speech, speech_events, speech_states
 from stimuli_builder.performance.subtitles import SUFFIXES, speech_in_subtitles
 
 LOWER_UP_MM, LOWER_IN_MM = 0.75, 2.6

@@ -5,8 +5,8 @@ from pathlib import Path
 import webvtt
 from webvtt.models import Caption
 
+from blink_engine.speech import Speech, joined
 from experiments.errors import InputError, did_you_mean
-from stimuli_builder.performance.speech import Speech, joined
 
 SUFFIXES = (".vtt", ".srt")
 

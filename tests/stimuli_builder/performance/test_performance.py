@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from blink_engine.speech import Speech, joined, speech_events, speech_states
 from experiments.errors import InputError
 from stimuli_builder.cli import app
 from stimuli_builder.performance.audio import speech_in_audio
 from stimuli_builder.performance.run import PerformanceJob, write_performance
-from stimuli_builder.performance.speech import Speech, joined, speech_events, speech_states
 from stimuli_builder.performance.subtitles import speech_in_subtitles
 
 RATE_HZ = 16_000

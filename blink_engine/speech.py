@@ -4,7 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from blink_engine import Event, StateChange, StateName
+from blink_engine.events import Event
+from blink_engine.parameters import StateName
+from blink_engine.performance import StateChange
 
 PAUSE_MIN_S = 0.18
 """Shorter gaps are closures of stops, not pauses (Heldner & Edlund 2010, Journal of Phonetics 38, 555)."""
