@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from statistics import fmean, stdev
+from statistics import stdev
 
 
 def within_participant_errors(rows: Sequence[Sequence[float]]) -> list[float]:
@@ -40,7 +40,17 @@ def within_participant_errors(rows: Sequence[Sequence[float]]) -> list[float]:
     conditions = len(rows[0])
     if conditions == 1:
         return [stdev(row[0] for row in rows) / math.sqrt(len(rows))]
-    grand = fmean(value for row in rows for value in row)
-    centred = [[value - fmean(row) + grand for value in row] for row in rows]
-    factor = math.sqrt(conditions / (conditions - 1) / len(rows))
-    return [factor * stdev(row[place] for row in centred) for place in range(conditions)]
+    columns, number = list(zip(*rows, strict=True)), len(rows)
+    means = [sum(row) / conditions for row in rows]
+    # The grand mean adds the same to every z of a condition, and so nothing to its deviation.
+    return [
+        math.sqrt(conditions / (conditions - 1) * _squares(column, means) / (number - 1) / number)
+        for column in columns
+    ]
+
+
+def _squares(column: Sequence[float], means: Sequence[float]) -> float:
+    """Sum of squared deviations of the z of one condition from their mean."""
+    z = [value - mean for value, mean in zip(column, means, strict=True)]
+    centre = math.fsum(z) / len(z)
+    return math.fsum([(value - centre) ** 2 for value in z])

@@ -134,7 +134,7 @@ def answer(kind, payload, places):
     if code is None:
         return None
     first, second = (places[role][0] for role in ("left", "first", "right", "second") if role in places)
-    return "", first, second, code, None
+    return "", first, second + 1, code, None
 
 
 def packed(codes):

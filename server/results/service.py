@@ -1,21 +1,21 @@
 """The results of a study as data arrive."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from itertools import combinations
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.clip_rating.declaration import SCALE_NAME, clip_rating_of
 from server.clock import now
 from server.models import Study, StudyVersion, VersionClip
-from server.results import repository, summary
+from server.results import summary
 from server.results.repository import Pool
 from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results, TimeBin
 from server.studies.lookup import definition_of
-
-_DELAY_EDGES = [10.0 * step for step in range(11)]
+from server.tallies.pools import PooledTally, pooled
+from server.tallies.tally import RT_MS
 
 
 def results(session: Session, study: Study, version: StudyVersion, origin: str) -> Results:
@@ -23,46 +23,51 @@ def results(session: Session, study: Study, version: StudyVersion, origin: str) 
     definition, of = definition_of(version), Pool(study.id, origin, version.series)
     scale = clip_rating_of(definition).scale
     factors = list(definition.factor_names)
-    means = repository.cell_means(session, of, factors)
-    clips = _clips(session, version, of, scale.minimum, scale.maximum)
+    tally = pooled(session, of.runs(), SCALE_NAME, factors)
+    clips = _clips(session, version, tally, scale.minimum, scale.maximum)
     return Results(
         study=study.name,
         origin=origin,
         series=version.series,
         counted_at=now(),
-        participants=len(means),
+        participants=len(tally.means),
         ratings=sum(clip.ratings for clip in clips),
         scale_minimum=scale.minimum,
         scale_maximum=scale.maximum,
-        margins=margins(means, factors, [factor.name for factor in definition.factors if factor.between]),
+        margins=margins(
+            tally.means, factors, [factor.name for factor in definition.factors if factor.between]
+        ),
         cells=_cells(clips),
         clips=clips,
         response_times=[
-            TimeBin(start_ms=250 * place, answers=n) for place, n in repository.response_times(session, of)
+            TimeBin(start_ms=RT_MS * place, answers=n) for place, n in sorted(tally.times.items())
         ],
-        playback=_playback(session, of),
+        playback=_playback(tally),
     )
 
 
 def margins(means: summary.CellMeans, factors: list[str], between: Sequence[str] = ()) -> list[Margin]:
     """Every factor, every pair of factors, and the cells where there are more than two factors."""
+    people = summary.alike(means)
     wanted = [list(chosen) for size in (1, 2) for chosen in combinations(factors, size)]
     if len(factors) > 2:
         wanted.append(factors)
     return [
         Margin(
             factors=keep,
-            means=[Mean.model_validate(vars(one)) for one in summary.margin(means, factors, keep, between)],
+            means=[Mean.model_validate(vars(one)) for one in summary.margin(people, factors, keep, between)],
         )
         for keep in wanted
     ]
 
 
-def _clips(session: Session, version: StudyVersion, of: Pool, lowest: int, highest: int) -> list[ClipResult]:
+def _clips(
+    session: Session, version: StudyVersion, tally: PooledTally, lowest: int, highest: int
+) -> list[ClipResult]:
     counts: dict[int, list[int]] = defaultdict(lambda: [0] * (highest - lowest + 1))
-    for clip, response, number in repository.clip_counts(session, of):
+    for (clip, _, response), number in tally.answers.items():
         if lowest <= response <= highest:
-            counts[clip][response - lowest] += number
+            counts[clip][int(response) - lowest] += number
     query = select(VersionClip).where(VersionClip.version_id == version.id)
     shown = {row.id: row for row in session.scalars(query)}
     older = set(counts) - set(shown)
@@ -107,12 +112,10 @@ def _weighted(clips: list[ClipResult]) -> float | None:
     return sum(clip.ratings * clip.mean for clip in clips if clip.mean is not None) / total if total else None
 
 
-def _playback(session: Session, of: Pool) -> Playback:
-    counts = repository.playback(session, of)
-    delays = repository.onset_delays(session, of)
-    return Playback(
-        verdicts=dict(counts["verdict"]),
-        methods=dict(counts["method"]),
-        rules=dict(counts["rule"]),
-        key_to_first_frame_ms=summary.histogram(delays, _DELAY_EDGES),
-    )
+def _playback(tally: PooledTally) -> Playback:
+    counts: tuple[Counter[str], ...] = (Counter(), Counter(), Counter())
+    for words, number in tally.plays.items():
+        for count, word in zip(counts, words, strict=True):
+            count[word] += number if word else 0
+    verdicts, methods, rules = (dict(sorted((+count).items())) for count in counts)
+    return Playback(verdicts=verdicts, methods=methods, rules=rules, key_to_first_frame_ms=tally.onsets)

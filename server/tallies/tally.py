@@ -1,6 +1,6 @@
 """The counts of one run, as each play changes them, and the two texts they are stored as.
 
-An answer is packed into eight bytes: 18 bits for the clip, 18 for a second clip (0 where a trial shows one)
+An answer is packed into eight bytes: 18 bits for the clip, 18 for a second clip (from 1; 0 for none)
 and 28 for the value in thousandths. So a million of them are read and counted in a fraction of a second,
 without a package for numbers.
 """
@@ -48,19 +48,20 @@ class Counted(NamedTuple):
     Attributes
     ----------
     scale: its name; empty where trials are not rated on scales.
-    clip, second: numbers of the clips in the version (`Place`); second is 0 where there is one.
+    clip, second: numbers of the clips in the version (`Place`); second is None where a trial shows one.
     value: the answer as a number. cell: of the clip, where the mean of values by cell means something.
     """
 
     scale: str
     clip: int
-    second: int
+    second: int | None
     value: float
     cell: int | None = None
 
     def packed(self) -> int:
         """As one number of 64 bits."""
-        return (self.clip << _CLIP_BITS | self.second) << _VALUE_BITS | (self.units + _ZERO)
+        second = 0 if self.second is None else self.second + 1
+        return (self.clip << _CLIP_BITS | second) << _VALUE_BITS | (self.units + _ZERO)
 
     @property
     def units(self) -> int:
@@ -68,10 +69,10 @@ class Counted(NamedTuple):
         return min(_ZERO - 1, max(-_ZERO, round(UNIT * self.value)))
 
 
-def unpacked(code: int) -> tuple[int, int, float]:
+def unpacked(code: int) -> tuple[int, int | None, float]:
     """Clip, second clip and value of a packed answer."""
     clip, second = divmod(code >> _VALUE_BITS, 1 << _CLIP_BITS)
-    return clip, second, (code % (1 << _VALUE_BITS) - _ZERO) / UNIT
+    return clip, second - 1 if second else None, (code % (1 << _VALUE_BITS) - _ZERO) / UNIT
 
 
 class Play(NamedTuple):

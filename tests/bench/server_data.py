@@ -9,7 +9,18 @@ from sqlalchemy.orm import DeclarativeBase
 
 from server.clock import now
 from server.context import Services
-from server.models import AssignedTrial, Link, Rating, Study, StudyRun, StudyVersion, TrialClip, VersionClip
+from server.models import (
+    AssignedTrial,
+    Link,
+    Rating,
+    RunTally,
+    Study,
+    StudyRun,
+    StudyVersion,
+    TrialClip,
+    VersionClip,
+)
+from server.tallies.recount import Recount
 from tests.helpers.studies import StudyInDatabase
 
 
@@ -30,6 +41,9 @@ def add_runs(services: Services, study: StudyInDatabase, runs: int, trials: int)
         session.execute(insert(AssignedTrial), [_assigned(first, trial) for trial in range(trials)])
         session.execute(insert(TrialClip), [_clip(first, trial, clips) for trial in range(trials)])
         session.execute(insert(Rating), [_rating(first, trial, clips) for trial in range(trials)])
+        counted = Recount(services.versions).counted(session, [first])[first]
+        session.execute(insert(RunTally).values(study_run_id=first, **counted.values()))
+        session.execute(_copied(RunTally, first))
         session.execute(_copied(AssignedTrial, first))
         session.execute(_copied(TrialClip, first))
         session.execute(_copied(Rating, first))

@@ -117,7 +117,7 @@ def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Cou
     """Each number by its scale; it has a mean by cell. "Not applicable" is none."""
     answers, shown = payload.get("answers", {SCALE_NAME: payload}), places["shown"]
     return [
-        Counted(name, shown.clip, 0, one["response"], shown.cell)
+        Counted(name, shown.clip, None, one["response"], shown.cell)
         for name, one in answers.items()
         if one["response"] is not None
     ]

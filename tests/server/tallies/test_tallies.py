@@ -23,7 +23,13 @@ from tests.helpers.studies import Participant, good_playback
 
 small = st.integers(0, 2**18 - 1)
 values = st.integers(-100_000, 134_217_000).map(lambda units: units / 1000)
-answers = st.builds(Counted, st.sampled_from(["", "naturalness"]), small, small, values)
+answers = st.builds(
+    Counted,
+    st.sampled_from(["", "naturalness"]),
+    small,
+    st.none() | small.filter(lambda n: n < 2**18 - 1),
+    values,
+)
 plays = st.builds(
     Play,
     st.integers(0, 30),

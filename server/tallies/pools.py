@@ -1,0 +1,118 @@
+"""The tallies of many runs together: what Results, monitor and participants read instead of ratings."""
+
+import json
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import Session
+
+from server.models import RunTally, StudyRun, VersionClip
+from server.tallies.tally import ONSET_BINS, UNIT, Place, numbers, packed_codes, unpacked
+
+
+@dataclass(frozen=True)
+class CellClip:
+    """A clip of a version with its cell."""
+
+    id: int
+    cell: str
+    levels: dict[str, str]
+
+
+@dataclass
+class PooledTally:
+    """The counts of some runs on one scale.
+
+    Attributes
+    ----------
+    means: run -> levels in the order of the factors -> mean answer.
+    answers: (clip, second clip, answer) -> how often; clips by their id, second None where there is one.
+    times: bin of 250 ms -> answers. onsets: answers by bins of 10 ms.
+    plays: (verdict, method, rule) -> plays, those of excluded runs included.
+    """
+
+    means: dict[str, dict[tuple[str, ...], float]] = field(default_factory=dict)
+    answers: Counter[tuple[int, int | None, float]] = field(default_factory=Counter)
+    times: Counter[int] = field(default_factory=Counter)
+    onsets: list[int] = field(default_factory=lambda: [0] * ONSET_BINS)
+    plays: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+
+
+def pooled(session: Session, runs: ColumnElement[bool], scale: str, factors: Sequence[str]) -> PooledTally:
+    """The counts of the runs that fit, answers of excluded ones left out."""
+    query = select(
+        StudyRun.id, StudyRun.version_id, StudyRun.excluded, RunTally.counts, RunTally.answers
+    ).join(RunTally, RunTally.study_run_id == StudyRun.id)
+    made = PooledTally()
+    packed: dict[int, list[str]] = defaultdict(list)
+    versions = _Versions(session, factors)
+    for run, version, excluded, counts, answers in session.execute(query.where(runs)):
+        counted = json.loads(counts)
+        _add_plays(made, counted)
+        if excluded:
+            continue
+        _add_times(made, counted)
+        text = json.loads(answers).get(scale)
+        if text is not None:
+            packed[version].append(text)
+            sums = counted["cells"].get(scale, ())
+            made.means[str(run)] = means_by_cell(sums, versions.levels(version))
+    for version, texts in packed.items():
+        _add_answers(made, texts, versions.clips(version))
+    return made
+
+
+def means_by_cell(sums: Sequence[int], levels: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], float]:
+    """Levels -> mean answer, of cells that have one; `sums` as `Tally.cells` has them."""
+    cells = zip(levels, sums[::2], sums[1::2], strict=False)
+    return {key: total / (UNIT * number) for key, number, total in cells if number}
+
+
+def _add_plays(made: PooledTally, counted: Any) -> None:
+    for key, number in counted["plays"].items():
+        verdict, method, rule = key.split(" ")
+        made.plays[verdict, method, rule] += number
+
+
+def _add_times(made: PooledTally, counted: Any) -> None:
+    for start, number in counted["times"].items():
+        made.times[int(start)] += number
+    if counted["onsets"]:
+        made.onsets = [one + more for one, more in zip(made.onsets, counted["onsets"], strict=True)]
+
+
+def _add_answers(made: PooledTally, texts: Iterable[str], clips: Sequence[CellClip]) -> None:
+    for code, times in Counter(packed_codes(texts)).items():
+        first, second, value = unpacked(code)
+        made.answers[clips[first].id, None if second is None else clips[second].id, value] += times
+
+
+class _Versions:
+    """The clips of study versions as tallies number them."""
+
+    def __init__(self, session: Session, factors: Sequence[str]) -> None:
+        self._session, self._factors = session, factors
+        self._clips: dict[int, list[CellClip]] = {}
+        self._levels: dict[int, list[tuple[str, ...]]] = {}
+
+    def clips(self, version: int) -> list[CellClip]:
+        if version not in self._clips:
+            query = select(VersionClip.id, VersionClip.cell, VersionClip.levels)
+            query = query.where(VersionClip.version_id == version).order_by(VersionClip.id)
+            self._clips[version] = [CellClip(*row) for row in self._session.execute(query)]
+        return self._clips[version]
+
+    def levels(self, version: int) -> list[tuple[str, ...]]:
+        """The levels of each cell, by its number."""
+        if version not in self._levels:
+            clips = self.clips(version)
+            places: dict[int, Place] = numbers((clip.id, clip.cell) for clip in clips)
+            found: dict[int, tuple[str, ...]] = {}
+            for clip in clips:
+                levels = tuple(clip.levels[name] for name in self._factors)
+                found.setdefault(places[clip.id].cell, levels)
+            self._levels[version] = [found[number] for number in sorted(found)]
+        return self._levels[version]
