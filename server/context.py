@@ -22,6 +22,8 @@ from server.stopping import Stopping
 from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
+RESUME_CODES_PER_MINUTE = 10
+"""Resume codes that may be tried for one visit a minute, per worker."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class Services:
     stopping: Stopping
     results: ResultsCache
     intake: Intake
+    resume_codes: RateLimit
 
     def time_of(self, request: Request) -> datetime:
         """When a participant's request came in: now, but where simulated people say when they act."""
@@ -67,6 +70,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         stopping=Stopping(),
         results=ResultsCache(),
         intake=Intake(settings, ClipBytes(clips), rehearses=rehearses),
+        resume_codes=RateLimit(RESUME_CODES_PER_MINUTE),
     )
 
 

@@ -18,6 +18,11 @@ def new_token() -> str:
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
+def new_pseudonym_key() -> str:
+    """A random key for the pseudonyms of one study: 64 hexadecimal digits."""
+    return secrets.token_hex(32)
+
+
 def derived_token(key: bytes, purpose: str, public_id: str) -> str:
     """The url-safe 128-bit token of `public_id`: not to be made without the key, stored nowhere."""
     digest = hmac.new(key, f"{purpose}:{public_id}".encode(), hashlib.sha256).digest()

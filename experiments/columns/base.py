@@ -36,7 +36,7 @@ RUN: tuple[Column, ...] = (
     Column(
         "participant",
         "text",
-        "Identifier of the participant: the link's label, the recruiter's id, or the run's.",
+        "The study's pseudonym of the participant; the same person has another one in another study.",
         source="r",
     ),
     Column(

@@ -33,7 +33,11 @@ EVIDENCE_COLUMNS = (
 RUN_COLUMNS: tuple[Column, ...] = (
     Column("study", "text", "Name of the study, unique on this server."),
     Column("run", "text", "Public identifier of the participant's visit (study run)."),
-    Column("participant", "text", "Identifier of the participant: link label, recruiter's id, or the run's."),
+    Column(
+        "participant",
+        "text",
+        "The study's pseudonym of the participant.",
+    ),
     Column("phase", "text", "Whether the study was a pilot or live.", values=("pilot", "live")),
     Column("synthetic", "boolean", "True where no person took part: simulated data."),
     Column("status", "text", "State of the visit."),
@@ -52,7 +56,6 @@ RUN_COLUMNS: tuple[Column, ...] = (
     Column("erased", "boolean", "True where the person's data were erased on request."),
     Column("forms", "text", "JSON object of form names and their answers."),
     Column("device", "text", "JSON object of what the browser said of itself."),
-    Column("recruiter_parameters", "text", "JSON object of the parameters of the recruiter's address."),
     Column("run_origin", "text", "Where the run came from, fixed at its start.", values=ORIGINS),
     Column("data_series", "integer", "Data series of the run's version of the study."),
     Column(

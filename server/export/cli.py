@@ -10,6 +10,7 @@ import typer
 from sqlalchemy.exc import SQLAlchemyError
 
 from experiments.errors import InputError
+from server.accounts.audit import record
 from server.cli_common import migrated_services, out
 from server.export.formats import FORMATS, Format
 from server.studies.lookup import find_study
@@ -28,7 +29,8 @@ def export(
         typer.Option(
             "--format",
             help="csv: one row a play; runs: one row a visit; raw: JSON lines with every drawn frame; "
-            "codebook: Markdown; psych-ds: a zip of the dataset folder.",
+            "codebook: Markdown; psych-ds: a zip of the dataset folder; identities: recruiters' ids "
+            "beside the pseudonyms, noted in the audit log.",
         ),
     ] = "csv",
 ) -> None:
@@ -43,6 +45,9 @@ def export(
       server export exp3 --format psych-ds --out exp3.zip
     """
     with migrated_services() as services, services.database.snapshot() as session:
+        if form == "identities":
+            with services.database.write() as noted:
+                record(noted, None, "identities downloaded", "study", study, what=form)
         found = find_study(session, study)
         try:
             size = _write(out_file, FORMATS[form](session, found))

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from fastapi.responses import StreamingResponse
 
 from server.accounts.audit import record
-from server.accounts.identity import Exporter, Identity, Viewer
+from server.accounts.identity import Exporter, Identity, Owner, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.export.formats import FORMATS, Format, row_count
@@ -20,9 +20,10 @@ ROWS_HEADER = "palpebra-rows"
 def _stream(
     services: Services, who: Identity, name: str, form: Format, media_type: str, file: str
 ) -> StreamingResponse:
+    action = "identities downloaded" if form == "identities" else "data downloaded"
     with services.database.write() as session:
         find_study(session, name)  # an unknown study is refused before the stream begins
-        record(session, who, "data downloaded", "study", name, what=form)
+        record(session, who, action, "study", name, what=form)
 
     pieces = _pieces(services, name, form)
     # The first piece is the number of rows; taking it begins the snapshot that the rest is read from.
@@ -63,6 +64,12 @@ def download_raw(services: ServicesDep, who: Exporter, study: str) -> StreamingR
 def download_psych_ds(services: ServicesDep, who: Exporter, study: str) -> StreamingResponse:
     """A Psych-DS dataset as a zip."""
     return _stream(services, who, study, "psych-ds", "application/zip", "psych-ds.zip")
+
+
+@router.get("/identities.csv", response_class=StreamingResponse)
+def download_identities(services: ServicesDep, who: Owner, study: str) -> StreamingResponse:
+    """Recruiters' ids beside the pseudonyms, one row a visit; for owners, and noted in the audit log."""
+    return _stream(services, who, study, "identities", "text/csv; charset=utf-8", "identities.csv")
 
 
 @router.get("/codebook.md", response_class=Response)

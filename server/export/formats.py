@@ -7,14 +7,14 @@ from typing import Literal
 from sqlalchemy.orm import Session
 
 from server.clock import now
-from server.export import codebook, psych_ds, runs
+from server.export import codebook, identities, psych_ds, runs
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.ratings_csv import rating_count
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
 from server.text import encoded
 
-Format = Literal["csv", "runs", "raw", "codebook", "psych-ds"]
+Format = Literal["csv", "runs", "raw", "codebook", "psych-ds", "identities"]
 Pieces = Callable[[Session, Study], Iterator[bytes]]
 
 
@@ -47,15 +47,24 @@ def psych_ds_zip(session: Session, study: Study) -> Iterator[bytes]:
     yield from psych_ds.dataset(session, study, now().date().isoformat())
 
 
+def identities_csv(session: Session, study: Study) -> Iterator[bytes]:
+    """One row a visit whose person is known: the recruiter's id beside the pseudonym."""
+    rows = identities.identity_rows(session, study)
+    yield from csv_pieces(whole(rows, identities.identity_count(session, study), extra=1))
+
+
 FORMATS: dict[Format, Pieces] = {
     "csv": ratings_csv,
     "runs": runs_csv,
     "raw": raw_json,
     "codebook": codebook_markdown,
     "psych-ds": psych_ds_zip,
+    "identities": identities_csv,
 }
 
 
 def row_count(form: Format, session: Session, study: Study) -> int:
     """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
+    if form == "identities":
+        return identities.identity_count(session, study)
     return rating_count(session, study) if form in ("csv", "psych-ds") else runs.run_count(session, study)

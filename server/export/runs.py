@@ -72,7 +72,6 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "erased": int(run.erased_at is not None),
         "forms": _json(dict(answers.all())),
         "device": _json(run.device),
-        "recruiter_parameters": _json(run.recruiter_parameters),
         "run_origin": run.origin,
         "data_series": run.version.series,
     } | _evidence(session, run)

@@ -29,6 +29,7 @@ RUN_STATUSES = ("active", "complete", "screened_out", "withdrawn")
 class StudyRun(Base):
     """A participant's visit. No internet address is stored, here or anywhere.
 
+    participant: the study's pseudonym of the person, see `server.participants.identities`.
     slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease.
     origin: where its answers come from, given at its start; the database refuses to change it.
     seed: of the trial order. trials_answered: trials that need no further play, practice and checks included.
@@ -77,7 +78,6 @@ class StudyRun(Base):
     consented_at: Mapped[datetime | None]
     completed_at: Mapped[datetime | None]
     completion_code: Mapped[str] = mapped_column(String(100), default="")
-    recruiter_parameters: Mapped[dict[str, str]] = mapped_column(default=dict)
     device: Mapped[dict[str, Any]] = mapped_column(default=dict)
     elapsed_ms: Mapped[float] = mapped_column(default=0.0)
     px_per_mm: Mapped[float | None]
@@ -93,6 +93,21 @@ class StudyRun(Base):
     study: Mapped[Study] = relationship()
     version: Mapped[StudyVersion] = relationship()
     link: Mapped[Link] = relationship()
+
+
+class RecruiterIdentity(Base):
+    """Who a run's person is to the recruiter: the only place where such an id is stored.
+
+    identifier: the person's id, empty where the address named nobody. parameters: of the address.
+    """
+
+    __tablename__ = "recruiter_identities"
+
+    study_run_id: Mapped[int] = mapped_column(
+        ForeignKey("study_runs.id", ondelete="CASCADE"), primary_key=True, autoincrement=False
+    )
+    identifier: Mapped[str] = mapped_column(String(500), default="")
+    parameters: Mapped[dict[str, str]] = mapped_column(default=dict)
 
 
 class AssignedTrial(Base):

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from server.clock import now
 from server.models.base import Base, one_of
+from server.tokens import new_pseudonym_key
 
 
 class Study(Base):
@@ -16,6 +17,7 @@ class Study(Base):
     status: draft (only previews), pilot, live, closed. paused: no new runs for the moment.
     quota: complete runs after which the study closes itself. revision: counts edits, so that of two people
     editing at once the second is told. recruiter: see `server.participants.recruiter`.
+    pseudonym_key: what the names of its participants are made with; it never leaves the database.
     """
 
     __tablename__ = "studies"
@@ -34,6 +36,7 @@ class Study(Base):
     created_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     opened_at: Mapped[datetime | None]
     closed_at: Mapped[datetime | None]
+    pseudonym_key: Mapped[str] = mapped_column(String(64), default=new_pseudonym_key)
 
     versions: Mapped[list["StudyVersion"]] = relationship(
         back_populates="study", order_by="StudyVersion.number", cascade="all, delete-orphan"

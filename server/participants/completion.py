@@ -34,11 +34,12 @@ def complete_run(services: Services, session: Session, token: str) -> Completion
         run.evidence_verdict = judge_run(session, run).verdict
         _close_when_full(session, study, run)
     if run.status == "screened_out":
-        return _screened_out(run)
+        return _screened_out(session, run)
     if run.status != "complete":
         raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")
     code = completion_code(session, run, loaded)
-    address = recruiter_of(run.link).redirect(code, run.public_id, visible(run.recruiter_parameters))
+    parameters = visible(repository.parameters(session, run))
+    address = recruiter_of(run.link).redirect(code, run.public_id, parameters)
     return Completion(status="complete", completion_code=code, redirect_url=address)
 
 
@@ -68,9 +69,10 @@ def completion_code(session: Session, run: StudyRun, loaded: LoadedVersion) -> s
     return recruiter_of(run.link).code(outcome, run.completion_code)
 
 
-def _screened_out(run: StudyRun) -> Completion:
+def _screened_out(session: Session, run: StudyRun) -> Completion:
     recruiter = recruiter_of(run.link)
-    address = recruiter.redirect_screened_out_to(run.public_id, visible(run.recruiter_parameters))
+    parameters = visible(repository.parameters(session, run))
+    address = recruiter.redirect_screened_out_to(run.public_id, parameters)
     code = recruiter.code_screened_out or None
     return Completion(status="screened_out", completion_code=code, redirect_url=address)
 

@@ -1,7 +1,7 @@
 """What a link leads to, and how a run begins or is taken up again."""
 
 import secrets
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import Any, Literal
 from uuid import UUID
 
@@ -16,16 +16,14 @@ from server.clock import now
 from server.context import Services
 from server.evidence.intake import ENFORCED_ORIGINS
 from server.evidence.repository import has_older_runs
-from server.models import Link, Study, StudyRun
-from server.participants import repository
+from server.models import Link, RecruiterIdentity, Study, StudyRun
+from server.participants import repository, returning
 from server.participants.bounds import checked_device
 from server.participants.recruiter import NO_RECRUITER, Recruiter
 from server.participants.refusals import (
     LanguageUnknown,
     LinkExpired,
     LinkUnknown,
-    RunLeft,
-    RunTooOld,
     StudyClosed,
     StudyFull,
     StudyPaused,
@@ -67,8 +65,10 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
     version_id = repository.active_version_id(session, link.study)
     experiment = services.versions.get(session, version_id).experiment
     run = repository.latest_run(session, link) if link.kind == "personal" else None
-    resumable = run is not None and run.status == "active" and refusal_to_resume(experiment, run) is None
-    over = run is not None and not resumable and not _restarts(experiment, run)
+    resumable = (
+        run is not None and run.status == "active" and returning.refusal_to_resume(experiment, run) is None
+    )
+    over = run is not None and not resumable and not returning.restarts(experiment, run)
     return LinkState(
         study=LinkedStudy(
             name=link.study.name,
@@ -101,10 +101,10 @@ def start_run(services: Services, session: Session, token: str, start: RunStart)
     """Begin a run, or give back the one this browser, person or personal link already has."""
     link = find_link(session, token)
     study = repository.lock_study(session, link.study_id)
-    known = _known_run(session, link, start)
+    known = returning.known_run(services, session, link, recruiter_of(link), start)
     if known is not None:
         experiment = services.versions.get(session, known.version_id).experiment
-        if not _restarts(experiment, known):
+        if not returning.restarts(experiment, known):
             return _resumed(services, experiment, known, start.client_id)
         with session.begin_nested():  # should a new visit be refused, the old one stays as it is
             known.status = "withdrawn"
@@ -163,46 +163,8 @@ def _origin(link: Link, study: Study) -> Origin:
     return "participant" if study.status == "live" else "pilot"
 
 
-def _known_run(session: Session, link: Link, start: RunStart) -> StudyRun | None:
-    run = repository.run_of_client(session, link, str(start.client_id))
-    if run is None and link.kind == "personal":
-        run = repository.latest_run(session, link)
-    recruiter = recruiter_of(link)
-    if run is None and recruiter.kind != "generic":
-        participant = recruiter.participant(start.query)
-        run = repository.latest_run(session, link, participant) if participant else None
-    return run
-
-
-def _restarts(experiment: Experiment, run: StudyRun) -> bool:
-    """True where coming back begins anew. Before consent there is nothing to begin anew."""
-    return experiment.session.resume == "restart" and run.status == "active" and run.consented_at is not None
-
-
-def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunTooOld | None:
-    """Why this run may not be taken up again; None where it may, or where it is over and only looked at."""
-    if run.status != "active" or run.origin == "preview":
-        return None
-    if now() > _oldest(experiment, run):
-        hours = f"{experiment.session.maximum_age_hours:g}"
-        return RunTooOld(f"This visit began more than {hours} hours ago and cannot be taken up again.")
-    if experiment.session.resume == "block" and run.consented_at is not None:
-        return RunLeft("This study must be done in one go; a visit that was left cannot be taken up again.")
-    return None
-
-
-def resumable_until(experiment: Experiment, run: StudyRun) -> datetime | None:
-    """Until when a reloaded page may go on by itself, without a connection; None where it must ask first."""
-    kept = experiment.session.resume == "resume" and run.status == "active" and run.origin != "preview"
-    return _oldest(experiment, run) if kept else None
-
-
-def _oldest(experiment: Experiment, run: StudyRun) -> datetime:
-    return run.started_at + timedelta(hours=experiment.session.maximum_age_hours)
-
-
 def _resumed(services: Services, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
-    refusal = refusal_to_resume(experiment, run)
+    refusal = returning.refusal_to_resume(experiment, run)
     if refusal is not None:
         raise refusal
     run.last_seen_at = now()
@@ -232,7 +194,7 @@ def _new_run(
     trials = KINDS[loaded.experiment.trial.kind].assign(loaded.experiment, seed, slot)
     public_id = new_public_id()
     token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
-    own = link.label if link.kind == "personal" else recruiter_of(link).participant(start.query)
+    identifier = recruiter_of(link).participant(start.query) or ""
     run = StudyRun(
         public_id=public_id,
         study_id=study.id,
@@ -240,7 +202,7 @@ def _new_run(
         link_id=link.id,
         client_id=str(start.client_id),
         token_hash=hash_token(token),
-        participant=(own or public_id)[:200],
+        participant=returning.name_of(link, study, identifier) or public_id,
         phase=phase,
         origin=origin,
         language=start.language,
@@ -248,11 +210,13 @@ def _new_run(
         slot=slot,
         trials_total=len(trials),
         completion_code=new_token()[:10],
-        recruiter_parameters=start.query,
         device=checked_device(start.device),
         evidence=_evidence(services, session, origin, start),
     )
     repository.add_all(session, [run])
+    if start.query:
+        known_as = RecruiterIdentity(study_run_id=run.id, identifier=identifier, parameters=start.query)
+        repository.add_all(session, [known_as])
     repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
     return run, token
 

@@ -45,6 +45,24 @@ class RunLeft(Conflict):
     code = "run_left"
 
 
+class ResumeCodeNeeded(Conflict):
+    """A visit under this recruiter's id has begun in another browser; the id alone does not take it up."""
+
+    code = "resume_code_needed"
+
+
+class ResumeCodeWrong(Conflict):
+    """The resume code is that of no visit by this link."""
+
+    code = "resume_code_wrong"
+
+
+class TakenPartAlready(Conflict):
+    """A visit under this recruiter's id is over."""
+
+    code = "taken_part_already"
+
+
 class RunUnknown(ApiError):
     """No run has this token."""
 

@@ -14,6 +14,7 @@ from server.models import (
     FormAnswer,
     Link,
     Rating,
+    RecruiterIdentity,
     RunEvent,
     Study,
     StudyRun,
@@ -81,6 +82,19 @@ def latest_run(session: Session, link: Link, participant: str | None = None) -> 
     """The newest run of a link, or of one participant of it."""
     query = select(StudyRun).where(StudyRun.link_id == link.id).order_by(StudyRun.id.desc()).limit(1)
     return session.scalar(query if participant is None else query.where(StudyRun.participant == participant))
+
+
+def runs_beginning(session: Session, link: Link, prefix: str) -> Sequence[StudyRun]:
+    """The runs of a link whose public id begins so; nearly always one."""
+    return session.scalars(
+        select(StudyRun).where(StudyRun.link_id == link.id, StudyRun.public_id.startswith(prefix))
+    ).all()
+
+
+def parameters(session: Session, run: StudyRun) -> dict[str, str]:
+    """The parameters of the address that led to a run."""
+    found = session.get(RecruiterIdentity, run.id)
+    return found.parameters if found else {}
 
 
 def places_taken(session: Session, column: Any, ident: int, origin: str, lease: timedelta) -> int:

@@ -18,7 +18,7 @@ from server.models import Calibration, FormAnswer, RunEvent, StudyRun
 from server.participants import bounds, repository, screening
 from server.participants.completion import completion_code
 from server.participants.forms import checked_answers
-from server.participants.links import find_link, refusal_to_resume, resumable_until
+from server.participants.links import find_link
 from server.participants.lookup import find_run, open_run
 from server.participants.refusals import (
     ConsentMissing,
@@ -26,6 +26,7 @@ from server.participants.refusals import (
     LanguageUnknown,
     ScreeningUndeclared,
 )
+from server.participants.returning import refusal_to_resume, resumable_until, shown_code
 from server.participants.schemas import (
     BlockInfo,
     CalibrationResult,
@@ -78,6 +79,7 @@ def run_state(services: Services, session: Session, token: str, moment: datetime
         elapsed_ms_before=run.elapsed_ms,
         completion_code=completion_code(session, run, loaded) if run.status == "complete" else None,
         resumable_until=resumable_until(experiment, run),
+        resume_code=shown_code(services.settings.key, experiment, run),
         server_time=moment,
         tickets=_tickets(services, run, experiment, moment),
     )

@@ -81,6 +81,13 @@ class RunStart(BaseModel):
         default_factory=dict, max_length=20, description="Parameters of the address, such as PROLIFIC_PID."
     )
     device: dict[Key, Any] = Field(default_factory=dict, max_length=40)
+    resume_code: Annotated[str, StringConstraints(max_length=60)] | None = Field(
+        default=None, description="Code that the page has shown: takes up that visit in this browser."
+    )
+    anew: bool = Field(
+        default=False,
+        description="Begin a visit though one under the same recruiter's id is open in another browser.",
+    )
 
 
 class RunStarted(BaseModel):
@@ -172,6 +179,9 @@ class RunState(BaseModel):
     completion_code: str | None
     resumable_until: datetime | None = Field(
         description="Until when a reloaded page may go on without asking; null where it must ask."
+    )
+    resume_code: str | None = Field(
+        description="By it the visit is taken up on another device; null where the link itself does that."
     )
     server_time: datetime
     tickets: Tickets | None = Field(description="Leave to answer, a ticket for each play of each trial.")

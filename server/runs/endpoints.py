@@ -5,11 +5,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from server.accounts.audit import record
-from server.accounts.identity import Experimenter, PersonalReader
+from server.accounts.identity import Experimenter, Owner, PersonalReader
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.runs import service
-from server.runs.schemas import Erase, Exclude, RunPage, Show, Timeline
+from server.runs.schemas import Erase, Exclude, RunIdentity, RunPage, Show, Timeline
 from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/runs", tags=["participants"], responses=ERROR_RESPONSES)
@@ -37,6 +37,13 @@ def get_timeline(services: ServicesDep, who: PersonalReader, study: str, run: st
         found = service.timeline(session, find_study(session, study), run)
         record(session, who, "personal data read", "run", run, study=study)
         return found
+
+
+@router.get("/{run}/identity")
+def get_identity(services: ServicesDep, who: Owner, study: str, run: str) -> RunIdentity:
+    """Who the participant is to the recruiter; for owners, and each look is in the audit log."""
+    with services.database.write() as session:
+        return service.identity(session, find_study(session, study), run, who)
 
 
 @router.put("/{run}/exclusion", status_code=204)

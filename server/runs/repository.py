@@ -12,6 +12,7 @@ from server.models import (
     Calibration,
     FormAnswer,
     Rating,
+    RecruiterIdentity,
     RunEvent,
     RunTally,
     Study,
@@ -115,9 +116,15 @@ def calibrations(session: Session, run: StudyRun) -> list[Calibration]:
     return list(session.scalars(query))
 
 
+def identity(session: Session, run: StudyRun) -> RecruiterIdentity | None:
+    """Who the run's person is to the recruiter; None where the address said nothing."""
+    return session.get(RecruiterIdentity, run.id)
+
+
 def delete_personal_rows(session: Session, run: StudyRun) -> int:
     """Delete everything a person left in a run; return how many ratings that were."""
     ratings = session.scalar(select(func.count()).select_from(Rating).where(Rating.study_run_id == run.id))
-    for table in (Rating, RunTally, AnswerEvidence, View, RunEvent, FormAnswer, Calibration):
+    personal = (AnswerEvidence, View, RunEvent, FormAnswer, Calibration, RecruiterIdentity)
+    for table in (Rating, RunTally, *personal):
         session.execute(delete(table).where(table.study_run_id == run.id))
     return int(ratings or 0)

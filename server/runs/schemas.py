@@ -22,6 +22,16 @@ class Erase(BaseModel):
     confirm: Annotated[str, StringConstraints(max_length=40)]
 
 
+class RunIdentity(BaseModel):
+    """Who a participant is to the recruiter."""
+
+    run: str
+    participant: str = Field(description="The study's pseudonym.")
+    identifier: str = Field(description="The recruiter's id; empty where the address named nobody.")
+    parameters: VisibleObject = Field(description="Of the address by which the participant came.")
+    link: str = Field(description="Label of the link.")
+
+
 Show = Literal["everybody", "complete", "not_complete", "excluded", "pilot", "simulated"]
 
 
@@ -118,7 +128,6 @@ class Timeline(BaseModel):
 
     summary: RunSummary
     device: VisibleObject
-    recruiter_parameters: VisibleObject
     consented_at: datetime | None
     trials: list[TimelineTrial]
     events: list[TimelineEvent]

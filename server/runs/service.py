@@ -10,9 +10,10 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
 from server.errors import Conflict, Invalid
-from server.models import AssignedTrial, AuditEntry, Rating, Study, StudyRun, VersionClip
+from server.models import AssignedTrial, AuditEntry, Link, Rating, Study, StudyRun, VersionClip
 from server.runs import repository
 from server.runs.schemas import (
+    RunIdentity,
     RunPage,
     RunSummary,
     Show,
@@ -59,7 +60,26 @@ def summary(run: StudyRun, answered: int, not_good: int) -> RunSummary:
         exclusion_reason=run.exclusion_reason,
         erased_at=run.erased_at,
         version=run.version.number,
-        link=run.link.label or run.link.kind,
+        link=_way_in(run.link),
+    )
+
+
+def _way_in(link: Link) -> str:
+    """What a link is called beside its participant: its label, but not where it is a person's."""
+    return link.kind if link.kind == "personal" else link.label or link.kind
+
+
+def identity(session: Session, study: Study, public_id: str, who: Identity) -> RunIdentity:
+    """Who a run's participant is to the recruiter; that somebody looked is written down."""
+    run = repository.find_run(session, study, public_id)
+    record(session, who, "identity read", "run", public_id, study=study.name)
+    known = repository.identity(session, run)
+    return RunIdentity(
+        run=public_id,
+        participant=run.participant,
+        identifier=known.identifier if known else "",
+        parameters=known.parameters if known else {},
+        link=run.link.label,
     )
 
 
@@ -72,7 +92,6 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
     return Timeline(
         summary=summary(run, answered, not_good),
         device=run.device,
-        recruiter_parameters=run.recruiter_parameters,
         consented_at=run.consented_at,
         trials=[_trial(*play) for play in plays],
         events=[
@@ -135,7 +154,7 @@ def erase(session: Session, study: Study, public_id: str, confirm: str, who: Ide
     if run.erased_at is not None:
         raise Conflict("This run's data were erased already.")
     ratings = repository.delete_personal_rows(session, run)
-    run.participant, run.device, run.recruiter_parameters = "erased", {}, {}
+    run.participant, run.device = "erased", {}
     run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
     run.completion_code = ""
     if run.link.kind == "personal":

@@ -81,7 +81,7 @@ def _run(number: int, participant: str, phase: str, trials: int) -> dict:
     }
     counts = {"trials_total": trials, "trials_answered": trials, "excluded": 0}
     rest = {"language": "en", "started_at": NOW, "last_seen_at": NOW, "completion_code": ""}
-    documents = {"recruiter_parameters": "{}", "device": "{}"}
+    documents = {"device": "{}"}
     return {"id": number, "participant": participant} | texts | state | numbers | counts | rest | documents
 
 

@@ -1103,6 +1103,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/runs/{run}/identity": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Identity
+         * @description Who the participant is to the recruiter; for owners, and each look is in the audit log.
+         */
+        get: operations["get_identity"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/runs/{run}/exclusion": {
         parameters: {
             query?: never;
@@ -1219,6 +1239,26 @@ export interface paths {
          * @description A Psych-DS dataset as a zip.
          */
         get: operations["download_psych_ds"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/data/identities.csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Identities
+         * @description Recruiters' ids beside the pseudonyms, one row a visit; for owners, and noted in the audit log.
+         */
+        get: operations["download_identities"];
         put?: never;
         post?: never;
         delete?: never;
@@ -4050,6 +4090,36 @@ export interface components {
             playback: components["schemas"]["Playback"];
         };
         /**
+         * RunIdentity
+         * @description Who a participant is to the recruiter.
+         */
+        RunIdentity: {
+            /** Run */
+            run: string;
+            /**
+             * Participant
+             * @description The study's pseudonym.
+             */
+            participant: string;
+            /**
+             * Identifier
+             * @description The recruiter's id; empty where the address named nobody.
+             */
+            identifier: string;
+            /**
+             * Parameters
+             * @description Of the address by which the participant came.
+             */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /**
+             * Link
+             * @description Label of the link.
+             */
+            link: string;
+        };
+        /**
          * RunPage
          * @description Runs, the latest first.
          */
@@ -4096,6 +4166,17 @@ export interface components {
             device?: {
                 [key: string]: unknown;
             };
+            /**
+             * Resume Code
+             * @description Code that the page has shown: takes up that visit in this browser.
+             */
+            resume_code?: string | null;
+            /**
+             * Anew
+             * @description Begin a visit though one under the same recruiter's id is open in another browser.
+             * @default false
+             */
+            anew?: boolean;
         };
         /**
          * RunStarted
@@ -4164,6 +4245,11 @@ export interface components {
              * @description Until when a reloaded page may go on without asking; null where it must ask.
              */
             resumable_until: string | null;
+            /**
+             * Resume Code
+             * @description By it the visit is taken up on another device; null where the link itself does that.
+             */
+            resume_code: string | null;
             /**
              * Server Time
              * Format: date-time
@@ -5072,10 +5158,6 @@ export interface components {
             device: {
                 [key: string]: unknown;
             };
-            /** Recruiter Parameters */
-            recruiter_parameters: {
-                [key: string]: unknown;
-            };
             /** Consented At */
             consented_at: string | null;
             /** Trials */
@@ -5660,6 +5742,7 @@ export type RenderOverrides = components['schemas']['RenderOverrides'];
 export type RenderSettings = components['schemas']['RenderSettings'];
 export type ReportOut = components['schemas']['ReportOut'];
 export type Results = components['schemas']['Results'];
+export type RunIdentity = components['schemas']['RunIdentity'];
 export type RunPage = components['schemas']['RunPage'];
 export type RunStart = components['schemas']['RunStart'];
 export type RunStarted = components['schemas']['RunStarted'];
@@ -8314,6 +8397,47 @@ export interface operations {
             };
         };
     };
+    get_identity: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+                run: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RunIdentity"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
     exclude_run: {
         parameters: {
             query?: never;
@@ -8554,6 +8678,44 @@ export interface operations {
         };
     };
     download_psych_ds: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    download_identities: {
         parameters: {
             query?: never;
             header?: never;

@@ -10,8 +10,9 @@ import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity
 import { type Kept, KeptVisit } from "./flow/kept-visit";
 import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGate, showRefusal, startRun } from "./flow/link";
 import { describeDevice, flush, openSession } from "./flow/open-session";
+import { asksForCode, codePage, type Claim } from "./flow/resume-code";
 import { serveOffline } from "./flow/serve-offline";
-import { startPage } from "./flow/start-page";
+import { type Beginning, startPage } from "./flow/start-page";
 import { timeline } from "./flow/timeline";
 import { watch } from "./flow/watchers";
 import { runTimeline, type SimulationMode } from "./jspsych";
@@ -75,22 +76,30 @@ async function visit(entry: Entry): Promise<void> {
   if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], found);
   await passGates(root, t, list);
   if (!(await oneTab(root, t, link_token))) return;
-  const chosen = returns ? language : await startPage(root, link, language);
+  const chosen = returns ? { language, has_code: false } : await startPage(root, link, language);
   const started = kept?.started ?? (await begun(entry, identity, chosen));
   await enter(entry, identity, store, started, list);
 }
 
 /** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
-function begun({ root, t, link_token }: Entry, identity: Identity, language: string): Promise<RunStarted> {
-  const client_id = identity.client_id();
+async function begun({ root, link_token }: Entry, identity: Identity, { language, has_code }: Beginning): Promise<RunStarted> {
+  const t = translator(language);
   const start = {
     language,
-    client_id,
     query: recruiterQuery(location.search),
     device: { user_agent: navigator.userAgent },
     evidence: true,
   };
-  return persistently(root, t, () => startRun(link_token, start));
+  const claimed = (claim: Claim): Promise<RunStarted> => startRun(link_token, { ...start, client_id: identity.client_id(), ...claim });
+  const kept = identity.code;
+  if (has_code) return codePage(root, t, "code_enter", identity, claimed);
+  try {
+    return await persistently(root, t, () => claimed(kept ? { resume_code: kept } : {}));
+  } catch (error) {
+    const why = asksForCode(error);
+    if (!why) throw error;
+    return codePage(root, t, why, identity, claimed);
+  }
 }
 
 /** A closed gate: explained; where the study screens devices, a visit that has not got further ends here with a way back. */
@@ -103,7 +112,7 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
     explain();
     return;
   }
-  const started = await begun(entry, identity, language);
+  const started = await begun(entry, identity, { language, has_code: false });
   const before = await persistently(root, t, () => fetchRun(started.run_token));
   if (before.status === "active" && before.consented_at) {
     explain();

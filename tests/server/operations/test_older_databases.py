@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,27 @@ def older_columns_of(content: bytes, header: list[str]) -> bytes:
 def test_the_ratings_csv_has_the_same_bytes(migrated: Services, study: str) -> None:
     older = older_ratings_csv(study)
     header = older.split(b"\n", 1)[0].decode().split(",")
-    assert older_columns_of(exported(migrated, study), header) == older
+    found, pseudonyms = raw_names(older_columns_of(exported(migrated, study), header), older)
+    assert found == older
+    for raw, names in pseudonyms.items():
+        assert len(names) == 1, f"{raw} has several pseudonyms"
+    assert len(set().union(*pseudonyms.values())) == len(pseudonyms)
+
+
+def raw_names(exported: bytes, older: bytes) -> tuple[bytes, dict[str, set[str]]]:
+    """The export with the raw names of before put back, and the pseudonyms of each; runs' own ids stay."""
+    tables = [list(csv.reader(io.StringIO(one.decode(), newline=""))) for one in (exported, older)]
+    place, run = tables[0][0].index("participant"), tables[0][0].index("run")
+    pseudonyms: dict[str, set[str]] = {}
+    for row, before in zip(*tables, strict=True):
+        if row[place] != before[place]:
+            assert re.fullmatch("p[0-9a-f]{12}", row[place])
+            assert before[place] != before[run]
+            pseudonyms.setdefault(before[place], set()).add(row[place])
+            row[place] = before[place]
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(tables[0])
+    return stream.getvalue().encode(), pseudonyms
 
 
 def send(client: TestClient, item: dict[str, Any], body: Any) -> Any:

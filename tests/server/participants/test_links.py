@@ -104,20 +104,6 @@ def test_a_personal_link_is_used_once_complete_but_shows_the_code_again(
     assert again.state()["completion_code"] == code
 
 
-def test_a_prolific_participant_goes_on_from_another_device(
-    client: TestClient, study: StudyInDatabase, services: Services
-) -> None:
-    link = study.link(recruiter={"kind": "prolific"})
-    query = {"PROLIFIC_PID": "5f0", "SESSION_ID": "9"}
-    first, second = Participant(client, link), Participant(client, link)
-    first.start(query=query)
-    second.start(query=query)
-    assert first.run_id == second.run_id
-    with services.database.read() as session:
-        run = session.query(StudyRun).one()
-        assert (run.participant, run.recruiter_parameters) == ("5f0", query)
-
-
 @pytest.mark.parametrize(
     ("policy", "outcome"), [("resume", 200), ("restart", 201), ("block", (409, "run_left"))]
 )

@@ -1,7 +1,7 @@
 import { Anchor, Button, Card, Code, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
-import { studyQuery } from "../queries";
+import { studyQuery, useMay } from "../queries";
 
 const FILES: [file: string, title: string, words: string][] = [
   ["ratings.csv", "Ratings", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
@@ -11,9 +11,17 @@ const FILES: [file: string, title: string, words: string][] = [
   ["raw.ndjson", "Raw data", "Everything stored, one JSON object a run: every drawn frame and its time."],
 ];
 
+/** For owners alone; each download is in the audit log. */
+const IDENTITIES: (typeof FILES)[number] = [
+  "identities.csv",
+  "Identities",
+  "Recruiters’ ids beside the pseudonyms, for payment. Kept apart from all data, and noted in the audit log.",
+];
+
 export function DataTab() {
   const { study = "" } = useParams({ strict: false });
   const detail = useQuery(studyQuery(study)).data;
+  const files = useMay("owner") ? [...FILES, IDENTITIES] : FILES;
   const version = detail?.summary.version ?? 1;
   return (
     <Stack>
@@ -22,7 +30,7 @@ export function DataTab() {
         are not.
       </Text>
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
-        {FILES.map(([file, title, words]) => (
+        {files.map(([file, title, words]) => (
           <Card withBorder key={file}>
             <Title order={2} size="h4">
               {title}

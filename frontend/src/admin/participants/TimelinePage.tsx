@@ -5,12 +5,14 @@ import { api, unwrap } from "../api";
 import { useMay } from "../queries";
 import { Answer } from "../ui/Answer";
 import { plain, when, words } from "../ui/format";
+import { IdentityButton } from "./IdentityButton";
 import { RunActions } from "./RunActions";
 import { TrialTable } from "./TrialTable";
 
 export function TimelinePage() {
   const { study = "", run = "" } = useParams({ strict: false });
   const mayChange = useMay("experimenter");
+  const owns = useMay("owner");
   const timeline = useQuery({
     queryKey: ["timeline", study, run],
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/runs/{run}", { params: { path: { study, run } } })),
@@ -35,7 +37,10 @@ export function TimelinePage() {
                 </Text>
                 {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>
-              {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} />}
+              <Group>
+                {owns && data.summary.erased_at === null && <IdentityButton study={study} run={run} />}
+                {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} />}
+              </Group>
             </Group>
             <Group align="stretch">
               {data.forms.map((form) => (

@@ -182,6 +182,19 @@ export const messages: Messages = {
   problem:
     "Was Sie bisher getan haben, bleibt erhalten. Laden Sie die Seite neu; wenn es wiederkommt, schreiben Sie bitte der Person, die Sie eingeladen hat: {detail}",
 
+  resume_note:
+    "Code zum Weitermachen: {code}. Notieren Sie ihn: Damit geht es auf einem anderen Gerät weiter, oder wenn dieser Browser Sie vergisst. Der Link oder Ihre Anmeldenummer allein genügt nicht, damit niemand sonst Ihren Besuch übernimmt.",
+  code_open: "Ich habe einen Code zum Weitermachen",
+  code_title: "Weitermachen",
+  code_needed:
+    "Unter Ihrer Anmeldung hat ein Besuch in einem anderen Browser begonnen. Machen Sie dort weiter, oder geben Sie den Code ein, den er gezeigt hat. Wir fragen, weil andere Ihre Anmeldenummer kennen können.",
+  code_over: "Ein Besuch unter Ihrer Anmeldung ist beendet. Mit seinem Code sehen Sie die letzte Seite noch einmal.",
+  code_enter: "Geben Sie den Code ein, den die Seite bei der Anleitung, in den Pausen und beim Unterbrechen gezeigt hat.",
+  code_label: "Code zum Weitermachen",
+  code_wrong: "Kein Besuch hat diesen Code. Bitte vergleichen Sie ihn mit Ihrer Notiz.",
+  code_wait: "Zu viele Versuche. Bitte warten Sie eine Minute.",
+  code_anew: "Ich habe keinen Code: neu beginnen",
+
   gate_title: "Die Studie kann hier nicht gezeigt werden",
   gate_open_title: "Bevor Sie beginnen",
   gate_insecure:

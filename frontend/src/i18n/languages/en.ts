@@ -179,6 +179,19 @@ export const messages = {
   problem:
     "What you have done so far is kept. Load the page again; if this comes back, please write to the person who invited you: {detail}",
 
+  resume_note:
+    "Resume code: {code}. Note it down: with it you can go on on another device, or if this browser forgets you. The link or your sign-up number alone is not enough, so that nobody else can take over your visit.",
+  code_open: "I have a resume code",
+  code_title: "Go on where you stopped",
+  code_needed:
+    "A visit under your sign-up has begun in another browser. Go on there, or enter the resume code that it showed. We ask because others may know your sign-up number.",
+  code_over: "A visit under your sign-up is over. Its resume code shows the last page again.",
+  code_enter: "Enter the code that the page showed with the instructions, in the breaks and when you paused.",
+  code_label: "Resume code",
+  code_wrong: "No visit has this code. Please compare it with what you noted.",
+  code_wait: "Too many tries. Please wait a minute.",
+  code_anew: "I have no code: begin anew",
+
   gate_title: "The study cannot be shown here",
   gate_open_title: "Before you begin",
   gate_insecure:

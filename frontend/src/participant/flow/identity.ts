@@ -52,9 +52,27 @@ export class Identity {
     return fresh;
   }
 
+  /** The resume code that was entered here: the visit belongs to another browser's client id. */
+  get code(): string | null {
+    try {
+      return this.storage?.getItem(`${this.key} code`) ?? null;
+    } catch {
+      return null;
+    }
+  }
+
+  keepCode(code: string): void {
+    try {
+      this.storage?.setItem(`${this.key} code`, code);
+    } catch {
+      // Full or blocked: the code is then asked for again.
+    }
+  }
+
   forget(): void {
     this.own = null;
     this.storage?.removeItem(this.key);
+    this.storage?.removeItem(`${this.key} code`);
   }
 
   private read(): string | null {

@@ -6,8 +6,14 @@ import { button, showPage } from "../../ui/page";
 import { emptied } from "../screens/notice";
 import { setLanguage } from "./appearance";
 
-/** Resolves with the language chosen when the participant starts. */
-export function startPage(root: HTMLElement, link: LinkState, language: string): Promise<string> {
+export interface Beginning {
+  language: string;
+  /** The visit began elsewhere, and its resume code is at hand. */
+  has_code: boolean;
+}
+
+/** Resolves with what was chosen when the participant starts. */
+export function startPage(root: HTMLElement, link: LinkState, language: string): Promise<Beginning> {
   return new Promise((resolve) => {
     const display = emptied(root);
     const draw = (chosen: string): void => {
@@ -15,11 +21,12 @@ export function startPage(root: HTMLElement, link: LinkState, language: string):
       const t = translator(chosen);
       const picker = link.study.languages.length > 1 ? languagePicker(link.study.languages, chosen, t("choose_language"), draw) : null;
       const preview = link.kind === "preview" ? h("p", { class: "help" }, t("preview_note")) : null;
-      const start = button(t("start_study"), () => resolve(chosen));
+      const start = button(t("start_study"), () => resolve({ language: chosen, has_code: false }));
+      const code = link.kind === "general" ? button(t("code_open"), () => resolve({ language: chosen, has_code: true }), "plain") : null;
       showPage(display, {
         title: link.study.title,
         body: [h("p", { class: "lead" }, t("minutes", { minutes: Math.ceil(link.study.expected_minutes) })), preview, picker],
-        actions: [start],
+        actions: [start, code],
       });
     };
     draw(language);

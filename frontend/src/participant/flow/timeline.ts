@@ -7,6 +7,7 @@ import { finish } from "../screens/finish";
 import { formPage } from "../screens/form";
 import { needsScreenSetup, screenSetup } from "../screens/screen-setup";
 import { textPage } from "../screens/text-page";
+import { codeNote } from "../screens/support";
 import { counted, type Session } from "../session";
 import { blockNodes, practiceNodes, restNodes } from "./blocks";
 import { enterStage } from "./stages";
@@ -52,7 +53,7 @@ function introduction(session: Session, eyebrow: string): Node {
   const back = session.answered > 0;
   const welcome = `# ${t("welcome_back_title")}\n\n${t("welcome_back", { done: session.answered, total })}\n\n`;
   const text = back ? welcome + run.texts.instructions.replace(/^(\s*)# /, "$1## ") : run.texts.instructions;
-  return trial(textPage(session), { eyebrow, text, action: t("continue"), remarks: "" });
+  return trial(textPage(session), { eyebrow, text, action: t("continue"), remarks: codeNote(session) });
 }
 
 function middle(session: Session): Node[] {

@@ -5,7 +5,7 @@ import { button, showPage } from "../../ui/page";
 import { progressBar } from "../../ui/progress";
 import { INT, plugin, type PluginClass } from "../jspsych";
 import { counted, type Session } from "../session";
-import { choose, stopButton } from "./support";
+import { choose, codeNote, stopButton } from "./support";
 
 interface Parameters {
   block: number;
@@ -48,7 +48,7 @@ async function rest(session: Session, display: HTMLElement, { block, blocks, sec
   const text = markdown(run.texts.block_break || `# ${t("break_part", { block, blocks })}`);
   const section = showPage(display, {
     eyebrow: t("break_part", { block, blocks }),
-    body: [h("div", { class: "prose" }, ...text), bar.element, count, wait, footer],
+    body: [h("div", { class: "prose" }, ...text), bar.element, count, wait, footer, h("p", { class: "help" }, codeNote(session))],
   });
   section.classList.add("break");
   section.append(stopButton(session));

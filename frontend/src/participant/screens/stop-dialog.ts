@@ -2,6 +2,7 @@
 import { h } from "../../ui/element";
 import { button } from "../../ui/page";
 import { showNotice } from "./notice";
+import { codeNote } from "./support";
 import type { Session } from "../session";
 
 export function openStopDialog(session: Session): void {
@@ -38,5 +39,6 @@ async function withdrawn(session: Session): Promise<void> {
 function end(session: Session, what: "paused" | "withdrawn"): void {
   const { t } = session;
   session.over.abort();
-  showNotice(session.root, { title: t(`${what}_title`), text: t(what) });
+  const more = what === "paused" ? [h("p", {}, codeNote(session))] : [];
+  showNotice(session.root, { title: t(`${what}_title`), text: t(what), more });
 }

@@ -60,6 +60,11 @@ export async function screenOut(session: Session, reason: string, data: object):
   return new Promise(() => {});
 }
 
+/** The resume code and what it is for; empty where the link itself resumes. */
+export function codeNote({ run, t }: Pick<Session, "run" | "t">): string {
+  return run.resume_code ? t("resume_note", { code: run.resume_code }) : "";
+}
+
 /** The quiet way out, in the corner of pages between the trials. */
 export function stopButton(session: Session): HTMLElement {
   return h(
