@@ -40,11 +40,19 @@ if (site === "participant") {
   const kindOf = (file) => kinds.find((kind) => file.startsWith(`${kind}-`)) ?? null;
   const filesOfKind = (kind) => names.map(({ name }) => name).filter((name) => kindOf(name) === kind);
   const total = (kind) => sum(filesOfKind(kind));
+  const languages = readdirSync(new URL("../src/i18n/languages/", import.meta.url)).map((name) => name.replace(/\.ts$/, ""));
+  const ofLanguages = names.map(({ name }) => name).filter((name) => languages.some((tag) => new RegExp(`^${tag}-.{8}\\.js$`).test(name)));
+  if (ofLanguages.length !== languages.length) {
+    console.error(`error: expected a file for each of ${languages.join(", ")} in dist/participant, found ${ofLanguages.join(", ")}`);
+    process.exitCode = 1;
+  }
+  // Who reads the study in one language loads one; a second only where the browser's own is not among the study's.
+  const apart = sum(ofLanguages) - Math.max(...ofLanguages.map(bytesOf));
   for (const kind of kinds.filter((one) => filesOfKind(one).length === 0)) {
     console.error(`error: expected a file of the kind ${kind} in dist/participant, found none; build the page again`);
     process.exitCode = 1;
   }
-  report(total(null) + Math.max(...kinds.map(total)), "participant bundle with the largest kind of trial");
+  report(total(null) - apart + Math.max(...kinds.map(total)), "participant bundle with the largest kind of trial and language");
 } else if (!existsSync(manifestFile)) {
   console.error("error: expected dist/admin/.vite/manifest.json; build the site first");
   process.exitCode = 1;

@@ -1,15 +1,19 @@
 /** The message catalogue: every sentence the page itself says. Study texts come from the declaration. */
-import { messages as en, type Messages } from "./languages/en";
+import type { Messages } from "./languages/en";
 
 export type MessageKey = keyof Messages;
 export type Translate = (key: MessageKey, values?: Record<string, string | number>) => string;
 
-/** A file a language, named by its tag: nothing else needs to know of it. */
-const files = import.meta.glob<Messages>("./languages/*.ts", { eager: true, import: "messages" });
-const catalogues: Record<string, Messages> = Object.fromEntries(Object.entries(files).map(([path, messages]) => [tagIn(path), messages]));
+/** A file a language, named by its tag: nothing else needs to know of it. A page loads those it speaks. */
+const files = import.meta.glob<Messages>("./languages/*.ts", { import: "messages" });
+const loaders = Object.fromEntries(Object.entries(files).map(([path, load]) => [tagIn(path), load]));
+const catalogues: Partial<Record<string, Messages>> = {};
 
 /** Languages that the page speaks itself. English first: it stands in for all others. */
-export const SHIPPED = ["en", ...Object.keys(catalogues).filter((tag) => tag !== "en")];
+export const SHIPPED = ["en", ...Object.keys(loaders).filter((tag) => tag !== "en")];
+
+const TRIES = 5;
+const AGAIN_MS = 1_000;
 
 const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ku", "ps", "sd", "ug", "ur", "yi"]);
 
@@ -17,10 +21,26 @@ function tagIn(path: string): string {
   return path.replace(/^.*\/|\.ts$/g, "");
 }
 
-/** Messages in `language`, in English where no catalogue of that language is shipped. */
+function shipped(language: string): string {
+  return [language, language.slice(0, 2)].find((tag) => SHIPPED.includes(tag)) ?? "en";
+}
+
+/** Fetch the messages of `language`, English where none are shipped. What cannot be had is tried again, then done without. */
+export async function loadMessages(language: string): Promise<void> {
+  const tag = shipped(language);
+  for (let tries = 1; !catalogues[tag] && tries <= TRIES; tries += 1) {
+    try {
+      catalogues[tag] = await loaders[tag]?.();
+    } catch {
+      await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+    }
+  }
+}
+
+/** Messages in `language` as `loadMessages` has fetched them; those of another language where it could not. */
 export function translator(language: string): Translate {
-  const messages = catalogues[language] ?? catalogues[language.slice(0, 2)] ?? en;
-  return (key, values = {}) => messages[key].replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
+  const messages = catalogues[shipped(language)] ?? Object.values(catalogues)[0];
+  return (key, values = {}) => (messages?.[key] ?? key).replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
 }
 
 export function direction(language: string): "rtl" | "ltr" {

@@ -2,7 +2,7 @@
 import "./style/index.css";
 import type { LinkState, RunStarted, RunState } from "../api/schema";
 import { Refused } from "./request";
-import { preferred, SHIPPED, translator, type Translate } from "../i18n";
+import { loadMessages, preferred, SHIPPED, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround } from "./flow/appearance";
 import { ended } from "./flow/ended";
 import { abilities, type Abilities, findings, type GateFinding } from "./flow/gates";
@@ -42,7 +42,9 @@ interface Entry {
 }
 
 export async function main(root: HTMLElement): Promise<void> {
-  let t = translator(preferred(SHIPPED, navigator.languages));
+  const spoken = preferred(SHIPPED, navigator.languages);
+  await loadMessages(spoken);
+  let t = translator(spoken);
   const fail = (error: unknown): void => showProblem(root, t, error);
   window.addEventListener("unhandledrejection", (event) => fail(event.reason));
   const link_token = location.pathname.split("/").filter(Boolean).at(-1) ?? "";
@@ -51,6 +53,7 @@ export async function main(root: HTMLElement): Promise<void> {
     const { link, kept } = await reach(root, t, link_token, keeping.read());
     setSurround(link.study.background);
     const language = preferred(link.study.languages, navigator.languages);
+    await loadMessages(language);
     setLanguage(language);
     document.title = link.study.title;
     t = translator(language);
@@ -84,12 +87,7 @@ async function visit(entry: Entry): Promise<void> {
 /** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
 async function begun({ root, link_token }: Entry, identity: Identity, { language, has_code }: Beginning): Promise<RunStarted> {
   const t = translator(language);
-  const start = {
-    language,
-    query: recruiterQuery(location.search),
-    device: { user_agent: navigator.userAgent },
-    evidence: true,
-  };
+  const start = { language, query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent }, evidence: true };
   const claimed = (claim: Claim): Promise<RunStarted> => startRun(link_token, { ...start, client_id: identity.client_id(), ...claim });
   const kept = identity.code;
   if (has_code) return codePage(root, t, "code_enter", identity, claimed);
@@ -133,6 +131,7 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   const run = kept?.run ?? (await persistently(root, t, () => fetchRun(started.run_token)));
   if (!kept) keeping.begin({ link, started, run });
   const kind = known ?? (await loadKind(run.trial.kind));
+  await loadMessages(run.language);
   const session = openSession({ root, link, run, kind, outbox, unsent });
   setLanguage(run.language);
   const over = (): Promise<void> => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { direction, pick, preferred, SHIPPED, translator } from "../../src/i18n";
+import { direction, loadMessages, pick, preferred, SHIPPED, translator } from "../../src/i18n";
 import { messages as en, type Messages } from "../../src/i18n/languages/en";
 import { recruiterQuery } from "../../src/participant/flow/identity";
 import { parseBlocks } from "../../src/ui/markdown";
@@ -17,7 +17,8 @@ describe("messages", () => {
     expect(SHIPPED).toHaveLength(Object.keys(files).length);
     expect(SHIPPED).toContain("de");
   });
-  it("are filled in, and fall back to English", () => {
+  it("are filled in, and fall back to English", async () => {
+    await Promise.all(["en", "de", "fi"].map(loadMessages));
     expect(translator("de")("step", { step: 1, steps: 4 })).toBe("Schritt 1 von 4");
     expect(translator("fi")("continue")).toBe("Continue");
   });

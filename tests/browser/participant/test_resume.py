@@ -124,3 +124,32 @@ def test_stopping_pauses_or_withdraws(server: ServerProcess, tmp_path: Path, pag
     assert [row["status"] for row in server.rows("SELECT status FROM study_runs")] == ["withdrawn"]
     visit.open(study.link_token)
     page.wait_for_selector("text=You have withdrawn")
+
+
+def test_a_resume_code_goes_on_in_another_browser_and_an_id_alone_does_not(
+    server: ServerProcess, tmp_path: Path, page: Page, chromium: Browser
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    link = server.link(study, "general", recruiter={"kind": "sona"})
+    visit = Visit(page, server.address).open(link, "?survey_code=40177").begin()
+    note = page.wait_for_selector("text=Resume code:")
+    code = note.inner_text().split("Resume code: ")[1].split(".")[0]
+    visit.instructions().practice().trials(most=2)
+    with chromium.new_context() as elsewhere:
+        other = Visit(elsewhere.new_page(), server.address).open(link, "?survey_code=40177")
+        other.page.click(".primary")
+        other.page.wait_for_selector("text=others may know your sign-up number")
+        assert axe_violations(other.page) == []
+        field = other.page.get_by_label("Resume code")
+        field.fill("0000-0000-0000")
+        field.press("Enter")
+        other.page.wait_for_selector("text=No visit has this code")
+        field.fill(code.lower())
+        field.press("Enter")
+        other.page.wait_for_selector("text=Welcome back")
+        other.open(link, "?survey_code=40177")  # this browser keeps the code
+        other.page.wait_for_selector("text=Welcome back")
+        assert other.instructions().trials() == 4
+    assert len(server.rows(RATED)) == 6
+    assert len(server.rows("SELECT id FROM study_runs")) == 1

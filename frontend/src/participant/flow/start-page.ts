@@ -1,6 +1,6 @@
 /** The first page: what this is, how long it takes, in which language. */
 import type { LinkState } from "../../api/schema";
-import { languageName, translator } from "../../i18n";
+import { languageName, loadMessages, translator } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
 import { button, showPage } from "../../ui/page";
 import { emptied } from "../screens/notice";
@@ -16,10 +16,14 @@ export interface Beginning {
 export function startPage(root: HTMLElement, link: LinkState, language: string): Promise<Beginning> {
   return new Promise((resolve) => {
     const display = emptied(root);
-    const draw = (chosen: string): void => {
+    const draw = async (chosen: string): Promise<void> => {
+      await loadMessages(chosen);
       setLanguage(chosen);
       const t = translator(chosen);
-      const picker = link.study.languages.length > 1 ? languagePicker(link.study.languages, chosen, t("choose_language"), draw) : null;
+      const picker =
+        link.study.languages.length > 1
+          ? languagePicker(link.study.languages, chosen, t("choose_language"), (one) => void draw(one))
+          : null;
       const preview = link.kind === "preview" ? h("p", { class: "help" }, t("preview_note")) : null;
       const start = button(t("start_study"), () => resolve({ language: chosen, has_code: false }));
       const code = link.kind === "general" ? button(t("code_open"), () => resolve({ language: chosen, has_code: true }), "plain") : null;
@@ -29,7 +33,7 @@ export function startPage(root: HTMLElement, link: LinkState, language: string):
         actions: [start, code],
       });
     };
-    draw(language);
+    void draw(language);
   });
 }
 
