@@ -13,7 +13,6 @@ from server.accounts.identity import Identity, NotSignedIn, Viewer, identify
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
-from server.monitor.heat import HeatMaps
 from server.monitor.schemas import MonitorSnapshot
 from server.studies.lookup import active_definition, find_study
 
@@ -23,14 +22,13 @@ LOOK_S = 0.2
 """How often a stream that waits looks whether the server is to end."""
 RETRY_MS = 1000
 """After so long a browser whose stream ended connects again."""
-_maps = HeatMaps()
 
 
 def _snapshot(services: Services, name: str, who: Identity) -> MonitorSnapshot:
     with services.database.read() as session:
         study = find_study(session, name)
         lease = timedelta(minutes=active_definition(session, study).session.lease_minutes)
-        shown = service.snapshot(session, study, _maps.of(study.id), lease)
+        shown = service.snapshot(session, study, lease)
     if who.sees_persons:
         return shown
     nameless = [run.model_copy(update={"participant": run.run}) for run in shown.runs]

@@ -60,4 +60,5 @@ class MonitorSnapshot(BaseModel):
     expected_finish: datetime | None = Field(
         description="When the quota will be full at the pace of the last day; null where it cannot be said."
     )
-    runs: list[MonitoredRun]
+    total: int = Field(description="Runs there are, previews aside.")
+    runs: list[MonitoredRun] = Field(description="The latest, in the order they began; not more than 500.")

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import ColumnElement, Select, case, delete, func, select
+from sqlalchemy import ColumnElement, Select, delete, func, select
 from sqlalchemy.orm import Session, joinedload
 
 from server.errors import NotFound
@@ -71,10 +71,9 @@ def page_of_runs(
 
 def answered(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]]:
     """Run number -> (trials answered, plays that were flagged or failed); for one page of runs."""
-    bad = func.sum(case((Rating.verdict.in_(("flagged", "failed")), 1), else_=0))
-    query = select(Rating.study_run_id, func.count(Rating.trial_index.distinct()), bad)
-    query = query.where(Rating.study_run_id.in_(runs)).group_by(Rating.study_run_id)
-    return {run: (int(done), int(not_good or 0)) for run, done, not_good in session.execute(query)}
+    query = select(RunTally.study_run_id, RunTally.heat, RunTally.not_good)
+    rows = session.execute(query.where(RunTally.study_run_id.in_(runs)))
+    return {run: (len(heat) - heat.count("."), not_good) for run, heat, not_good in rows}
 
 
 def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, VersionClip | None]]:

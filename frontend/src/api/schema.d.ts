@@ -3027,7 +3027,15 @@ export interface components {
              * @description When the quota will be full at the pace of the last day; null where it cannot be said.
              */
             expected_finish: string | null;
-            /** Runs */
+            /**
+             * Total
+             * @description Runs there are, previews aside.
+             */
+            total: number;
+            /**
+             * Runs
+             * @description The latest, in the order they began; not more than 500.
+             */
             runs: components["schemas"]["MonitoredRun"][];
         };
         /**

@@ -54,10 +54,8 @@ def test_who_takes_the_place_of_a_deleted_preview_gets_a_row_of_her_own(
     client: TestClient,
     services: Services,
     study: StudyInDatabase,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """SQLite gives the numbers of deleted runs and ratings to the next ones."""
-    monkeypatch.setattr("server.monitor.heat._READ_AGAIN", 0)
     preview = Participant(client, study.link("preview")).agree()
     for trial in preview.state()["trials"][:3]:
         preview.rate(trial)
@@ -69,3 +67,18 @@ def test_who_takes_the_place_of_a_deleted_preview_gets_a_row_of_her_own(
     person.rate(trials[1])
     [run] = viewer.get("/studies/short/monitor").json()["runs"]
     assert run["heat"] == ".g" + "." * 10
+
+
+def test_every_run_is_counted_and_the_latest_are_listed(
+    viewer: Admin, client: TestClient, study: StudyInDatabase, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.monitor.service.MAX_LISTED", 2)
+    people = [Participant(client, study.link_token).agree() for _ in range(3)]
+    people[0].answer_all()
+    assert people[0].request("POST", "/complete").status_code == 200
+    study.change(quota=5)
+    shown = viewer.get("/studies/short/monitor").json()
+    assert [run["run"] for run in shown["runs"]] == [one.run_id for one in people[1:]]
+    assert (shown["total"], shown["complete"], shown["active"]) == (3, 1, 2)
+    reached = {step["stage"]: step["runs"] for step in shown["funnel"]}
+    assert (reached["consent"], reached["done"]) == (3, 1)

@@ -161,13 +161,12 @@ def test_the_monitor_counts_who_was_screened_out(screened: Screened, services: S
     from datetime import timedelta
 
     from server.models import Study
-    from server.monitor.heat import HeatMap
     from server.monitor.service import snapshot
 
     screened().request("PUT", "/forms/about", {"answers": {"age": 90}})
     screened()
     with services.database.read() as session:
         study = session.query(Study).filter_by(name="screened").one()
-        shown = snapshot(session, study, HeatMap(), timedelta(hours=1))
+        shown = snapshot(session, study, timedelta(hours=1))
     assert (shown.active, shown.complete, shown.screened_out) == (1, 0, 1)
     assert {step.stage: step.runs for step in shown.funnel}["calibration"] == 0

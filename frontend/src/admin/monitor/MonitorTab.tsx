@@ -42,7 +42,7 @@ export function MonitorTab() {
         <>
           <SimpleGrid cols={{ base: 1, md: 2 }}>
             <Funnel steps={snapshot.funnel} />
-            <Quality runs={snapshot.runs} />
+            <Quality runs={snapshot.runs} of={snapshot.total} />
           </SimpleGrid>
           <RunTable study={study} snapshot={snapshot} />
         </>

@@ -1,10 +1,10 @@
-/** How the clips were shown so far, over all runs; at the same time the heat map's legend. */
+/** How the clips were shown so far, over the runs that are listed; at the same time the heat map's legend. */
 
 import { Card, Group, Stack, Text, Title } from "@mantine/core";
 import type { Schemas } from "../api";
 import { TRIAL_COLOURS } from "./colours";
 
-export function Quality({ runs }: { runs: Schemas["MonitoredRun"][] }) {
+export function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) {
   const total = (count: (run: Schemas["MonitoredRun"]) => number) => runs.reduce((sum, run) => sum + count(run), 0);
   const flagged = total((run) => run.flagged);
   const uncertain = total((run) => run.uncertain);
@@ -24,6 +24,11 @@ export function Quality({ runs }: { runs: Schemas["MonitoredRun"][] }) {
         <Title order={2} size="h4">
           How trials went
         </Title>
+        {of > runs.length && (
+          <Text size="sm" c="dimmed">
+            Of the latest {runs.length.toLocaleString()} runs; all {of.toLocaleString()} are under Participants and Results.
+          </Text>
+        )}
         {(Object.keys(counts) as (keyof typeof counts)[]).map((letter) => (
           <Group key={letter} gap="sm">
             <svg width={14} height={14} aria-hidden="true">
