@@ -80,6 +80,7 @@ class Kind:
     further_examples: of keys that exclude one another, so that the reference shows each.
     shares_clips: whether it follows [assignment] and factors between participants; else they are refused.
     plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
+    adapts: whether answers decide what is shown next: the server then follows its series.
     check_response: the number that an answer, as stored, is to an attention check, which asks for one.
     """
 
@@ -97,6 +98,7 @@ class Kind:
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     shares_clips: bool = False
+    adapts: bool = False
 
     @property
     def name(self) -> str:

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from server.context import DatabaseDep, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.participants import completion, links, runs
+from server.participants.next_trials import follow
 from server.participants.refusals import RunUnknown
 from server.participants.schemas import (
     CalibrationResult,
@@ -86,8 +87,13 @@ def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
 @router.get("/run")
 def get_run(services: ServicesDep, request: Request, token: RunToken) -> RunState:
     """Everything the page needs to begin or to go on."""
+    moment = services.time_of(request)
     with services.database.read() as session:
-        return runs.run_state(services, session, token, services.time_of(request))
+        state = runs.run_state(services, session, token, moment)
+    if any(trial.series for trial in state.trials) and follow(services, token) is not None:
+        with services.database.read() as session:
+            return runs.run_state(services, session, token, moment)
+    return state
 
 
 @router.put("/run/consent")

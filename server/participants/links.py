@@ -31,6 +31,7 @@ from server.participants.refusals import (
 from server.participants.schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
 from server.participants.screening import screens_devices
 from server.tokens import derived_token, hash_token, new_public_id, new_token
+from server.trials.series import service as series
 from server.versions import LoadedVersion
 
 RUN_PURPOSE = "run"
@@ -218,6 +219,8 @@ def _new_run(
         known_as = RecruiterIdentity(study_run_id=run.id, identifier=identifier, parameters=start.query)
         repository.add_all(session, [known_as])
     repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
+    if KINDS[loaded.experiment.trial.kind].adapts:
+        series.add_places(session.connection(), run, loaded, trials)
     return run, token
 
 

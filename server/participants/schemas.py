@@ -12,7 +12,7 @@ from experiments.rules import PlaybackRules
 from experiments.trials.union import AnyPage
 from server.evidence.schemas import Tickets
 from server.models import STAGES
-from server.trials.schemas import Role
+from server.trials.schemas import TrialInfo
 
 Stage = Literal[
     "consent",
@@ -103,42 +103,6 @@ class BlockInfo(BaseModel):
 
     block: int
     trials: int
-
-
-class TrialClip(BaseModel):
-    """One clip of a trial, and the role in which it is shown."""
-
-    role: Role
-    clip_sha256: str
-    clip_url: str
-    frames: int
-    fps: float
-    width_px: int
-    height_px: int
-    width_mm: float | None
-    inter_ocular_px: float | None
-
-
-class TrialInfo(BaseModel):
-    """One trial as the page needs it; nothing tells the participant which cell it is."""
-
-    trial_index: int
-    kind: Literal["practice", "main", "attention"]
-    block: int
-    clip_sha256: str | None
-    clip_url: str | None
-    frames: int | None
-    fps: float | None
-    bytes: int | None
-    width_px: int | None
-    height_px: int | None
-    width_mm: float | None
-    inter_ocular_px: float | None
-    clips: list[TrialClip] = Field(description="Every clip, in the order of its places.")
-    prompt: str | None = Field(description="Markdown of an attention check.")
-    plays_done: int
-    plays_wanted: int
-    answered: bool
 
 
 class CalibrationState(BaseModel):

@@ -2,9 +2,11 @@
 
 from sqlalchemy.orm import Session
 
+from experiments.trials import KINDS
 from server.models import StudyRun
 from server.participants import repository
-from server.participants.schemas import TrialClip, TrialInfo
+from server.trials.schemas import SeriesPlace, TrialClip, TrialInfo
+from server.trials.series import service as series
 from server.trials.verdict import is_settled
 from server.versions import LoadedVersion
 
@@ -13,6 +15,7 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
     """Every trial of a run; nothing in it tells the participant which cell a clip is of."""
     done, clips = repository.plays(session, run), repository.trial_clips(session, run)
     most = loaded.experiment.playback.max_repeats
+    places = _places(session, run, loaded)
     trials = []
     for row in repository.trials(session, run):
         shown = clips.get(row.trial_index, {})
@@ -20,6 +23,8 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
         clip = loaded.clips[first] if first is not None else None
         plays = done.get(row.trial_index, [])
         settled = any(is_settled(row.kind, play, verdict, most) for play, verdict in plays)
+        place, closed = places.get(row.trial_index, (None, False))
+        settled = settled or closed
         trials.append(
             TrialInfo(
                 trial_index=row.trial_index,
@@ -39,9 +44,20 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
                 plays_done=len(plays),
                 plays_wanted=len(plays) if settled else len(plays) + 1,
                 answered=settled,
+                series=place,
             )
         )
     return trials
+
+
+def _places(session: Session, run: StudyRun, loaded: LoadedVersion) -> dict[int, tuple[SeriesPlace, bool]]:
+    """Place in its series of each trial that has one, and whether that series ended before it."""
+    if not KINDS[loaded.experiment.trial.kind].adapts:
+        return {}
+    return {
+        index: (SeriesPlace(number=number, position=position, known=known), closed)
+        for index, number, position, known, closed in series.places(session.connection(), run.id, loaded)
+    }
 
 
 def _clip(loaded: LoadedVersion, role: str, clip_id: int) -> TrialClip:

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from sqlalchemy import select
 
 from experiments.errors import InputError
+from experiments.trials.threshold.declaration import Threshold
 from server.app import create_app
 from server.cli_common import migrated_services, out
 from server.context import Services
@@ -21,6 +22,7 @@ from server.settings import Settings
 from server.simulation.adversaries import act, manner_called, summary, write
 from server.simulation.http import JsonClient, Refused, running_server
 from server.simulation.manners import MANNERS
+from server.simulation.observer import observer_of
 from server.simulation.person import Person, Rater
 from server.studies.links import PURPOSE, create_link
 from server.studies.lookup import active_version, find_study
@@ -44,6 +46,13 @@ def simulate(
         str,
         typer.Option("--as", help=f"Manner of taking part, to try the evidence by: {', '.join(MANNERS)}."),
     ] = "",
+    observer: Annotated[
+        str,
+        typer.Option(
+            help="In a study of thresholds, the true function: threshold=200,spread=30,sd=10,guess=0.02,"
+            "lapse=0.02; sd is that of people's thresholds. What is left out is usual for the stimuli."
+        ),
+    ] = "",
     json_file: Annotated[
         Path | None, typer.Option("--json", help="With --as: file for the verdict and signals of each run.")
     ] = None,
@@ -61,6 +70,8 @@ def simulate(
       server simulate exp3 --participants 20
 
       server simulate exp3 --as http --participants 5 --json http.json
+
+      server simulate threshold_demo --participants 10 --observer threshold=180,spread=30,sd=15
     """
     settings = Settings()
     if manner:
@@ -78,14 +89,14 @@ def simulate(
     if json_file is not None:
         raise InputError("--json goes with --as, which gives the verdicts to write")
     with migrated_services(settings) as services:
-        token, levels = _prepare(services, study)
+        token, raters = _prepare(services, study, observer)
     people = range(seed * 1_000_000, seed * 1_000_000 + participants)
     with (
         _server(settings, url) as address,
         ThreadPoolExecutor(at_once) as pool,
         _bar(participants) as advance,
     ):
-        work = [pool.submit(_one, address, token, Rater(number, seed, levels)) for number in people]
+        work = [pool.submit(_one, address, token, raters(number, seed)) for number in people]
         ratings = 0
         for done in as_completed(work):
             try:
@@ -103,16 +114,16 @@ def _as(
     """Simulated people in a manner, with the verdict on each."""
     manner = manner_called(name)
     with migrated_services(settings) as services:
-        token, levels = _prepare(services, study)
-    raters = [Rater(number, people.start, levels) for number in people]
-    runs = act(settings, token, raters, manner, at_once)
+        token, raters = _prepare(services, study)
+    everyone = [raters(number, people.start) for number in people]
+    runs = act(settings, token, everyone, manner, at_once)
     if json_file is not None:
         write(json_file, study, name, runs)
     out.print(f"study {study}, {len(runs)} as {name}: {summary(runs)}")
 
 
-def _prepare(services: Services, name: str) -> tuple[str, dict[str, dict[str, str]]]:
-    """A link whose runs are simulated, and the levels of each clip."""
+def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Callable[[int, int], Rater]]:
+    """A link whose runs are simulated, and the maker of raters, who know the levels of each clip."""
     with services.database.write() as session:
         study = find_study(session, name)
         query = select(VersionClip.clip_sha256, VersionClip.levels)
@@ -122,7 +133,13 @@ def _prepare(services: Services, name: str) -> tuple[str, dict[str, dict[str, st
         link = create_link(
             session, services.settings.key, study, "general", label="simulation", synthetic=True
         )
-        return derived_token(services.settings.key, PURPOSE, link.public_id), levels
+        experiment, observer = services.versions.get(session, version.id).experiment, None
+        if isinstance(experiment.trial, Threshold):
+            observer = observer_of(experiment, levels, observed)
+        elif observed:
+            raise InputError(f"--observer: expected a study of thresholds, got {experiment.trial.kind}")
+        token = derived_token(services.settings.key, PURPOSE, link.public_id)
+    return token, lambda number, seed: Rater(number, seed, levels, observer)
 
 
 def _one(address: str, token: str, rater: Rater) -> int:

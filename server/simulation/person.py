@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from experiments.definition.forms import FormField
 from server.simulation.http import JsonClient
+from server.simulation.observer import Observer
 from server.trials.kinds import served
 
 LEVEL_SD, PERSON_SD, CLIP_SD = 0.5, 0.6, 0.2
@@ -25,13 +26,29 @@ class Rater:
     ----------
     seed: of this person. effects_seed: of the effects, shared by all people of a simulation.
     levels_of: levels of each clip by its hash; a real participant never learns them, so the effects are
-    put in from outside.
+    put in from outside. observer: their psychometric function, in a study of thresholds.
     """
 
-    def __init__(self, seed: int, effects_seed: int, levels_of: Mapping[str, Mapping[str, str]]) -> None:
+    def __init__(
+        self,
+        seed: int,
+        effects_seed: int,
+        levels_of: Mapping[str, Mapping[str, str]],
+        observer: Observer | None = None,
+    ) -> None:
         self.seed, self.effects_seed, self.levels_of = seed, effects_seed, levels_of
         self.rng = random.Random(f"{effects_seed}/person/{seed}")
         self.shift = self.rng.gauss(0, PERSON_SD)
+        own = random.Random(f"{effects_seed}/observer/{seed}")
+        self.observer = observer and observer.of_person(own)
+
+    def __call__(self, clip: str) -> float:
+        """How well this person likes a clip."""
+        return self.likes(clip)
+
+    def sees(self, clip: str) -> float:
+        """How likely this person says yes to a clip, or names it rightly; a guess without an observer."""
+        return self.observer.sees(clip) if self.observer else 0.5
 
     def likes(self, clip: str) -> float:
         """How well this person likes a clip: effects of levels and exemplar, and the person's own shift."""
@@ -51,6 +68,7 @@ class Person:
         self.client, self.rater, self.language = client, rater, language
         self.elapsed_ms = 0.0
         self.ratings = 0
+        self.following: dict[str, Any] | None = None
         self.brings_evidence = False
 
     def take_part(
@@ -68,6 +86,7 @@ class Person:
                 return None
             if self.rate(trial, state["trial"]):
                 self._offer_again(trial, due)
+            due = _following(due, self.following)
             progress()
         if not self._forms(state, "after"):
             return None
@@ -110,9 +129,10 @@ class Person:
     def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:
         """Play and rate one trial; True where the receipt asks for the clip again."""
         body = self.rating(trial, declared)
-        receipt = self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)["receipt"]
+        saved = self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)
         self.ratings += 1
-        return bool(receipt["again"])
+        self.following = saved.get("next")
+        return bool(saved["receipt"]["again"])
 
     def rating(self, trial: dict[str, Any], declared: dict[str, Any]) -> dict[str, Any]:
         """The rating as the page would send it."""
@@ -123,7 +143,7 @@ class Person:
         return {
             "trial_index": trial["trial_index"],
             "play": trial["plays_done"] + 1,
-            "answer": served(declared["kind"]).simulated(self.rater.likes, trial, declared, rng),
+            "answer": served(declared["kind"]).simulated(self.rater, trial, declared, rng),
             "rt": round(rt, 2),
             "rt_from_first_frame": round(rt + length_ms, 2),
             "time_elapsed": round(self.elapsed_ms, 2),
@@ -159,6 +179,18 @@ class Person:
         """Put the trial at the end of its block."""
         place = sum(1 for other in due if other["block"] == trial["block"])
         due.insert(place, {**trial, "plays_done": trial["plays_done"] + 1})
+
+
+def _following(due: list[dict[str, Any]], following: dict[str, Any] | None) -> list[dict[str, Any]]:
+    """The trials due as the server has chosen them anew, without those of ended series."""
+    if following is None:
+        return due
+    anew = {trial["trial_index"]: trial for trial in following["trials"]}
+    return [
+        anew.get(trial["trial_index"], trial)
+        for trial in due
+        if trial["plays_done"] or trial["trial_index"] not in following["closed"]
+    ]
 
 
 def _frames(trial: dict[str, Any]) -> int:

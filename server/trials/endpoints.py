@@ -3,11 +3,14 @@
 from uuid import UUID
 
 from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from sqlalchemy import Connection
 
+from experiments.trials import KINDS
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.participants.endpoints import RunToken
+from server.participants.next_trials import next_trials
 from server.trials import service
 from server.trials.schemas import RatingIn, RatingSaved, Receipt
 
@@ -26,6 +29,11 @@ async def put_rating(
         return service.save_rating(*work, received_at)
 
     receipt, is_new = await services.group_commit.run(token, save)
-    content = RatingSaved(receipt=receipt).model_dump_json()
+    adapts = KINDS[rating.answer.kind].adapts
+    if adapts:
+        receipt, following = await run_in_threadpool(next_trials, services, token, receipt)
+        content = RatingSaved(receipt=receipt, next=following).model_dump_json()
+    else:
+        content = RatingSaved(receipt=receipt).model_dump_json(exclude={"next"})
     # A finished response, so that FastAPI does not validate and encode the receipt once more.
     return Response(content, 201 if is_new else 200, media_type="application/json")  # type: ignore[return-value]

@@ -106,6 +106,53 @@ class RatingIn(BaseModel):
         return data
 
 
+class TrialClip(BaseModel):
+    """One clip of a trial, and the role in which it is shown."""
+
+    role: Role
+    clip_sha256: str
+    clip_url: str
+    frames: int
+    fps: float
+    width_px: int
+    height_px: int
+    width_mm: float | None
+    inter_ocular_px: float | None
+
+
+class SeriesPlace(BaseModel):
+    """Where a trial stands in an adaptive series, and how much of it the choice of its clip knew."""
+
+    number: int = Field(description="Which series, from 0.")
+    position: int = Field(description="Place in the series, from 1.")
+    known: int = Field(
+        description="Answers of the series that the choice rests on; sent back with the answer."
+    )
+
+
+class TrialInfo(BaseModel):
+    """One trial as the page needs it; nothing tells the participant which cell it is."""
+
+    trial_index: int
+    kind: Literal["practice", "main", "attention"]
+    block: int
+    clip_sha256: str | None
+    clip_url: str | None
+    frames: int | None
+    fps: float | None
+    bytes: int | None
+    width_px: int | None
+    height_px: int | None
+    width_mm: float | None
+    inter_ocular_px: float | None
+    clips: list[TrialClip] = Field(description="Every clip, in the order of its places.")
+    prompt: str | None = Field(description="Markdown of an attention check.")
+    plays_done: int
+    plays_wanted: int
+    answered: bool
+    series: SeriesPlace | None = Field(default=None, description="Of trials that answers decide on.")
+
+
 class Receipt(BaseModel):
     """The rating is on disk."""
 
@@ -120,7 +167,17 @@ class Receipt(BaseModel):
     )
 
 
+class NextTrials(BaseModel):
+    """What an answer changes of the trials to come, in a study whose answers decide what is shown."""
+
+    trials: list[TrialInfo] = Field(description="The next trials of each series, as chosen from all answers.")
+    closed: list[int] = Field(description="Trials that need no answer, since their series has ended.")
+
+
 class RatingSaved(BaseModel):
     """The answer to a rating."""
 
     receipt: Receipt
+    next: NextTrials | None = Field(
+        default=None, description="Where answers decide what is shown next; left out where they do not."
+    )

@@ -6,6 +6,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.definition import Experiment
+from experiments.trials import KINDS
 from server.errors import Conflict, Invalid, NotFound
 from server.evidence.intake import Answer, Intake
 from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
@@ -16,6 +17,7 @@ from server.tokens import hash_token
 from server.trials import repository
 from server.trials.kinds import Part, served
 from server.trials.schemas import RatingIn, Receipt
+from server.trials.series import service as series
 from server.trials.verdict import Ruling, is_settled
 from server.versions import LoadedVersion, Versions
 
@@ -57,6 +59,9 @@ def save_rating(
             f"Trial {rating.trial_index} is not in this run, which has trials 0 to {run.trials_total - 1}."
         )
     loaded = versions.get(connection, run.version_id)
+    adapts = KINDS[loaded.experiment.trial.kind].adapts
+    if adapts:
+        trial = series.as_offered(connection, run.id, trial, rating)
     stored = repository.stored_ratings(connection, run.id, rating.trial_index, rating_id)
     kind = loaded.experiment.trial.kind
     answer = rating.answer.stored()
@@ -76,6 +81,8 @@ def save_rating(
     _count(connection, run.id, trial, _play(loaded, trial, rating, answer, ruling))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
     before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
+    if adapts and series.take(connection, run.id, loaded, trial, rating, ruling):
+        before = True
     answered = int(settles and not before)
     elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)
     repository.mark_seen(connection, run.id, saved_at, elapsed, answered)

@@ -81,4 +81,5 @@ THRESHOLD = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     check_response=check_response,
+    adapts=True,
 )

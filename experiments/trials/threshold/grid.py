@@ -72,6 +72,11 @@ def clip_of(experiment: "Experiment", levels: dict[str, str], stimulus: str, exe
     return ClipSpec(tuple((name, every[name]) for name in experiment.factor_names), exemplar)
 
 
+def exemplar_at(experiment: "Experiment", position: int) -> int:
+    """Exemplar of the clips at a place (from 1) of a series: they go round, whatever the stimulus is."""
+    return 1 + position % experiment.exemplars.per_cell
+
+
 def standard_of(trial: Threshold) -> str | None:
     """The level shown for comparison; None where one clip is shown."""
     return trial.task.standard if isinstance(trial.task, TwoInterval) else None

@@ -7,7 +7,7 @@ from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec
 from experiments.trials.threshold.declaration import Series, Stop, threshold_of
-from experiments.trials.threshold.grid import clip_of, model, series_of, standard_of, stimuli
+from experiments.trials.threshold.grid import clip_of, exemplar_at, model, series_of, standard_of, stimuli
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -26,7 +26,6 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
     rng = random.Random(seed)
     trials = [_practice(experiment, rng) for _ in range(experiment.practice.trials)]
     done = dict.fromkeys((one.name for one in series_of(experiment)), 0)
-    starts = {name: rng.randrange(experiment.exemplars.per_cell) for name in done}
     for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
         main: list[Trial] = []
         here = _series_in(experiment, block)
@@ -37,8 +36,7 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
                 place = done[one.name]
                 done[one.name] += 1
                 level = _spread(list(stimuli(experiment).values()), place)
-                exemplar = 1 + (starts[one.name] + place) % experiment.exemplars.per_cell
-                shown = _shown(experiment, one, level, exemplar, rng)
+                shown = _shown(experiment, one, level, exemplar_at(experiment, place + 1), rng)
                 main.append(Trial("main", number, block.label, shown, series=one.name))
         if main:
             trials.extend(with_attention(experiment, main, rng, lambda draw: draw.randint(1, 2)))

@@ -3315,6 +3315,22 @@ export interface components {
             note?: string;
         };
         /**
+         * NextTrials
+         * @description What an answer changes of the trials to come, in a study whose answers decide what is shown.
+         */
+        NextTrials: {
+            /**
+             * Trials
+             * @description The next trials of each series, as chosen from all answers.
+             */
+            trials: components["schemas"]["TrialInfo"][];
+            /**
+             * Closed
+             * @description Trials that need no answer, since their series has ended.
+             */
+            closed: number[];
+        };
+        /**
          * NumberField
          * @description A whole number within limits, such as an age in years.
          */
@@ -3735,6 +3751,8 @@ export interface components {
          */
         RatingSaved: {
             receipt: components["schemas"]["Receipt"];
+            /** @description Where answers decide what is shown next; left out where they do not. */
+            next?: components["schemas"]["NextTrials"] | null;
         };
         /**
          * Receipt
@@ -4550,6 +4568,27 @@ export interface components {
             runs: {
                 [key: string]: number;
             };
+        };
+        /**
+         * SeriesPlace
+         * @description Where a trial stands in an adaptive series, and how much of it the choice of its clip knew.
+         */
+        SeriesPlace: {
+            /**
+             * Number
+             * @description Which series, from 0.
+             */
+            number: number;
+            /**
+             * Position
+             * @description Place in the series, from 1.
+             */
+            position: number;
+            /**
+             * Known
+             * @description Answers of the series that the choice rests on; sent back with the answer.
+             */
+            known: number;
         };
         /**
          * Session
@@ -5408,6 +5447,8 @@ export interface components {
             plays_wanted: number;
             /** Answered */
             answered: boolean;
+            /** @description Of trials that answers decide on. */
+            series?: components["schemas"]["SeriesPlace"] | null;
         };
         /**
          * TwoInterval
@@ -5725,6 +5766,7 @@ export type NewStudy = components['schemas']['NewStudy'];
 export type NewToken = components['schemas']['NewToken'];
 export type NewTokenOut = components['schemas']['NewTokenOut'];
 export type NewVersion = components['schemas']['NewVersion'];
+export type NextTrials = components['schemas']['NextTrials'];
 export type NumberField = components['schemas']['NumberField'];
 export type OneAfterTheOther = components['schemas']['OneAfterTheOther'];
 export type Option = components['schemas']['Option'];
@@ -5767,6 +5809,7 @@ export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
 export type SeenClip = components['schemas']['SeenClip'];
 export type Series = components['schemas']['Series'];
 export type SeriesOut = components['schemas']['SeriesOut'];
+export type SeriesPlace = components['schemas']['SeriesPlace'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];

@@ -7,7 +7,7 @@ import random
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args
 
 from experiments.definition import Experiment
 from experiments.trials.kind import Answer
@@ -20,8 +20,16 @@ if TYPE_CHECKING:
     from server.versions import LoadedVersion
 
 Part = Literal["practice", "main", "attention"]
-Preference = Callable[[str], float]
-"""How well a simulated person likes the clip with this hash, 0 being neutral."""
+
+
+class Preference(Protocol):
+    """A simulated person. Called: how well they like the clip with this hash, 0 being neutral."""
+
+    def __call__(self, clip: str, /) -> float:
+        """How well they like it."""
+
+    def sees(self, clip: str, /) -> float:
+        """How likely they say yes to it, or name it rightly: their psychometric function."""
 
 
 def asked_in(prompt: str) -> int:

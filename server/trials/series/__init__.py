@@ -1,0 +1,1 @@
+"""Adaptive series: what was answered decides what is shown next."""

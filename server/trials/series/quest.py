@@ -1,0 +1,147 @@
+"""QUEST+ (Watson 2017, Journal of Vision 17(3):10) by the library questplus: the one module that uses it.
+
+It is loaded with the first series that is followed, since it brings numpy, scipy and pandas with it; servers
+without such studies never load it (docs/decisions/0505). Equal answers give equal estimates and choices.
+"""
+
+import math
+import threading
+import warnings
+from collections import OrderedDict
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from experiments.trials.threshold.grid import Model
+
+if TYPE_CHECKING:
+    from questplus import QuestPlus
+
+YES, NO = "yes", "no"
+MAX_STATES = 4096
+"""Posteriors kept: participants of one study share the first ones, and each answer needs that before it."""
+
+Answers = tuple[tuple[float, bool], ...]
+"""Stimulus and whether the answer was yes (or right), in the order of answering."""
+
+
+class Estimate(NamedTuple):
+    """What is known after some answers: means over the posterior, its SD, and its entropy in bits."""
+
+    threshold: float
+    threshold_sd: float
+    spread: float
+    entropy: float
+
+
+@dataclass(frozen=True)
+class _State:
+    posterior: Any
+    chosen: float
+    yes_is_likelier: bool
+    estimate: Estimate
+
+
+_states: "OrderedDict[tuple[Model, Answers], _State]" = OrderedDict()
+_working = threading.Lock()
+
+
+def estimate(model: Model, answers: Answers) -> Estimate:
+    """The estimate after these answers."""
+    with _working:
+        return _after(model, answers).estimate
+
+
+def choices(model: Model, answers: Answers, count: int) -> list[float]:
+    """The stimuli of the next `count` trials.
+
+    The first is the one that leaves the least expected entropy. Those after it are chosen as if each one
+    before had got the answer that is likelier by the posterior.
+    """
+    chosen: list[float] = []
+    with _working:
+        for _ in range(count):
+            state = _after(model, answers)
+            chosen.append(state.chosen)
+            answers = (*answers, (state.chosen, state.yes_is_likelier))
+    return chosen
+
+
+def _after(model: Model, answers: Answers) -> _State:
+    """The state after these answers, from the longest beginning of them that is kept."""
+    begin = len(answers)
+    while begin and (model, answers[:begin]) not in _states:
+        begin -= 1
+    state = _states.get((model, answers[:begin])) or _kept(model, (), None)
+    _states.move_to_end((model, answers[:begin]))
+    for end in range(begin + 1, len(answers) + 1):
+        state = _kept(model, answers[:end], state)
+    return state
+
+
+def _kept(model: Model, answers: Answers, before: _State | None) -> _State:
+    with warnings.catch_warnings():
+        # Where a parameter has become impossible, the library takes the logarithm of 0 and leaves it out.
+        warnings.simplefilter("ignore")
+        state = _stepped(model, answers, before)
+    _states[model, answers] = state
+    while len(_states) > MAX_STATES:
+        _states.popitem(last=False)
+    return state
+
+
+def _stepped(model: Model, answers: Answers, before: _State | None) -> _State:
+    engine = _engine(model)
+    if before is None:
+        engine.posterior = engine.prior
+    else:
+        (stimulus, positive), engine.posterior = answers[-1], before.posterior
+        engine.update(stim=_spoken(model, stimulus), outcome={"response": YES if positive else NO})
+        engine.stim_history.clear()
+        engine.resp_history.clear()
+    chosen = engine.next_stim["intensity"]
+    likelihood = engine.likelihoods.sel(intensity=chosen, response=YES)
+    share = float((engine.posterior * likelihood).sum())
+    sign = -1 if model.falling else 1
+    return _State(engine.posterior, sign * chosen, share >= 0.5, _estimate(model, engine))
+
+
+def _estimate(model: Model, engine: "QuestPlus") -> Estimate:
+    threshold, spread = _names(model)
+    means = engine.param_estimate
+    values = engine.param_domain[threshold].tolist()
+    shares = engine.marginal_posterior[threshold].tolist()
+    variance = math.fsum(p * (v - means[threshold]) ** 2 for p, v in zip(shares, values, strict=True))
+    every = engine.posterior.values.ravel().tolist()
+    entropy = -math.fsum(p * math.log2(p) for p in every if p > 0)
+    sign = -1 if model.falling else 1
+    return Estimate(sign * means[threshold], math.sqrt(variance), means[spread], max(0.0, entropy))
+
+
+def _spoken(model: Model, stimulus: float) -> dict[str, float]:
+    return {"intensity": -stimulus if model.falling else stimulus}
+
+
+def _names(model: Model) -> tuple[str, str]:
+    return ("mean", "sd") if model.function == "normal" else ("threshold", "slope")
+
+
+@lru_cache(maxsize=64)
+def _engine(model: Model) -> "QuestPlus":
+    """The library's object for a function; its likelihoods are made once, its posterior is set each time."""
+    from questplus import QuestPlus
+
+    sign = -1 if model.falling else 1
+    threshold, spread = _names(model)
+    return QuestPlus(
+        stim_domain={"intensity": sorted(sign * number for number in model.stimuli)},
+        param_domain={
+            threshold: sorted(sign * number for number in model.thresholds),
+            spread: list(model.spreads),
+            "lower_asymptote": [model.guess],
+            "lapse_rate": [model.lapse],
+        },
+        outcome_domain={"response": [YES, NO]},
+        func="norm_cdf" if model.function == "normal" else "weibull",
+        stim_scale="linear",
+    )

@@ -1,0 +1,267 @@
+"""Adaptive series through the API: chosen from stored answers, marked where ahead, ended, exported."""
+
+import uuid
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.context import Services
+from server.export.formats import FORMATS
+from server.models import SeriesOffer, Study, StudyRun
+from server.simulation.observer import observer_of
+from server.simulation.person import Person, Rater
+from server.trials.series import quest
+from server.trials.series import service as series
+from server.versions import Versions
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
+from tests.helpers.thresholds import TWO_INTERVAL, YES_NO, text_with, thresholds
+
+
+@pytest.fixture
+def study(services: Services, tmp_path: Path) -> StudyInDatabase:
+    return add_study(services, tmp_path / "clips", text_with(SHORT))
+
+
+@pytest.fixture
+def observer(client: TestClient, study: StudyInDatabase) -> Participant:
+    return Participant(client, study.link_token).agree()
+
+
+def mains(state: Any) -> list[Any]:
+    return [trial for trial in state["trials"] if trial["kind"] == "main"]
+
+
+def of_series(state: Any, number: int) -> list[Any]:
+    return [trial for trial in mains(state) if trial["series"]["number"] == number]
+
+
+def answer(one: Participant, trial: Any, chosen: str | None, rating_id: str = "", **changes: Any) -> Any:
+    place = trial["series"] or {"known": 0}
+    body = {
+        "trial_index": trial["trial_index"],
+        "play": 1,
+        "answer": {"kind": "threshold", "chosen": chosen, "known": place["known"]},
+        "rt": 500.0,
+        "playback": good_playback(trial),
+        **changes,
+    }
+    return one.request("PUT", f"/ratings/{rating_id or uuid.uuid4()}", body)
+
+
+def rows_of(services: Services) -> list[Any]:
+    with services.database.read() as session:
+        return [row for row in thresholds(session) if row["kind"] == "main"]
+
+
+def test_the_first_stimuli_are_chosen_before_any_answer(
+    observer: Participant, study: StudyInDatabase
+) -> None:
+    state = observer.state()
+    first = of_series(state, 0)[0]
+    assert first["series"] == {"number": 0, "position": 1, "known": 0}
+    with study.services.database.read() as session:
+        offers = session.query(SeriesOffer).filter_by(trial_index=first["trial_index"]).all()
+        clip = study.services.versions.get(session, 1).clips[offers[0].version_clip_id]
+    assert clip.sha256 == first["clip_sha256"]
+
+
+def test_an_answer_chooses_the_next_trials_of_its_series(observer: Participant, services: Services) -> None:
+    state = observer.state()
+    first, other = of_series(state, 0)[0], of_series(state, 1)[0]
+    saved = answer(observer, first, "yes")
+    assert saved.status_code == 201, saved.text
+    following = saved.json()["next"]
+    mine = [trial for trial in following["trials"] if trial["series"]["number"] == 0]
+    assert [trial["series"]["known"] for trial in mine] == [1, 1, 1]
+    assert [trial["series"]["position"] for trial in mine] == [2, 3, 4]
+    again = {trial["trial_index"]: trial for trial in observer.state()["trials"]}
+    assert all(again[trial["trial_index"]] == trial for trial in mine)
+    assert again[other["trial_index"]] == other
+    (row,) = rows_of(services)
+    assert (row["response"], row["correct"], row["ahead"], row["known"]) == ("yes", None, 0, 0)
+    assert row["value"] == float(row["cell"].split("/")[0])
+    assert row["threshold"] is not None
+    assert row["threshold_sd"] > 0
+
+
+def test_yes_leads_to_lower_stimuli_than_no(client: TestClient, study: StudyInDatabase) -> None:
+    values = {}
+    for chosen in ("yes", "no"):
+        one = Participant(client, study.link_token).agree()
+        for _ in range(5):
+            trial = next(t for t in of_series(one.state(), 0) if not t["answered"])
+            answer(one, trial, chosen)
+        rows = [row for row in rows_of(study.services) if row["run"] == one.run_id]
+        values[chosen] = rows[-1]["threshold"]
+    assert values["yes"] < values["no"] - 50
+
+
+def test_the_same_answers_give_the_same_stimuli_to_everybody_and_in_another_worker(
+    client: TestClient, study: StudyInDatabase
+) -> None:
+    shown = []
+    for _ in range(2):
+        one, mine = Participant(client, study.link_token).agree(), []
+        for chosen in ("yes", "no", "yes"):
+            trial = next(t for t in of_series(one.state(), 0) if not t["answered"])
+            answer(one, trial, chosen)
+            mine.append(chosen)
+        rows = [row for row in rows_of(study.services) if row["run"] == one.run_id]
+        shown.append([(row["value"], row["threshold"]) for row in rows])
+        quest._states.clear()
+        again = series.follow(study.services.database, Versions(), one.token)
+        assert again is not None
+        by_trial = {trial["trial_index"]: trial for trial in one.state()["trials"]}
+        with study.services.database.read() as session:
+            clips = study.services.versions.get(session, 1).clips
+            for offer in again.offers:
+                assert clips[offer.clip].sha256 == by_trial[offer.trial_index]["clip_sha256"]
+    assert shown[0] == shown[1]
+
+
+def test_an_answer_sent_twice_moves_the_series_once(observer: Participant, services: Services) -> None:
+    first, name = of_series(observer.state(), 0)[0], str(uuid.uuid4())
+    one = answer(observer, first, "yes", name)
+    two = answer(observer, first, "yes", name)
+    assert (one.status_code, two.status_code) == (201, 200)
+    assert one.json() == two.json()
+    assert answer(observer, first, "no", name).status_code == 409
+    assert len(rows_of(services)) == 1
+
+
+def test_trials_answered_ahead_are_taken_with_what_was_shown_and_marked(
+    observer: Participant, services: Services
+) -> None:
+    ahead = of_series(observer.state(), 0)[:3]
+    shown = [trial["clip_sha256"] for trial in ahead]
+    for trial in ahead:  # as the page got them before the first answer was known
+        receipt = answer(observer, trial, "yes").json()["receipt"]
+        assert (receipt["verdict"], receipt["rule"]) == ("good", "")
+    rows = rows_of(services)
+    assert [row["clip_sha256"] for row in rows] == shown
+    assert [(row["known"], row["ahead"]) for row in rows] == [(0, 0), (0, 1), (0, 2)]
+    assert all(row["counts"] for row in rows)
+    following = [t for t in of_series(observer.state(), 0) if not t["answered"]]
+    assert following[0]["series"]["known"] == 3
+
+
+def test_a_clip_that_was_not_offered_fails(observer: Participant, services: Services) -> None:
+    first = of_series(observer.state(), 0)[0]
+    swapped = good_playback(first) | {"clip_sha256": "0" * 64}
+    receipt = answer(observer, first, "yes", playback=swapped).json()["receipt"]
+    assert (receipt["verdict"], receipt["rule"], receipt["again"]) == ("failed", "wrong_clip", True)
+    (row,) = rows_of(services)
+    assert (row["counts"], row["threshold"]) == (0, None)
+    # The next trial's choice does not rest on it.
+    assert of_series(observer.state(), 0)[1]["series"]["known"] == 0
+    again = answer(observer, first, "yes", play=2)
+    assert again.json()["receipt"]["verdict"] == "good"
+    assert of_series(observer.state(), 0)[1]["series"]["known"] == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "code"),
+    [
+        ({"kind": "threshold", "chosen": "first"}, "no_such_answer"),
+        ({"kind": "paired_comparison", "winner": "left"}, "answer_of_other_kind"),
+        ({"kind": "threshold", "chosen": "maybe"}, "invalid"),
+        ({"kind": "threshold", "chosen": "yes", "known": -1}, "invalid"),
+    ],
+)
+def test_what_is_no_answer_is_refused_in_one_line(
+    observer: Participant, services: Services, given: dict[str, Any], code: str
+) -> None:
+    refused = answer(observer, of_series(observer.state(), 0)[0], None, answer=given)
+    assert refused.status_code == 422
+    assert refused.json()["error"]["code"] == code, refused.text
+    assert "\n" not in refused.json()["error"]["message"]
+    assert rows_of(services) == []
+
+
+def test_a_series_ends_early_and_its_trials_need_no_answer(
+    client: TestClient, services: Services, tmp_path: Path
+) -> None:
+    rule = YES_NO.replace("stop = { trials = 8 }", "stop = { trials = 12, at_least = 4, sd = 200.0 }")
+    study = add_study(services, tmp_path / "clips", text_with(SHORT, rule))
+    one = Participant(client, study.link_token).agree()
+    before = one.state()
+    late = of_series(before, 0)[5]
+    for place in range(4):
+        saved = answer(one, of_series(one.state(), 0)[place], "yes").json()
+    closed = {trial["trial_index"] for trial in of_series(before, 0)[4:]}
+    assert set(saved["next"]["closed"]) == closed
+    assert saved["receipt"]["remaining"] == len(before["trials"]) - 4 - len(closed)
+    assert all(trial["answered"] for trial in of_series(one.state(), 0))
+    assert not any(trial["answered"] for trial in of_series(one.state(), 1))
+    # A page that was away may have shown one of them: it is kept, and counted once.
+    kept = answer(one, late, "no").json()
+    assert kept["receipt"]["remaining"] == saved["receipt"]["remaining"]
+    one.answer_forms()
+    while due := [trial for trial in one.state()["trials"] if not trial["answered"]]:
+        asked = 1 if due[0]["kind"] != "attention" else int(due[0]["prompt"].split("**")[1])
+        assert answer(one, due[0], ["yes", "no"][asked - 1]).status_code == 201
+    done = one.request("POST", "/complete")
+    assert done.status_code == 200, done.text
+    with services.database.read() as session:
+        run = session.query(StudyRun).one()
+        assert run.trials_answered <= run.trials_total
+
+
+class Api:
+    """The client that `Person` speaks through."""
+
+    token = ""
+
+    def __init__(self, client: TestClient) -> None:
+        self.client = client
+
+    def get(self, path: str) -> Any:
+        return self._send("GET", path)
+
+    def put(self, path: str, body: Any = None) -> Any:
+        return self._send("PUT", path, body)
+
+    def post(self, path: str, body: Any = None) -> Any:
+        return self._send("POST", path, body)
+
+    def _send(self, method: str, path: str, body: Any = None) -> Any:
+        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
+        answer = self.client.request(method, path, json=body, headers=headers)
+        assert answer.status_code < 300, answer.text
+        return answer.json()
+
+
+@pytest.mark.parametrize("task", [YES_NO, TWO_INTERVAL], ids=["yes_no", "two_interval"])
+def test_simulated_observers_answer_to_the_end_and_the_csv_has_their_series(
+    client: TestClient, services: Services, tmp_path: Path, task: str
+) -> None:
+    study = add_study(services, tmp_path / "clips", text_with(SHORT, task))
+    with services.database.read() as session:
+        version = services.versions.get(session, 1)
+        names = version.experiment.factor_names
+        levels = {
+            version.clips[ident].sha256: dict(zip(names, cell.split("/"), strict=True))
+            for (cell, _), ident in version.places.items()
+        }
+    seen = observer_of(study.experiment, levels, "threshold=250,spread=20,sd=0")
+    person = Person(Api(client), Rater(1, 1, levels, seen))  # type: ignore[arg-type]
+    assert person.take_part(study.link(synthetic=True))
+    rows = [row for row in rows_of(services) if row["counts"]]
+    assert {row["series"] for row in rows} == {"s1", "s2"}
+    assert all(row["ahead"] == 0 for row in rows if row["play"] == 1)
+    two = task == TWO_INTERVAL
+    plain = [row for row in rows if row["value"] >= 400]
+    wrong = sum(not row["correct"] if two else row["response"] == "no" for row in plain)
+    assert wrong <= len(plain) / 3
+    if two:
+        assert {row["interval"] for row in rows} == {"first", "second"}
+        assert all((row["response"] == row["interval"]) == bool(row["correct"]) for row in rows)
+    with services.database.read() as session:
+        found = session.query(Study).filter_by(name=study.name).one()
+        lines = b"".join(FORMATS["csv"](session, found)).decode().splitlines()
+        codebook = b"".join(FORMATS["codebook"](session, found)).decode()
+    header = lines[0].split(",")
+    assert {"series", "duration", "value", "response", "correct", "ahead", "threshold"} <= set(header)
+    assert "| ahead | integer |" in codebook
