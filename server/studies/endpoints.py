@@ -20,6 +20,8 @@ from server.studies.schemas import (
     Checked,
     ClipOut,
     DefinitionText,
+    EditDefinition,
+    EditedDefinition,
     JudgedEdit,
     NewStudy,
     NewVersion,
@@ -42,6 +44,12 @@ def list_experiments(services: ServicesDep, _who: Viewer) -> list[ShippedExperim
 def check_definition(_who: Viewer, body: DefinitionText) -> Checked:
     """Check a definition: every problem with its line and the nearest right name, or what it expands to."""
     return service.check(body.toml)
+
+
+@router.post("/definitions/edit")
+def edit_definition(_who: Viewer, body: EditDefinition) -> EditedDefinition:
+    """Write changed data into a definition: its comments, order and form stay. Nothing is stored."""
+    return service.edit(body)
 
 
 @router.post("/uploads", status_code=201)

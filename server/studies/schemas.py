@@ -292,3 +292,19 @@ class UploadOut(BaseModel):
     has_manifest: bool
     tables: list[str] = Field(description="Names of CSV files in the upload.")
     suggested_pattern: str | None
+
+
+class EditDefinition(_In):
+    """A definition's text, and what it shall say instead; without `data` the text is read only."""
+
+    toml: TomlText
+    data: dict[str, Any] | None = Field(default=None, description="The declaration as the TOML's tables.")
+
+
+class EditedDefinition(BaseModel):
+    """A definition as text and as data, with its problems, or what it expands to."""
+
+    toml: str
+    data: dict[str, Any] | None = Field(description="Null where the text is not TOML.")
+    problems: list[ProblemOut]
+    design: DesignOut | None

@@ -1,5 +1,6 @@
 """Studies from the dashboard: create, edit as new versions, open and close."""
 
+import tomllib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,8 @@ from server.studies.schemas import (
     ChangeTexts,
     Checked,
     DesignOut,
+    EditDefinition,
+    EditedDefinition,
     FactorOut,
     JudgedEdit,
     LevelOut,
@@ -44,6 +47,7 @@ from server.studies.schemas import (
     VersionOut,
 )
 from server.studies.series import judged, series_of
+from server.studies.toml_edit import with_data
 from server.studies.uploads import FILMS, upload_folder
 
 ALLOWED = {
@@ -88,6 +92,17 @@ def check(text: str) -> Checked:
         problems = [ProblemOut(line=p.line, path=p.path, message=p.message) for p in error.problems]
         return Checked(problems=problems, design=None)
     return Checked(problems=[], design=design_out(experiment))
+
+
+def edit(wanted: EditDefinition) -> EditedDefinition:
+    """A definition's text with other data in it: what did not change keeps its form and its comments."""
+    text = wanted.toml if wanted.data is None else with_data(wanted.toml, wanted.data)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        data = None
+    checked = check(text)
+    return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)
 
 
 def judge_edit(session: Session, name: str, text: str) -> JudgedEdit:

@@ -724,6 +724,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/definitions/edit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Edit Definition
+         * @description Write changed data into a definition: its comments, order and form stay. Nothing is stored.
+         */
+        post: operations["edit_definition"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/uploads": {
         parameters: {
             query?: never;
@@ -2169,6 +2189,39 @@ export interface components {
              * @default 60000
              */
             above_ms: number;
+        };
+        /**
+         * EditDefinition
+         * @description A definition's text, and what it shall say instead; without `data` the text is read only.
+         */
+        EditDefinition: {
+            /** Toml */
+            toml: string;
+            /**
+             * Data
+             * @description The declaration as the TOML's tables.
+             */
+            data?: {
+                [key: string]: unknown;
+            } | null;
+        };
+        /**
+         * EditedDefinition
+         * @description A definition as text and as data, with its problems, or what it expands to.
+         */
+        EditedDefinition: {
+            /** Toml */
+            toml: string;
+            /**
+             * Data
+             * @description Null where the text is not TOML.
+             */
+            data: {
+                [key: string]: unknown;
+            } | null;
+            /** Problems */
+            problems: components["schemas"]["ProblemOut"][];
+            design: components["schemas"]["DesignOut"] | null;
         };
         /**
          * Erase
@@ -5717,6 +5770,8 @@ export type DesignOut = components['schemas']['DesignOut'];
 export type Display = components['schemas']['Display'];
 export type DropFailedPlays = components['schemas']['DropFailedPlays'];
 export type DropSlowTrials = components['schemas']['DropSlowTrials'];
+export type EditDefinition = components['schemas']['EditDefinition'];
+export type EditedDefinition = components['schemas']['EditedDefinition'];
 export type Erase = components['schemas']['Erase'];
 export type ErrorBody = components['schemas']['ErrorBody'];
 export type ErrorDetail = components['schemas']['ErrorDetail'];
@@ -7544,6 +7599,48 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Checked"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    edit_definition: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["EditDefinition"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EditedDefinition"];
                 };
             };
             /** @description The request's content is not acceptable */

@@ -1,0 +1,234 @@
+"""Write changed data into a TOML text: what did not change keeps its form, its order and its comments.
+
+tomlkit counts a comment above `[[forms]]` to the table before it. Where elements are moved or removed, such
+comments go with the element that they stand above.
+"""
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import tomlkit
+from tomlkit.container import Container
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, Array, Comment, Table, Whitespace
+
+from experiments.errors import InputError
+from server.studies import toml_items
+
+IDENTITY = ("name", "value", "rule", "kind")
+"""Keys by which an element of a list is known again after an edit; else its content, then its place."""
+
+
+def with_data(text: str, data: Mapping[str, Any]) -> str:
+    """`text` with as few changes as make it say `data`; None values are left out.
+
+    Raises
+    ------
+    InputError
+        Where `text` is not TOML, or `data` holds what TOML cannot say.
+    """
+    wanted = _without_none(data)
+    try:
+        document = tomlkit.parse(text)
+        _merge(document, wanted)
+        merged = tomlkit.dumps(document)
+        if _same(tomllib.loads(merged), wanted):
+            return merged
+    except (TOMLKitError, tomllib.TOMLDecodeError) as error:
+        if not _is_toml(text):
+            raise InputError(f"not valid TOML: {error}; correct the text first") from error
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the declaration holds what TOML cannot say: {error}") from error
+    # Tables written out of order are beyond tomlkit's editing: the whole is then written afresh.
+    return tomlkit.dumps(toml_items.fresh_document(wanted))
+
+
+def _is_toml(text: str) -> bool:
+    try:
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return False
+    return True
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [_without_none(inner) for inner in value if inner is not None]
+    return value
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Equal, and of equal types: 1, 1.0 and true are three things. Order of keys counts for nothing."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return type(one) is type(other) and bool(one == other)
+
+
+def _plain(item: Any) -> Any:
+    return item.unwrap() if hasattr(item, "unwrap") else item
+
+
+def _merge(table: Any, wanted: Mapping[str, Any]) -> None:
+    for key in [key for key in table if key not in wanted]:
+        _remove(table, key)
+    for key, value in wanted.items():
+        if key not in table:
+            _add(table, key, value)
+        elif not _same(_plain(table[key]), value):
+            _change(table, key, value)
+
+
+def _add(table: Any, key: str, value: Any) -> None:
+    top = isinstance(table, tomlkit.TOMLDocument)
+    item = toml_items.item(value, toml_items.is_inline(table), top)
+    table[key] = item
+    toml_items.close(item)
+    if top and isinstance(item, Table):
+        item.trivia.indent = "\n"
+
+
+def _remove(table: Any, key: str) -> None:
+    """Remove a key; comments at the end of a table belong to what follows and are kept where that is."""
+    item, container = table[key], table if isinstance(table, Container) else getattr(table, "value", None)
+    kept = _take_tail(item) if isinstance(item, Table | AoT) else []
+    before = _item_before(container, key) if kept and isinstance(container, Container) else None
+    del table[key]
+    if before is not None:
+        _give_tail(before, kept)
+
+
+def _item_before(container: Container, key: str) -> Any:
+    previous = None
+    for known, item in container.body:
+        if known is not None and known.key == key:
+            return previous
+        if isinstance(item, Table | AoT):
+            previous = item
+    return None
+
+
+def _change(table: Any, key: str, value: Any) -> None:
+    old = table[key]
+    if isinstance(value, Mapping) and isinstance(old, Mapping):
+        _merge(old, value)
+    elif isinstance(old, AoT) and toml_items.are_tables(value):
+        tables, lead = _merged_tables(old, value)
+        container = table if isinstance(table, Container) else getattr(table, "value", None)
+        before = _item_before(container, key) if isinstance(container, Container) else None
+        table[key] = tables
+        _give_tail(tables if before is None else before, lead)
+    elif isinstance(old, Array) and isinstance(value, list):
+        _merge_array(old, value)
+    else:
+        table[key] = toml_items.item(value, toml_items.is_inline(table))
+
+
+def _known_again(old: Sequence[Any], wanted: Sequence[Any]) -> list[int | None]:
+    """For each wanted element the number of the old one that it is an edit of; None for new ones."""
+    free = list(range(len(old)))
+    known: list[int | None] = [None] * len(wanted)
+
+    def match(fits: Callable[[int, int], bool]) -> None:
+        for place in range(len(wanted)):
+            number = next((number for number in free if fits(number, place)), None)
+            if known[place] is None and number is not None:
+                known[place] = number
+                free.remove(number)
+
+    match(lambda number, place: _same(old[number], wanted[place]))
+    match(lambda number, place: _are_of_one_name(old[number], wanted[place]))
+    if len(old) == len(wanted):
+        match(lambda number, place: number == place)
+    return known
+
+
+def _are_of_one_name(one: Any, other: Any) -> bool:
+    return _identity(one) is not None and _identity(one) == _identity(other)
+
+
+def _identity(element: Any) -> str | None:
+    if not isinstance(element, Mapping):
+        return None
+    return next((f"{key}={element[key]}" for key in IDENTITY if key in element), None)
+
+
+def _merged_tables(old: AoT, wanted: Sequence[Mapping[str, Any]]) -> tuple[AoT, list[Any]]:
+    """The elements in their new order, and the comments that now stand above the first."""
+    tables = list(old.body)
+    above = [[], *[_take_tail(table) for table in tables]]
+    known = _known_again([_plain(table) for table in tables], wanted)
+    fresh = tomlkit.aot()
+    leads: list[list[Any]] = []
+    for number, value in zip(known, wanted, strict=True):
+        if number is None:
+            table, lead = toml_items.table(value), []
+            _take_tail(table)
+        else:
+            table, lead = tables[number], above[number]
+            _merge(table, value)
+        leads.append(lead)
+        fresh.append(table)
+    body = list(fresh.body)
+    for table, lead in zip(body, [*leads[1:], above[-1]], strict=True):
+        _give_tail(table, lead or [Whitespace("\n")])
+    return toml_items.close(fresh), leads[0]
+
+
+def _last_container(item: Any) -> Container | None:
+    """The container at the end of the lines that an item is written in."""
+    while True:
+        if isinstance(item, AoT):
+            if not item.body:
+                return None
+            item = item.body[-1]
+        if not isinstance(item, Table):
+            return None
+        container = item.value
+        last = next(
+            (one for _, one in reversed(container.body) if not isinstance(one, Whitespace | Comment)), None
+        )
+        if not isinstance(last, Table | AoT) or (isinstance(last, Table) and not last.value.body):
+            return container
+        item = last
+
+
+def _take_tail(item: Any) -> list[Any]:
+    """Cut off the comments and blank lines that stand at the end of a table."""
+    container = _last_container(item)
+    tail: list[Any] = []
+    while (
+        container is not None and container.body and isinstance(container.body[-1][1], Whitespace | Comment)
+    ):
+        tail.insert(0, container.body.pop()[1])
+    return tail
+
+
+def _give_tail(item: Any, tail: Sequence[Any]) -> None:
+    container = _last_container(item)
+    if container is not None:
+        container.body.extend((None, piece) for piece in tail)
+
+
+def _merge_array(array: Array, wanted: list[Any]) -> None:
+    """Change an array in its place, so that its lines and their comments stay."""
+    known = _known_again(_plain(array), wanted)
+    kept = [number for number in known if number is not None]
+    if kept != sorted(kept) or not kept:
+        array.clear()
+        for value in wanted:
+            array.append(toml_items.inline(value))
+        toml_items.spread(array)
+        return
+    for number in reversed(range(len(array))):
+        if number not in kept:
+            del array[number]
+    for place, (origin, value) in enumerate(zip(known, wanted, strict=True)):
+        if origin is None:
+            array.insert(place, toml_items.inline(value))
+        elif not _same(_plain(array[place]), value):
+            array[place] = toml_items.inline(value)
