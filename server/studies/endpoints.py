@@ -16,7 +16,6 @@ from server.studies.lookup import active_version, find_study
 from server.studies.schemas import (
     ChangeSettings,
     ChangeStatus,
-    ChangeTexts,
     Checked,
     ClipOut,
     DefinitionText,
@@ -114,13 +113,6 @@ def get_version(services: ServicesDep, _who: Viewer, study: str, number: int) ->
     """The TOML of one version."""
     with services.database.read() as session:
         return service.version_text(session, study, number)
-
-
-@router.put("/studies/{study}/texts")
-def change_texts(services: ServicesDep, who: Experimenter, study: str, body: ChangeTexts) -> StudyDetail:
-    """Change the pages of one language; they become a new version."""
-    service.change_texts(services, study, body, who)
-    return get_study(services, who, study)
 
 
 @router.put("/studies/{study}/status")

@@ -144,14 +144,6 @@ class NewVersion(_In):
     note: Label = ""
 
 
-class ChangeTexts(_In):
-    """The pages of one language; they become a new version."""
-
-    revision: Revision
-    language: Annotated[str, StringConstraints(max_length=10)]
-    texts: dict[str, Annotated[str, StringConstraints(max_length=50_000)]]
-
-
 class ChangeStatus(_In):
     """Open or close a study."""
 

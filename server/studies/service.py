@@ -3,16 +3,13 @@
 import tomllib
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
-import tomlkit
 from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
-from tomlkit.exceptions import ParseError
 
 from experiments import design
 from experiments.definition import Experiment
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import did_you_mean
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.schema.stored import load_stored
@@ -29,7 +26,6 @@ from server.studies.lookup import active_version, find_study
 from server.studies.schemas import (
     BlockOut,
     ChangeSettings,
-    ChangeTexts,
     Checked,
     DesignOut,
     EditDefinition,
@@ -190,23 +186,6 @@ def add_definition(services: Services, name: str, wanted: NewVersion, who: Ident
         study = _for_edit(session, name, wanted.revision)
         manifest = Manifest.model_validate(active_version(session, study).manifest)
         add_version(session, study, wanted.toml, experiment, manifest, who, wanted.note)
-
-
-def change_texts(services: Services, name: str, wanted: ChangeTexts, who: Identity) -> None:
-    """Change the pages of one language; the rest of the TOML keeps its form and comments."""
-    with services.database.read() as session:
-        text = active_version(session, find_study(session, name)).definition_toml
-    try:
-        document: Any = tomlkit.parse(text)
-    except ParseError as error:
-        raise InputError(f"the stored definition cannot be read ({error}); edit it as a whole") from error
-    texts = document.setdefault("texts", tomlkit.table()).setdefault(wanted.language, tomlkit.table())
-    for page, words in wanted.texts.items():
-        texts[page] = tomlkit.string(words, multiline="\n" in words)
-    fresh = NewVersion(
-        revision=wanted.revision, toml=tomlkit.dumps(document), note=f"texts in {wanted.language}"
-    )
-    add_definition(services, name, fresh, who)
 
 
 def change_status(session: Session, name: str, revision: int, status: str, who: Identity) -> None:

@@ -61,11 +61,13 @@ def _without_none(value: Any) -> Any:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Equal, and of equal types: 1, 1.0 and true are three things. Order of keys counts for nothing."""
+    """Equal, where true is not 1, and 60 is 60.0, as in JSON. Order of keys counts for nothing."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return isinstance(one, bool) is isinstance(other, bool) and one == other
     return type(one) is type(other) and bool(one == other)
 
 

@@ -58,7 +58,7 @@ const study = createRoute({
 const tab = { getParentRoute: () => study };
 const tabs = [
   createRoute({ ...tab, path: "/", component: lazyRouteComponent(() => import("./studies/DesignTab"), "DesignTab") }),
-  createRoute({ ...tab, path: "/texts", component: lazyRouteComponent(() => import("./studies/TextsTab"), "TextsTab") }),
+  createRoute({ ...tab, path: "/build", component: lazyRouteComponent(() => import("./builder/BuilderTab"), "BuilderTab") }),
   createRoute({ ...tab, path: "/clips", component: lazyRouteComponent(() => import("./studies/ClipsTab"), "ClipsTab") }),
   createRoute({ ...tab, path: "/links", component: lazyRouteComponent(() => import("./studies/LinksTab"), "LinksTab") }),
   createRoute({ ...tab, path: "/monitor", component: lazyRouteComponent(() => import("./monitor/MonitorTab"), "MonitorTab") }),

@@ -872,26 +872,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/admin/studies/{study}/texts": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        /**
-         * Change Texts
-         * @description Change the pages of one language; they become a new version.
-         */
-        put: operations["change_texts"];
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/admin/studies/{study}/status": {
         parameters: {
             query?: never;
@@ -1811,23 +1791,6 @@ export interface components {
              * @enum {string}
              */
             status: "draft" | "pilot" | "live" | "closed";
-        };
-        /**
-         * ChangeTexts
-         * @description The pages of one language; they become a new version.
-         */
-        ChangeTexts: {
-            /**
-             * Revision
-             * @description The revision this edit started from.
-             */
-            revision: number;
-            /** Language */
-            language: string;
-            /** Texts */
-            texts: {
-                [key: string]: string;
-            };
         };
         /**
          * Checked
@@ -5752,7 +5715,6 @@ export type ChangeOut = components['schemas']['ChangeOut'];
 export type ChangePassword = components['schemas']['ChangePassword'];
 export type ChangeSettings = components['schemas']['ChangeSettings'];
 export type ChangeStatus = components['schemas']['ChangeStatus'];
-export type ChangeTexts = components['schemas']['ChangeTexts'];
 export type Checked = components['schemas']['Checked'];
 export type ChoiceField = components['schemas']['ChoiceField'];
 export type ClipOut = components['schemas']['ClipOut'];
@@ -7988,50 +7950,6 @@ export interface operations {
                 };
                 content: {
                     "text/plain": components["schemas"]["ErrorBody"];
-                };
-            };
-        };
-    };
-    change_texts: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                study: string;
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["ChangeTexts"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["StudyDetail"];
-                };
-            };
-            /** @description The request's content is not acceptable */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
-                };
-            };
-            /** @description Refused */
-            "4XX": {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorBody"];
                 };
             };
         };

@@ -18,7 +18,15 @@ PAGES = {
     "studies": ("/", "A short study"),
     "new": ("/studies/new", "New study"),
     "design": ("/studies/short", "trials a participant"),
-    "texts": ("/studies/short/texts", "Consent (Markdown)"),
+    "build": ("/studies/short/build", "Save as a new version"),
+    "build-factors": ("/studies/short/build?section=factors", "Add factor"),
+    "build-trial": ("/studies/short/build?section=trial", "As participants see it"),
+    "build-order": ("/studies/short/build?section=order", "Split by"),
+    "build-forms": ("/studies/short/build?section=forms", "Add from the question bank"),
+    "build-texts": ("/studies/short/build?section=texts", "Consent (Markdown)"),
+    "build-screen": ("/studies/short/build?section=screen", "Inter ocular (mm)"),
+    "build-rules": ("/studies/short/build?section=rules", "Add exclusion"),
+    "build-analysis": ("/studies/short/build?section=analysis", "Statistic"),
     "clips": ("/studies/short/clips", "8 clips"),
     "links": ("/studies/short/links", "New links"),
     "monitor": ("/studies/short/monitor", "How far people come"),
@@ -143,23 +151,6 @@ def test_a_misspelt_key_is_shown_at_its_line(dashboard: Dashboard) -> None:
     expect(page.get_by_text(re.compile("did you mean 'title'"))).to_be_visible()
     page.get_by_role("button", name="Line 2").click()
     assert page.evaluate("window.getSelection().toString()") == 'titel = "y"'
-
-
-def test_an_edit_that_changes_what_is_measured_is_said_before_it_is_saved(dashboard: Dashboard) -> None:
-    page = dashboard.open("/studies/short/settings")
-    editor = page.get_by_label("Definition", exact=True)
-    editor.fill(editor.input_value().replace("[trial.scale]", "[trial.scale]\nmaximum = 5"))
-    expect(page.get_by_text("Saving begins a new data series")).to_be_visible()
-    expect(page.get_by_text("trial.scale.maximum: 7 becomes 5")).to_be_visible()
-    page.get_by_role("button", name="Undo changes").click()
-    expect(page.get_by_text("Saving begins a new data series")).to_be_hidden()
-
-
-def test_texts_are_edited_as_a_new_version(dashboard: Dashboard) -> None:
-    page = dashboard.open("/studies/short/texts")
-    page.get_by_label("Debrief (Markdown)").fill("Many thanks.")
-    page.get_by_role("button", name="Save").click()
-    expect(page.get_by_text("short, version 2")).to_be_visible()
 
 
 def test_the_keyboard_reaches_the_content(dashboard: Dashboard) -> None:

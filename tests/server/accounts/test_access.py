@@ -10,7 +10,6 @@ CHANGES = [
     ("POST", "/studies"),
     ("DELETE", "/studies/short"),
     ("POST", "/studies/short/versions"),
-    ("PUT", "/studies/short/texts"),
     ("PUT", "/studies/short/status"),
     ("PUT", "/studies/short/settings"),
     ("POST", "/studies/short/links"),

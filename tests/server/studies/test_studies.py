@@ -1,4 +1,5 @@
 import io
+import tomllib
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -166,14 +167,25 @@ def test_a_definition_is_checked_with_lines(experimenter: Admin) -> None:
     )
 
 
+def test_text_that_is_no_toml_has_no_data_and_takes_none(experimenter: Admin) -> None:
+    read = experimenter.send("POST", "/definitions/edit", {"toml": "name = = 1\n"}).json()
+    assert (read["data"], read["problems"][0]["line"]) == (None, 1)
+    answer = experimenter.send("POST", "/definitions/edit", {"toml": "name = ", "data": {"name": "a"}})
+    assert (answer.status_code, "not valid TOML" in answer.json()["error"]["message"]) == (422, True)
+
+
 def test_edited_texts_become_a_version_and_runs_keep_theirs(
     experimenter: Admin, study: StudyInDatabase, participant: Participant
 ) -> None:
     participant.agree()
     revision = experimenter.get("/studies/short").json()["summary"]["revision"]
-    body = {"revision": revision, "language": "en", "texts": {"consent": "Do you really agree?"}}
-    changed = experimenter.send("PUT", "/studies/short/texts", body)
-    assert changed.status_code == 200, changed.text
+    data = tomllib.loads(SHORT)
+    data["texts"]["en"]["consent"] = "Do you really agree?"
+    edited = experimenter.send("POST", "/definitions/edit", {"toml": SHORT, "data": data}).json()
+    assert (edited["problems"], edited["data"], edited["design"]["unique_clips"]) == ([], data, 8)
+    body = {"revision": revision, "toml": edited["toml"]}
+    changed = experimenter.send("POST", "/studies/short/versions", body)
+    assert changed.status_code == 201, changed.text
     assert [version["number"] for version in changed.json()["versions"]] == [2, 1]
     assert changed.json()["definition"]["texts"]["en"]["consent"] == "Do you really agree?"
     assert participant.state()["texts"]["consent"] == "Do you agree?"

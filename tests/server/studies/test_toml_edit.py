@@ -115,8 +115,8 @@ def test_a_further_level_keeps_the_lines_of_the_others() -> None:
     assert tomllib.loads(text) == data
 
 
-def test_true_and_one_are_told_apart() -> None:
-    assert with_data("a = true\nb = 1\n", {"a": 1, "b": 1.0}) == "a = 1\nb = 1.0\n"
+def test_true_is_not_one_and_a_number_stays_as_it_is_written() -> None:
+    assert with_data("a = true\nb = 60.0\n", {"a": 1, "b": 60}) == "a = 1\nb = 60.0\n"
 
 
 def test_tables_out_of_order_are_written_whole() -> None:

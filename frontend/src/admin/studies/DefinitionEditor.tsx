@@ -1,11 +1,10 @@
-/** TOML with its problems, each at its line, checked while typing. */
+/** TOML with its problems, checked while typing, and what it expands to. */
 
-import { Alert, List, Textarea } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
-import { useRef } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Design } from "./Design";
+import { TomlText } from "./TomlText";
 
 interface Props {
   toml: string;
@@ -13,47 +12,10 @@ interface Props {
 }
 
 export function DefinitionEditor({ toml, onChange }: Props) {
-  const place = useRef<HTMLTextAreaElement>(null);
   const checked = useCheck(toml);
-  const goTo = (line: number) => {
-    const start =
-      toml
-        .split("\n")
-        .slice(0, line - 1)
-        .join("\n").length + (line > 1 ? 1 : 0);
-    const end = toml.indexOf("\n", start);
-    place.current?.focus();
-    place.current?.setSelectionRange(start, end === -1 ? toml.length : end);
-  };
   return (
     <>
-      <Textarea
-        ref={place}
-        className="editor"
-        aria-label="Definition"
-        autosize
-        minRows={12}
-        maxRows={28}
-        spellCheck={false}
-        value={toml}
-        onChange={(event) => onChange(event.currentTarget.value)}
-      />
-      {checked !== undefined && checked.problems.length > 0 && (
-        <Alert color="red" variant="light" title="Not usable yet" my="sm" role="status">
-          <List size="sm">
-            {checked.problems.map((problem) => (
-              <List.Item key={`${String(problem.line)}${problem.path}${problem.message}`}>
-                {problem.line !== null && (
-                  <button type="button" className="line-link" onClick={() => goTo(problem.line ?? 1)}>
-                    Line {problem.line}
-                  </button>
-                )}{" "}
-                {problem.path}: {problem.message}
-              </List.Item>
-            ))}
-          </List>
-        </Alert>
-      )}
+      <TomlText toml={toml} onChange={onChange} problems={checked?.problems ?? []} />
       {checked?.design !== null && checked?.design !== undefined && <Design design={checked.design} />}
     </>
   );

@@ -1,7 +1,6 @@
-import { Anchor, Button, Card, Group, Stack, TextInput, Title } from "@mantine/core";
+import { Anchor, Card, Stack, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useNavigate, useParams } from "@tanstack/react-router";
-import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
@@ -9,8 +8,6 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
-import { DefinitionEditor, useCheck } from "./DefinitionEditor";
-import { JudgedEdit } from "./JudgedEdit";
 import { Running } from "./Running";
 
 export function SettingsTab() {
@@ -20,43 +17,11 @@ export function SettingsTab() {
       {(detail) => (
         <Stack key={detail.summary.revision} maw={900}>
           <Running detail={detail} />
-          <ChangeDefinition detail={detail} />
           <Versions detail={detail} />
           {detail.summary.status === "draft" && <Delete name={detail.summary.name} />}
         </Stack>
       )}
     </Answer>
-  );
-}
-
-function ChangeDefinition({ detail }: { detail: Schemas["StudyDetail"] }) {
-  const { name, revision } = detail.summary;
-  const [toml, setToml] = useState(detail.toml);
-  const [note, setNote] = useState("");
-  const usable = useCheck(toml)?.design != null;
-  const save = useChange(
-    () => unwrap(api.POST("/api/admin/studies/{study}/versions", { params: { path: { study: name } }, body: { revision, toml, note } })),
-    { touches: [["study", name]], done: "Saved as a new version." },
-  );
-  return (
-    <Card withBorder>
-      <Stack>
-        <Title order={2} size="h4">
-          Definition
-        </Title>
-        <DefinitionEditor toml={toml} onChange={setToml} />
-        {toml !== detail.toml && usable && <JudgedEdit name={name} toml={toml} />}
-        <Group align="end">
-          <TextInput label="What changed" value={note} onChange={(event) => setNote(event.currentTarget.value)} w={320} />
-          <Button disabled={toml === detail.toml || !usable} loading={save.isPending} onClick={() => save.mutate(undefined)}>
-            Save as a new version
-          </Button>
-          <Button variant="default" disabled={toml === detail.toml} onClick={() => setToml(detail.toml)}>
-            Undo changes
-          </Button>
-        </Group>
-      </Stack>
-    </Card>
   );
 }
 

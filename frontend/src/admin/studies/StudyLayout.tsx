@@ -11,7 +11,7 @@ import { StatusButtons } from "./StatusButtons";
 
 const TABS = [
   ["design", "Design"],
-  ["texts", "Texts"],
+  ["build", "Build"],
   ["clips", "Clips"],
   ["links", "Links"],
   ["monitor", "Monitor"],
@@ -20,6 +20,7 @@ const TABS = [
   ["participants", "Participants"],
   ["settings", "Settings"],
 ] as const;
+const FOR_EXPERIMENTERS = new Set<string>(["build", "links", "settings"]);
 
 export function StudyLayout() {
   const { study = "" } = useParams({ strict: false });
@@ -55,7 +56,7 @@ export function StudyLayout() {
             onChange={(to) => void navigate({ to: `/studies/${study}${to === "design" ? "" : `/${to ?? ""}`}` })}
           >
             <Tabs.List ref={line} className="tabs-line">
-              {TABS.filter(([path]) => mayChange || (path !== "links" && path !== "settings")).map(([path, label]) => (
+              {TABS.filter(([path]) => mayChange || !FOR_EXPERIMENTERS.has(path)).map(([path, label]) => (
                 <Tabs.Tab key={path} value={path}>
                   {label}
                 </Tabs.Tab>

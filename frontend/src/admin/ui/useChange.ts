@@ -7,13 +7,16 @@ interface Options<T> {
   touches: QueryKey[];
   done?: string;
   then?: (result: T) => void;
+  /** Done before what it touches is loaded again. */
+  before?: () => void;
 }
 
-export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touches, done, then }: Options<T>) {
+export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touches, done, then, before }: Options<T>) {
   const queries = useQueryClient();
   return useMutation<T, Error, Input>({
     mutationFn: change,
     onSuccess: async (result) => {
+      before?.();
       await Promise.all(touches.map((queryKey) => queries.invalidateQueries({ queryKey })));
       if (done !== undefined) notifications.show({ message: done, color: "teal" });
       then?.(result);

@@ -1,0 +1,188 @@
+/** What is edited: pages of forms, the TOML beside them, and the bar that saves. */
+
+import { Alert, Button, Group, NavLink, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
+import { useHotkeys } from "@mantine/hooks";
+import { Link, useNavigate, useSearch } from "@tanstack/react-router";
+import { useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { Design } from "../studies/Design";
+import { JudgedEdit } from "../studies/JudgedEdit";
+import { TomlText } from "../studies/TomlText";
+import { useChange } from "../ui/useChange";
+import type { Data } from "./data";
+import { Field } from "./fields/Field";
+import { Forms } from "./Forms";
+import { forgetWork } from "./kept";
+import { EXPERIMENT } from "./schema";
+import { type Section, sectionOf, SECTIONS } from "./sections";
+import { Texts } from "./Texts";
+import { TrialPreview } from "./TrialPreview";
+import { type Builder, BuilderContext, useBuilder } from "./useBuilder";
+
+interface Props {
+  detail: Schemas["StudyDetail"];
+  start: { toml: string; data: Data };
+}
+
+export function Workbench({ detail, start }: Props) {
+  const { name, revision } = detail.summary;
+  const builder = useBuilder(name, revision, detail.toml, start);
+  const [beside, setBeside] = useState(false);
+  const { section: asked }: { section?: unknown } = useSearch({ strict: false });
+  const section = SECTIONS.find(({ id }) => id === asked) ?? SECTIONS[0];
+  useHotkeys(
+    [
+      ["mod+Z", () => builder.undo?.()],
+      ["mod+shift+Z", () => builder.redo?.()],
+      ["mod+Y", () => builder.redo?.()],
+    ],
+    [],
+  );
+  if (section === undefined) return null;
+  const wrong = builder.problems.length > 0;
+  return (
+    <BuilderContext value={builder}>
+      <Bar detail={detail} builder={builder} beside={beside} onBeside={setBeside} />
+      <div className={beside ? "builder with-toml" : "builder"}>
+        <Sections study={name} builder={builder} current={section.id} />
+        <Stack gap="sm" className="builder-page">
+          <div>
+            <Title order={2} size="h3">
+              {section.label}
+            </Title>
+            <Text size="sm" c="dimmed">
+              {section.about}
+            </Text>
+          </div>
+          {builder.broken ? (
+            <Alert color="yellow">The text is no TOML at the moment. Correct it beside, or undo; the forms come back then.</Alert>
+          ) : (
+            <Page section={section} />
+          )}
+        </Stack>
+        {beside && <TomlText toml={builder.toml} onChange={builder.setToml} problems={builder.problems} rows={40} />}
+      </div>
+      {wrong && <Wrong study={name} builder={builder} />}
+      {builder.changed && !builder.writing && !wrong && <JudgedEdit name={name} toml={builder.toml} />}
+      {builder.design !== null && !wrong && <Design design={builder.design} />}
+    </BuilderContext>
+  );
+}
+
+function Page({ section }: { section: Section }) {
+  if (section.id === "forms") return <Forms />;
+  if (section.id === "texts") return <Texts />;
+  return (
+    <Stack gap="sm">
+      {section.id === "trial" && <TrialPreview />}
+      {section.keys
+        .map((key) => [key, EXPERIMENT.properties?.[key]] as const)
+        .map(([key, schema]) =>
+          schema === undefined ? null : (
+            <Field key={key} path={[key]} schema={schema} required={EXPERIMENT.required?.includes(key) ?? false} />
+          ),
+        )}
+    </Stack>
+  );
+}
+
+interface BarProps {
+  detail: Schemas["StudyDetail"];
+  builder: Builder;
+  beside: boolean;
+  onBeside: (beside: boolean) => void;
+}
+
+function Bar({ detail, builder, beside, onBeside }: BarProps) {
+  const { name, revision, status } = detail.summary;
+  const [note, setNote] = useState("");
+  const save = useChange(
+    () =>
+      unwrap(
+        api.POST("/api/admin/studies/{study}/versions", {
+          params: { path: { study: name } },
+          body: { revision, toml: builder.toml, note },
+        }),
+      ),
+    { touches: [["study", name]], done: "Saved as a new version.", before: () => forgetWork(name) },
+  );
+  const ready = builder.changed && !builder.writing && !builder.broken && builder.problems.length === 0;
+  return (
+    <div className="builder-bar">
+      <Group gap="xs" align="end">
+        <Button disabled={!ready} loading={save.isPending} onClick={() => save.mutate(undefined)}>
+          Save as a new version
+        </Button>
+        <TextInput
+          aria-label="What changed"
+          placeholder="What changed (a note)"
+          value={note}
+          onChange={(event) => setNote(event.currentTarget.value)}
+          w={220}
+        />
+        <Button variant="default" disabled={builder.undo === null} onClick={() => builder.undo?.()}>
+          Undo
+        </Button>
+        <Button variant="default" disabled={builder.redo === null} onClick={() => builder.redo?.()}>
+          Redo
+        </Button>
+        <Button variant="default" disabled={!builder.changed} onClick={builder.reset}>
+          As saved
+        </Button>
+        <Switch label="TOML beside" checked={beside} onChange={(event) => onBeside(event.currentTarget.checked)} mb={6} />
+      </Group>
+      <Text size="xs" c="dimmed" role="status" mt={4}>
+        {builder.error !== null
+          ? `${builder.error.message} Your work is kept in this browser.`
+          : builder.changed
+            ? "Not saved yet; kept in this browser."
+            : `As saved, version ${detail.summary.version}.`}
+        {status === "live" && " This study is live: a change makes a new version; runs under way keep theirs."}
+      </Text>
+    </div>
+  );
+}
+
+function Sections({ study, builder, current }: { study: string; builder: Builder; current: string }) {
+  const navigate = useNavigate();
+  const count = (section: Section) => builder.problems.filter((problem) => sectionOf(problem.path)?.id === section.id).length;
+  const mark = (section: Section) => (count(section) > 0 ? `${section.label} (${count(section)} to mend)` : section.label);
+  return (
+    <>
+      <Select
+        hiddenFrom="sm"
+        label="Page of the builder"
+        allowDeselect={false}
+        data={SECTIONS.map((section) => ({ value: section.id, label: mark(section) }))}
+        value={current}
+        onChange={(id) => void navigate({ to: `/studies/${study}/build`, search: { section: id } })}
+      />
+      <nav className="builder-sections mantine-visible-from-sm" aria-label="Pages of the builder">
+        {SECTIONS.map((section) => (
+          <NavLink
+            key={section.id}
+            renderRoot={(props) => <Link {...props} to="/studies/$study/build" params={{ study }} search={{ section: section.id }} />}
+            label={mark(section)}
+            active={section.id === current}
+          />
+        ))}
+      </nav>
+    </>
+  );
+}
+
+function Wrong({ study, builder }: { study: string; builder: Builder }) {
+  return (
+    <Alert color="red" variant="light" title="Not usable yet" role="status">
+      {builder.problems.slice(0, 12).map((problem) => (
+        <Text size="sm" key={`${problem.path}${problem.message}`}>
+          <Link to="/studies/$study/build" params={{ study }} search={{ section: sectionOf(problem.path)?.id ?? "study" }}>
+            {problem.path || "TOML"}
+            {problem.line !== null && ` (line ${problem.line})`}
+          </Link>
+          : {problem.message}
+        </Text>
+      ))}
+    </Alert>
+  );
+}

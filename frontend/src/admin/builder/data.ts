@@ -1,0 +1,86 @@
+/** A declaration as plain data, changed without changing what was there before. */
+
+export type Path = readonly (string | number)[];
+export type Data = Record<string, unknown>;
+
+export function isTable(value: unknown): value is Data {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}
+
+export function valueAt(data: unknown, path: Path): unknown {
+  let value = data;
+  for (const part of path) {
+    if (Array.isArray(value)) value = (value as unknown[])[Number(part)];
+    else if (isTable(value)) value = value[part];
+    else return undefined;
+  }
+  return value;
+}
+
+export function listAt(data: unknown, path: Path): unknown[] {
+  const value = valueAt(data, path);
+  return Array.isArray(value) ? (value as unknown[]) : [];
+}
+
+export function tableAt(data: unknown, path: Path): Data {
+  const value = valueAt(data, path);
+  return isTable(value) ? value : {};
+}
+
+export function textAt(data: unknown, path: Path): string {
+  const value = valueAt(data, path);
+  return typeof value === "string" ? value : "";
+}
+
+/** `data` with another value at `path`; undefined removes the key, and tables on the way are made. */
+export function withValue(data: unknown, path: Path, value: unknown): unknown {
+  const [part, ...rest] = path;
+  if (part === undefined) return value;
+  const inner = withValue(valueAt(data, [part]), rest, value);
+  if (Array.isArray(data)) {
+    const list = [...(data as unknown[])];
+    if (inner === undefined) list.splice(Number(part), 1);
+    else list[Number(part)] = inner;
+    return list;
+  }
+  const table = isTable(data) ? { ...data } : {};
+  if (inner === undefined) Reflect.deleteProperty(table, part);
+  else table[part] = inner;
+  return table;
+}
+
+export function withMoved(list: readonly unknown[], from: number, to: number): unknown[] {
+  const moved = [...list];
+  const [element] = moved.splice(from, 1);
+  moved.splice(Math.min(list.length - 1, Math.max(0, to)), 0, element);
+  return moved;
+}
+
+/** As the server names places: elements are counted from 1. */
+export function placeName(path: Path): string {
+  return path.map((part) => (typeof part === "number" ? part + 1 : part)).join(".");
+}
+
+/** As the table of effects names keys: without the numbers of elements, languages and members. */
+export function keyName(path: Path): string {
+  return path.filter((part) => typeof part === "string").join(".");
+}
+
+const UNITS: Record<string, string> = { ms: "ms", mm: "mm", px: "px", hours: "hours", minutes: "minutes", seconds: "seconds" };
+
+/** "failed_longest_gap_ms" reads "Failed longest gap (ms)". */
+export function labelOf(key: string): string {
+  const parts = key.split("_");
+  const last = parts.at(-1) ?? "";
+  const unit = parts.length > 1 ? UNITS[last] : undefined;
+  const words = (unit === undefined ? parts : parts.slice(0, -1)).join(" ");
+  return `${words.charAt(0).toUpperCase()}${words.slice(1)}${unit === undefined ? "" : ` (${unit})`}`;
+}
+
+/** A name that none of `taken` has: "factor_2" after "factor". */
+export function freeName(wanted: string, taken: readonly string[]): string {
+  if (!taken.includes(wanted)) return wanted;
+  let number = 2;
+  while (taken.includes(`${wanted}_${number}`)) number += 1;
+  return `${wanted}_${number}`;
+}

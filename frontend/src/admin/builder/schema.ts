@@ -1,0 +1,179 @@
+/** The declaration's JSON schema, and which editor a key of it gets. */
+
+import declared from "../../api/declaration.json";
+
+export interface Schema {
+  $ref?: string;
+  type?: string;
+  title?: string;
+  description?: string;
+  default?: unknown;
+  const?: unknown;
+  enum?: string[];
+  properties?: Record<string, Schema>;
+  patternProperties?: Record<string, Schema>;
+  required?: string[];
+  items?: Schema;
+  anyOf?: Schema[];
+  oneOf?: Schema[];
+  discriminator?: { propertyName: string; mapping: Record<string, string> };
+  minimum?: number;
+  maximum?: number;
+  exclusiveMinimum?: number;
+  minItems?: number;
+  maxItems?: number;
+  $defs?: Record<string, Schema>;
+}
+
+export const EXPERIMENT = declared.schema as unknown as Schema;
+
+type Effect = "wording" | "measured";
+const EFFECTS = declared.effects as Record<string, Effect>;
+const TRIAL_EFFECTS = declared.trial_effects as Record<string, Record<string, Effect>>;
+
+/** The schema that a reference stands for; what stands beside the reference (help, default) goes before. */
+export function resolved(schema: Schema): Schema {
+  if (schema.$ref === undefined) return schema;
+  const name = schema.$ref.replace("#/$defs/", "");
+  const whole = { ...EXPERIMENT.$defs?.[name], ...schema };
+  delete whole.$ref;
+  return whole;
+}
+
+export type Editor =
+  | { kind: "constant" }
+  | { kind: "flag" }
+  | { kind: "number"; whole: boolean; minimum?: number | undefined; maximum?: number | undefined }
+  | { kind: "choice"; options: string[] }
+  | { kind: "text" }
+  | { kind: "translated" }
+  | { kind: "words" }
+  | { kind: "lists" }
+  | { kind: "table"; keys: [name: string, schema: Schema][]; required: string[] }
+  | { kind: "variants"; tag: string; variants: Record<string, Schema> }
+  | { kind: "elements"; of: Schema; atLeast: number }
+  | { kind: "languages"; of: Schema }
+  | { kind: "raw" };
+
+/** The editor of a key; `raw` takes any value as JSON where there is no better one. */
+export function editorOf(given: Schema): Editor {
+  const schema = withoutNull(resolved(given));
+  if (schema.const !== undefined) return { kind: "constant" };
+  if (schema.enum !== undefined) return { kind: "choice", options: schema.enum };
+  if (schema.discriminator !== undefined) return variantsOf(schema.discriminator);
+  switch (schema.type) {
+    case "boolean":
+      return { kind: "flag" };
+    case "integer":
+    case "number":
+      return {
+        kind: "number",
+        whole: schema.type === "integer",
+        minimum: schema.minimum ?? schema.exclusiveMinimum,
+        maximum: schema.maximum,
+      };
+    case "string":
+      return { kind: "text" };
+    case "array":
+      return listEditor(schema);
+    case "object":
+      return tableEditor(schema);
+    default:
+      return { kind: "raw" };
+  }
+}
+
+function variantsOf({ propertyName, mapping }: NonNullable<Schema["discriminator"]>): Editor {
+  const variants = Object.fromEntries(Object.entries(mapping).map(([tag, $ref]) => [tag, resolved({ $ref })]));
+  return { kind: "variants", tag: propertyName, variants };
+}
+
+function listEditor(schema: Schema): Editor {
+  const items = withoutNull(resolved(schema.items ?? {}));
+  if (items.type === "string") return { kind: "words" };
+  if (items.type === "array" && withoutNull(resolved(items.items ?? {})).type === "string") return { kind: "lists" };
+  const inner = editorOf(items).kind;
+  return inner === "table" || inner === "variants" ? { kind: "elements", of: items, atLeast: schema.minItems ?? 0 } : { kind: "raw" };
+}
+
+function tableEditor(schema: Schema): Editor {
+  if (schema.properties !== undefined) return { kind: "table", keys: Object.entries(schema.properties), required: schema.required ?? [] };
+  const [inner] = Object.values(schema.patternProperties ?? {});
+  if (inner === undefined) return { kind: "raw" };
+  return resolved(inner).type === "string" ? { kind: "translated" } : { kind: "languages", of: resolved(inner) };
+}
+
+/** A key that may be left out altogether (`X | None`): its schema without the null. */
+export function withoutNull(schema: Schema): Schema {
+  const others = schema.anyOf?.filter((one) => one.type !== "null");
+  if (others?.length !== 1 || others[0] === undefined) return schema;
+  const whole = { ...resolved(others[0]), ...schema };
+  delete whole.anyOf;
+  return whole;
+}
+
+export function mayBeNull(schema: Schema): boolean {
+  return resolved(schema).anyOf?.some((one) => one.type === "null") ?? false;
+}
+
+/** The value that a new key begins with: what is required, empty where nothing else is known. */
+export function starter(given: Schema, languages: readonly string[]): unknown {
+  const schema = resolved(given);
+  if (schema.default !== undefined && schema.default !== null) return schema.default;
+  const editor = editorOf(schema);
+  switch (editor.kind) {
+    case "constant":
+      return schema.const;
+    case "flag":
+      return false;
+    case "number":
+      return Math.max(1, schema.minimum ?? 1);
+    case "choice":
+      return editor.options[0];
+    case "text":
+      return "";
+    case "translated":
+      return Object.fromEntries(languages.map((language) => [language, ""]));
+    case "languages":
+      return Object.fromEntries(languages.map((language) => [language, starter(editor.of, languages)]));
+    case "table":
+      return starterTable(editor, languages);
+    case "variants":
+      return starterOf(editor, Object.keys(editor.variants)[0] ?? "", languages);
+    case "elements":
+      return Array.from({ length: editor.atLeast }, () => starter(editor.of, languages));
+    case "words":
+    case "lists":
+      return [];
+    case "raw":
+      return null;
+  }
+}
+
+function starterTable({ keys, required }: Extract<Editor, { kind: "table" }>, languages: readonly string[]): Record<string, unknown> {
+  const needed = keys.filter(([name, schema]) => required.includes(name) || editorOf(schema).kind === "constant");
+  return Object.fromEntries(needed.map(([name, schema]) => [name, starter(schema, languages)]));
+}
+
+/** A member of a union with its tag and what else it requires; `before` gives the keys that both have. */
+export function starterOf(
+  { tag, variants }: Extract<Editor, { kind: "variants" }>,
+  chosen: string,
+  languages: readonly string[],
+  before: Record<string, unknown> = {},
+): Record<string, unknown> {
+  const schema = variants[chosen] ?? {};
+  const fresh = starter(schema, languages) as Record<string, unknown>;
+  const kept = Object.entries(before).filter(([key]) => key !== tag && key in (schema.properties ?? {}));
+  return { [tag]: chosen, ...fresh, ...Object.fromEntries(kept), ...{ [tag]: chosen } };
+}
+
+/** What an edit of the key at this path (without list numbers) does to answers that are there. */
+export function effectOf(path: string, trialKind: string): Effect | null {
+  for (let at = path; at !== ""; at = at.slice(0, Math.max(0, at.lastIndexOf(".")))) {
+    const found = EFFECTS[at] ?? (at.startsWith("trial.") ? TRIAL_EFFECTS[trialKind]?.[at.slice(6)] : undefined);
+    if (found !== undefined) return found;
+    if (at === "trial.kind") return "measured";
+  }
+  return null;
+}

@@ -1,0 +1,190 @@
+import { execFileSync } from "node:child_process";
+import { existsSync } from "node:fs";
+import { join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { describe, expect, it } from "vitest";
+import declared from "../../src/api/declaration.json";
+import { FORMS, inLanguages } from "../../src/admin/builder/bank";
+import { type Data, freeName, isTable, labelOf, listAt, type Path, valueAt, withMoved, withValue } from "../../src/admin/builder/data";
+import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
+import { type Editor, editorOf, effectOf, EXPERIMENT, type Schema, starter, starterOf } from "../../src/admin/builder/schema";
+import { SECTIONS } from "../../src/admin/builder/sections";
+import { suggestionsFor } from "../../src/admin/builder/suggestions";
+
+const repository = fileURLToPath(new URL("../../../", import.meta.url));
+const python = ["bin/python", "Scripts/python.exe"].map((name) => join(repository, ".venv", name)).find(existsSync);
+
+/** Every key below `schema` with its editor, once. */
+function* editors(schema: Schema, path: string, seen = new Set<string>()): Generator<[string, Editor]> {
+  const editor = editorOf(schema);
+  if (path !== "") yield [path, editor];
+  if (seen.has(path)) return;
+  seen.add(path);
+  if (editor.kind === "table") for (const [name, inner] of editor.keys) yield* editors(inner, path === "" ? name : `${path}.${name}`, seen);
+  if (editor.kind === "elements" || editor.kind === "languages") yield* editors(editor.of, `${path}[]`, seen);
+  if (editor.kind === "variants")
+    for (const [tag, inner] of Object.entries(editor.variants)) yield* editors(inner, `${path}<${tag}>`, seen);
+}
+
+describe("the declaration's schema", () => {
+  it("has an editor of its own for every key", () => {
+    const all = [...editors(EXPERIMENT, "")];
+    expect(all.length).toBeGreaterThan(120);
+    expect(all.filter(([, editor]) => editor.kind === "raw").map(([path]) => path)).toEqual([]);
+  });
+
+  it("has help for every key", () => {
+    const tables = [EXPERIMENT, ...Object.values(EXPERIMENT.$defs ?? {})];
+    const keys = tables.flatMap((table) => Object.entries(table.properties ?? {}));
+    expect(keys.filter(([, key]) => !key.description).map(([name]) => name)).toEqual([]);
+  });
+
+  it("stands on the pages of the builder, each key once", () => {
+    const shown = SECTIONS.flatMap(({ keys }) => keys).filter((key) => key in (EXPERIMENT.properties ?? {}));
+    expect(shown.toSorted()).toEqual(Object.keys(EXPERIMENT.properties ?? {}).toSorted());
+  });
+
+  it("says what an edit does to the data", () => {
+    expect(effectOf("trial.scale.question", "clip_rating")).toBe("measured");
+    expect(effectOf("texts.en.debrief", "clip_rating")).toBe("wording");
+    expect(Object.keys(declared.trial_effects)).toContain("clip_rating");
+  });
+});
+
+/** Builds `wanted` as somebody would in the forms: one key after the other, each by the editor that it has. */
+function built(data: unknown, schema: Schema, path: Path, wanted: unknown): unknown {
+  const editor = editorOf(schema);
+  const languages = ["en", "de"];
+  switch (editor.kind) {
+    case "table":
+      return Object.entries(wanted as Data).reduce(
+        (made, [name, value]) => {
+          const inner = editor.keys.find(([key]) => key === name)?.[1];
+          if (inner === undefined) throw new Error(`no editor for ${[...path, name].join(".")}`);
+          return built(made, inner, [...path, name], value);
+        },
+        isTable(valueAt(data, path)) ? data : withValue(data, path, {}),
+      );
+    case "variants": {
+      const tag = String((wanted as Data)[editor.tag] ?? Object.keys(editor.variants)[0]);
+      const inner = editor.variants[tag] ?? {};
+      const { [editor.tag]: _, ...others } = wanted as Data;
+      return built(withValue(data, path, starterOf(editor, tag, languages)), inner, path, others);
+    }
+    case "elements":
+      return (wanted as unknown[]).reduce<unknown>(
+        (made, element, place) => {
+          const added = withValue(made, path, [...listAt(made, path), starter(editor.of, languages)]);
+          return built(added, editor.of, [...path, place], element);
+        },
+        withValue(data, path, []),
+      );
+    case "languages":
+      return Object.entries(wanted as Data).reduce((made, [language, value]) => built(made, editor.of, [...path, language], value), data);
+    case "constant":
+      expect(wanted).toBe(schema.const);
+      return data;
+    case "flag":
+      expect(typeof wanted).toBe("boolean");
+      return withValue(data, path, wanted);
+    case "number":
+      expect(typeof wanted).toBe("number");
+      return withValue(data, path, wanted);
+    case "choice":
+      expect(editor.options).toContain(wanted);
+      return withValue(data, path, wanted);
+    case "text":
+      expect(typeof wanted).toBe("string");
+      return withValue(data, path, wanted);
+    case "translated":
+      return Object.entries(wanted as Data).reduce((made, [language, text]) => withValue(made, [...path, language], text), data);
+    case "words":
+    case "lists":
+      expect(Array.isArray(wanted)).toBe(true);
+      return withValue(data, path, wanted);
+    default:
+      throw new Error(`no editor can set ${path.join(".")}`);
+  }
+}
+
+const PROGRAM = `
+import json, sys, tomllib
+from experiments.load import locate, parse_experiment
+from experiments.schema.canonical import definition_sha256
+from server.studies.toml_edit import with_data
+made = json.load(sys.stdin)
+if made is None:
+    print(json.dumps({n: tomllib.loads(locate(n).read_text("utf-8")) for n in ("exp1", "exp2", "exp3")}))
+else:
+    hashes = lambda text: definition_sha256(parse_experiment(text))
+    print(json.dumps({n: [hashes(with_data("", d)), hashes(locate(n).read_text("utf-8"))] for n, d in made.items()}))
+`;
+
+function asked(input: unknown): Record<string, unknown> {
+  const printed = execFileSync(python ?? "python3", ["-c", PROGRAM], { cwd: repository, input: JSON.stringify(input) });
+  return JSON.parse(printed.toString()) as Record<string, unknown>;
+}
+
+describe("the three experiments", () => {
+  it("are built by the forms alone, equal to the shipped TOML by their hash", () => {
+    const shipped = asked(null);
+    expect(Object.keys(shipped)).toEqual(["exp1", "exp2", "exp3"]);
+    const made = Object.fromEntries(Object.entries(shipped).map(([name, data]) => [name, built({}, EXPERIMENT, [], data)]));
+    for (const [mine, theirs] of Object.values(asked(made)) as [string, string][]) expect(mine).toBe(theirs);
+  }, 60_000);
+});
+
+describe("data under edit", () => {
+  it("change without changing what was there before", () => {
+    const before = { a: [{ b: 1 }, { b: 2 }] };
+    expect(withValue(before, ["a", 1, "b"], 3)).toEqual({ a: [{ b: 1 }, { b: 3 }] });
+    expect(withValue(before, ["a", 0], undefined)).toEqual({ a: [{ b: 2 }] });
+    expect(withValue(before, ["c", "d"], 1)).toEqual({ ...before, c: { d: 1 } });
+    expect(before).toEqual({ a: [{ b: 1 }, { b: 2 }] });
+    expect(withMoved([1, 2, 3], 0, 2)).toEqual([2, 3, 1]);
+  });
+
+  it("are undone and done again; a word is one step", () => {
+    let history = begun({ title: "a" }, "title = 'a'");
+    for (const [place, text] of ["ab", "abc"].entries()) history = edited(history, ["title"], text, 1_000 + place);
+    history = edited(history, ["name"], "x", 9_000);
+    history = undone(history);
+    expect(history.now.data).toEqual({ title: "abc" });
+    history = undone(history);
+    expect(history.now).toMatchObject({ data: { title: "a" }, toml: "title = 'a'" });
+    expect(redone(redone(history)).now.data).toEqual({ title: "abc", name: "x" });
+    expect(undone(undone(history))).toBe(undone(history));
+  });
+
+  it("are written into the newest text that is known", () => {
+    const history = edited(begun({ a: 1 }, "a = 1"), ["a"], 2, 0);
+    expect(latestToml(history)).toBe("a = 1");
+    expect(latestToml(written(history, history.now.data, "a = 2"))).toBe("a = 2");
+    expect(written(history, { a: 2 }, "a = 2").now.toml).toBeNull();
+  });
+});
+
+describe("words of the builder", () => {
+  it("reads keys as words with their units", () => {
+    expect(labelOf("failed_longest_gap_ms")).toBe("Failed longest gap (ms)");
+    expect(labelOf("name")).toBe("Name");
+    expect(freeName("form", ["form", "form_2"])).toBe("form_3");
+  });
+
+  it("offers what is declared elsewhere", () => {
+    const data = {
+      factors: [{ name: "speed", levels: [{ name: "slow" }, { name: "fast" }] }],
+      forms: [{ name: "about", fields: [{ name: "vision", options: [{ value: "normal" }] }] }],
+      screening: [{ rule: "form_answer", form: "about", field: "vision" }],
+    };
+    expect(suggestionsFor(data, ["blocks", "split_by"])).toEqual(["speed"]);
+    expect(suggestionsFor(data, ["trial", "reference", "cell"])).toEqual(["slow", "fast"]);
+    expect(suggestionsFor(data, ["screening", 0, "field"])).toEqual(["vision"]);
+    expect(suggestionsFor(data, ["screening", 0, "refused"])).toEqual(["normal"]);
+  });
+
+  it("puts forms of the bank into the languages of the study", () => {
+    const [first] = FORMS;
+    expect(inLanguages(first?.form["title"], ["de", "fr"])).toEqual({ de: "Über Sie", fr: "About you" });
+  });
+});
