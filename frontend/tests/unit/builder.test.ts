@@ -66,9 +66,10 @@ function built(data: unknown, schema: Schema, path: Path, wanted: unknown): unkn
         isTable(valueAt(data, path)) ? data : withValue(data, path, {}),
       );
     case "variants": {
-      const tag = String((wanted as Data)[editor.tag] ?? Object.keys(editor.variants)[0]);
+      const named = (wanted as Data)[editor.tag];
+      const tag = typeof named === "string" ? named : (Object.keys(editor.variants)[0] ?? "");
       const inner = editor.variants[tag] ?? {};
-      const { [editor.tag]: _, ...others } = wanted as Data;
+      const others = withValue(wanted, [editor.tag], undefined);
       return built(withValue(data, path, starterOf(editor, tag, languages)), inner, path, others);
     }
     case "elements":
