@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon help run test check setup setup-test lock format types bench scope load audit screenshots docs api clean
+.PHONY: addon playground help run test check setup setup-test lock format types bench scope load audit screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -70,6 +70,9 @@ load: setup-test ## real servers under load and kill -9, a table at the end (LOA
 
 addon: setup ## build the Blender add-on: dist/palpebra_blinks-VERSION.zip
 	@$(BIN)/python tools/build_addon.py
+
+playground: setup ## build the blink engine's playground: dist/playground.html, one page that opens from a folder
+	@$(BIN)/python tools/build_playground.py
 
 docs: setup-test ## write the references in docs/ (data dictionary, settings, declaration) from the code
 	@$(BIN)/python tools/reference.py

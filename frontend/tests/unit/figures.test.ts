@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { browserName, soon } from "../../src/admin/ui/format";
-import { framesAt, nearest } from "../../src/admin/figures/playing";
+import { framesAt } from "../../src/admin/figures/playing";
+import { nearest } from "../../src/playground/faces";
 import { merge } from "../../src/admin/monitor/useMonitor";
 
 describe("a curve played at another rate", () => {

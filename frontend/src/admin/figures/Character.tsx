@@ -1,11 +1,12 @@
 /** A character that blinks along a closure curve at 30 frames a second, as in a clip without motion blur. */
 
-import { Button, Group, SegmentedControl, Stack, Switch, Text } from "@mantine/core";
+import { Button, Group, SegmentedControl, Stack, Switch } from "@mantine/core";
 import { useReducedMotion } from "@mantine/hooks";
-import { useQuery } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { framesAt, nearest } from "./playing";
+import { nearest } from "../../playground/faces";
+import type { Schemas } from "../api";
+import { framesAt } from "./playing";
+import { stripAddress, WithStrips } from "./WithStrips";
 
 const FPS = 30;
 const REST_MS = 700;
@@ -19,27 +20,14 @@ interface Props {
 }
 
 export function Character(props: Props) {
-  const strips = useQuery({
-    queryKey: ["strips"],
-    queryFn: () => unwrap(api.GET("/api/admin/blinks/strips")),
-    staleTime: Number.POSITIVE_INFINITY,
-  });
-  if (strips.data === undefined) return null;
-  if (strips.data.characters.length === 0) {
-    return (
-      <Text size="sm" c="dimmed">
-        The characters' pictures are not on this server; <code>make run</code> makes them, or <code>stimuli strips</code>.
-      </Text>
-    );
-  }
-  return <Player {...props} strips={strips.data} />;
+  return <WithStrips>{(strips) => <Player {...props} strips={strips} />}</WithStrips>;
 }
 
 function Player({ closure, other, fps, strips }: Props & { strips: Schemas["Strips"] }) {
   const [character, setCharacter] = useState(strips.characters.find((name) => name !== "cartoon") ?? strips.characters[0] ?? "");
   const [repeat, setRepeat] = useState(false);
   const [played, setPlayed] = useState(0);
-  const picture = usePicture(`/api/admin/blinks/strips/${encodeURIComponent(character)}.webp`);
+  const picture = usePicture(stripAddress(character));
   const canvas = useRef<HTMLCanvasElement>(null);
   const { width_px: width, height_px: height, closures } = strips;
   const still = useReducedMotion();

@@ -5,6 +5,7 @@ import { useQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { ModelSliders } from "./ModelSliders";
+import { Playground } from "./Playground";
 import { Recorded } from "./Recorded";
 
 export function FiguresPage() {
@@ -17,8 +18,8 @@ export function FiguresPage() {
     <Stack>
       <Title order={1}>Blinks</Title>
       <Text maw={720}>
-        The blinks that clips are made from: recorded ones, and the PCA model fitted to them. Closure is 0 with the eye open and 1 with it
-        closed, at 300 samples a second.
+        The blinks that clips are made from: recorded ones, and the PCA model fitted to them; and the engine that makes whole performances.
+        Closure is 0 with the eye open and 1 with it closed, at 300 samples a second.
       </Text>
       <Answer of={library}>
         {(data) => (
@@ -26,12 +27,16 @@ export function FiguresPage() {
             <Tabs.List>
               <Tabs.Tab value="model">Model</Tabs.Tab>
               <Tabs.Tab value="recorded">Recorded ({data.profiles.length})</Tabs.Tab>
+              <Tabs.Tab value="playground">Playground</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="model" pt="md">
               <ModelSliders library={data} />
             </Tabs.Panel>
             <Tabs.Panel value="recorded" pt="md">
               <Recorded library={data} />
+            </Tabs.Panel>
+            <Tabs.Panel value="playground" pt="md">
+              <Playground />
             </Tabs.Panel>
           </Tabs>
         )}

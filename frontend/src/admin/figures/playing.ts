@@ -13,12 +13,3 @@ function valueAt(values: readonly number[], place: number): number {
   const [left = 0, right = 0] = [values[before], values[Math.min(last, before + 1)]];
   return left + Math.min(1, place - before) * (right - left);
 }
-
-/** Place of the ascending `steps` value that lies nearest. */
-export function nearest(steps: readonly number[], value: number): number {
-  let best = 0;
-  for (let place = 1; place < steps.length; place += 1) {
-    if (Math.abs((steps[place] ?? 0) - value) < Math.abs((steps[best] ?? 0) - value)) best = place;
-  }
-  return best;
-}
