@@ -13,6 +13,7 @@ from experiments.errors import InputError
 from server.accounts.audit import record
 from server.cli_common import migrated_services, out
 from server.export.formats import FORMATS, Format
+from server.export.origins import ExportOrigin, runs_by_origin
 from server.studies.lookup import find_study
 
 
@@ -33,6 +34,9 @@ def export(
             "beside the pseudonyms, noted in the audit log.",
         ),
     ] = "csv",
+    origin: Annotated[
+        ExportOrigin, typer.Option(help="Whose data: of one origin, or all together.")
+    ] = "participant",
 ) -> None:
     """Write a study's data: as csv, the columns of experiments/columns and one column a factor.
 
@@ -43,6 +47,8 @@ def export(
       server export exp3 --out exp3.csv
 
       server export exp3 --format psych-ds --out exp3.zip
+
+      server export exp3 --origin simulated --out rehearsal.csv
     """
     with migrated_services() as services, services.database.snapshot() as session:
         if form == "identities":
@@ -50,13 +56,17 @@ def export(
                 record(noted, None, "identities downloaded", "study", study, what=form)
         found = find_study(session, study)
         try:
-            size = _write(out_file, FORMATS[form](session, found))
+            size = _write(out_file, FORMATS[form](session, found, origin))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
             ) from error
+        there = runs_by_origin(session, found)
     if str(out_file) != "-":
         out.print(f"{out_file}: {size:,} bytes")
+    if form != "codebook" and origin != "all" and origin not in there and there:
+        others = ", ".join(f"{number} of origin {name}" for name, number in sorted(there.items()))
+        typer.echo(f"no runs of origin {origin}; there are {others} (--origin)", err=True)
 
 
 def _write(out_file: Path, pieces: Iterable[bytes]) -> int:

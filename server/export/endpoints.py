@@ -1,4 +1,4 @@
-"""Downloads of a study's data; every one is streamed in constant memory."""
+"""Downloads of a study's data, of one origin unless all are asked for; streamed in constant memory."""
 
 from collections.abc import Iterator
 
@@ -10,6 +10,7 @@ from server.accounts.identity import Exporter, Identity, Owner, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.export.formats import FORMATS, Format, row_count
+from server.export.origins import ExportOrigin
 from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/data", tags=["data"], responses=ERROR_RESPONSES)
@@ -18,64 +19,79 @@ ROWS_HEADER = "palpebra-rows"
 
 
 def _stream(
-    services: Services, who: Identity, name: str, form: Format, media_type: str, file: str
+    services: Services,
+    who: Identity,
+    name: str,
+    form: Format,
+    origin: ExportOrigin,
+    media_type: str,
+    file: str,
 ) -> StreamingResponse:
     action = "identities downloaded" if form == "identities" else "data downloaded"
     with services.database.write() as session:
         find_study(session, name)  # an unknown study is refused before the stream begins
-        record(session, who, action, "study", name, what=form)
+        record(session, who, action, "study", name, what=form, origin=origin)
 
-    pieces = _pieces(services, name, form)
+    pieces = _pieces(services, name, form, origin)
+    whose = "" if origin == "participant" or form == "identities" else f"{origin}-"
     # The first piece is the number of rows; taking it begins the snapshot that the rest is read from.
     headers = {
-        "content-disposition": f'attachment; filename="{name}-{file}"',
+        "content-disposition": f'attachment; filename="{name}-{whose}{file}"',
         ROWS_HEADER: next(pieces).decode(),
     }
     return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
 
-def _pieces(services: Services, name: str, form: Format) -> Iterator[bytes]:
+def _pieces(services: Services, name: str, form: Format, origin: ExportOrigin) -> Iterator[bytes]:
     """The number of rows, then the export; what goes wrong ends the connection before the answer's end."""
     with services.database.snapshot() as session:
         study = find_study(session, name)
-        yield str(row_count(form, session, study)).encode()
-        yield from FORMATS[form](session, study)
+        yield str(row_count(form, session, study, origin)).encode()
+        yield from FORMATS[form](session, study, origin)
 
 
 @router.get("/ratings.csv", response_class=StreamingResponse)
-def download_ratings(services: ServicesDep, who: Exporter, study: str) -> StreamingResponse:
+def download_ratings(
+    services: ServicesDep, who: Exporter, study: str, origin: ExportOrigin = "participant"
+) -> StreamingResponse:
     """One row a play: the columns of the codebook, one column a factor."""
-    return _stream(services, who, study, "csv", "text/csv; charset=utf-8", "ratings.csv")
+    return _stream(services, who, study, "csv", origin, "text/csv; charset=utf-8", "ratings.csv")
 
 
 @router.get("/runs.csv", response_class=StreamingResponse)
-def download_runs(services: ServicesDep, who: Exporter, study: str) -> StreamingResponse:
+def download_runs(
+    services: ServicesDep, who: Exporter, study: str, origin: ExportOrigin = "participant"
+) -> StreamingResponse:
     """One row a visit, forms included."""
-    return _stream(services, who, study, "runs", "text/csv; charset=utf-8", "runs.csv")
+    return _stream(services, who, study, "runs", origin, "text/csv; charset=utf-8", "runs.csv")
 
 
 @router.get("/raw.ndjson", response_class=StreamingResponse)
-def download_raw(services: ServicesDep, who: Exporter, study: str) -> StreamingResponse:
+def download_raw(
+    services: ServicesDep, who: Exporter, study: str, origin: ExportOrigin = "participant"
+) -> StreamingResponse:
     """Everything stored, one JSON object a run and line."""
-    return _stream(services, who, study, "raw", "application/x-ndjson", "raw.ndjson")
+    return _stream(services, who, study, "raw", origin, "application/x-ndjson", "raw.ndjson")
 
 
 @router.get("/psych-ds.zip", response_class=StreamingResponse)
-def download_psych_ds(services: ServicesDep, who: Exporter, study: str) -> StreamingResponse:
+def download_psych_ds(
+    services: ServicesDep, who: Exporter, study: str, origin: ExportOrigin = "participant"
+) -> StreamingResponse:
     """A Psych-DS dataset as a zip."""
-    return _stream(services, who, study, "psych-ds", "application/zip", "psych-ds.zip")
+    return _stream(services, who, study, "psych-ds", origin, "application/zip", "psych-ds.zip")
 
 
 @router.get("/identities.csv", response_class=StreamingResponse)
 def download_identities(services: ServicesDep, who: Owner, study: str) -> StreamingResponse:
     """Recruiters' ids beside the pseudonyms, one row a visit; for owners, and noted in the audit log."""
-    return _stream(services, who, study, "identities", "text/csv; charset=utf-8", "identities.csv")
+    return _stream(services, who, study, "identities", "all", "text/csv; charset=utf-8", "identities.csv")
 
 
 @router.get("/codebook.md", response_class=Response)
 def download_codebook(services: ServicesDep, _who: Viewer, study: str) -> Response:
     """What every column means."""
     with services.database.read() as session:
-        text = b"".join(FORMATS["codebook"](session, find_study(session, study)))
+        text = b"".join(FORMATS["codebook"](session, find_study(session, study), "all"))
     headers = {"content-disposition": f'attachment; filename="{study}-codebook.md"'}
     return Response(text, media_type="text/markdown; charset=utf-8", headers=headers)

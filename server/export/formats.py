@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.export import codebook, identities, psych_ds, runs
+from server.export.origins import ExportOrigin
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.ratings_csv import rating_count
 from server.models import Study
@@ -15,40 +16,43 @@ from server.studies.lookup import active_definition, all_definitions
 from server.text import encoded
 
 Format = Literal["csv", "runs", "raw", "codebook", "psych-ds", "identities"]
-Pieces = Callable[[Session, Study], Iterator[bytes]]
+Pieces = Callable[[Session, Study, ExportOrigin], Iterator[bytes]]
 
 
-def ratings_csv(session: Session, study: Study) -> Iterator[bytes]:
+def ratings_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
     """One row a play: the columns of the codebook, one column a factor."""
-    yield from csv_pieces(rating_table(session, study))
+    yield from csv_pieces(rating_table(session, study, origin))
 
 
-def runs_csv(session: Session, study: Study) -> Iterator[bytes]:
+def runs_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
     """One row a visit, forms included."""
-    yield from csv_pieces(whole(runs.run_rows(session, study), runs.run_count(session, study), extra=1))
+    rows, number = runs.run_rows(session, study, origin), runs.run_count(session, study, origin)
+    yield from csv_pieces(whole(rows, number, extra=1))
 
 
-def raw_json(session: Session, study: Study) -> Iterator[bytes]:
+def raw_json(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
     """Everything stored, one JSON object a run and line; the last line tells that it is complete."""
-    number = runs.run_count(session, study)
-    for line in whole(runs.raw_lines(session, study), number):
+    number = runs.run_count(session, study, origin)
+    for line in whole(runs.raw_lines(session, study, origin), number):
         yield encoded(line)
     yield (json.dumps({"complete": True, "runs": number}) + "\n").encode()
 
 
-def codebook_markdown(session: Session, study: Study) -> Iterator[bytes]:
-    """What every column means."""
+def codebook_markdown(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+    """What every column means; the same whatever the origin."""
+    del origin
     columns = codebook.rating_columns(all_definitions(session, study))
     yield encoded(codebook.markdown(active_definition(session, study), columns))
 
 
-def psych_ds_zip(session: Session, study: Study) -> Iterator[bytes]:
+def psych_ds_zip(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
     """A Psych-DS dataset as a zip."""
-    yield from psych_ds.dataset(session, study, now().date().isoformat())
+    yield from psych_ds.dataset(session, study, now().date().isoformat(), origin)
 
 
-def identities_csv(session: Session, study: Study) -> Iterator[bytes]:
-    """One row a visit whose person is known: the recruiter's id beside the pseudonym."""
+def identities_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+    """One row a visit whose person is known, of any origin: the recruiter's id beside the pseudonym."""
+    del origin
     rows = identities.identity_rows(session, study)
     yield from csv_pieces(whole(rows, identities.identity_count(session, study), extra=1))
 
@@ -63,8 +67,9 @@ FORMATS: dict[Format, Pieces] = {
 }
 
 
-def row_count(form: Format, session: Session, study: Study) -> int:
+def row_count(form: Format, session: Session, study: Study, origin: ExportOrigin) -> int:
     """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
     if form == "identities":
         return identities.identity_count(session, study)
-    return rating_count(session, study) if form in ("csv", "psych-ds") else runs.run_count(session, study)
+    count = rating_count if form in ("csv", "psych-ds") else runs.run_count
+    return count(session, study, origin)

@@ -11,12 +11,14 @@ from sqlalchemy.orm import Session
 
 from experiments.columns import RUN_COLUMNS, Column
 from experiments.definition import Experiment
+from experiments.trials import KINDS
 from server.export.codebook import (
     factor_columns,
     markdown,
     rating_columns,
     variables_measured,
 )
+from server.export.origins import ExportOrigin
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.runs import run_count, run_rows
 from server.models import Study
@@ -57,17 +59,17 @@ def _own_name(column: str) -> str:
     return f"factor_{column}" if column in _TAKEN else column
 
 
-def dataset(session: Session, study: Study, made: str) -> Iterator[bytes]:
+def dataset(session: Session, study: Study, made: str, origin: ExportOrigin) -> Iterator[bytes]:
     """The pieces of the zip: `dataset_description.json`, README, CHANGES, `data/`, codebook, definition."""
     sink = _Sink()
     version, definition = active_version(session, study), active_definition(session, study)
     columns = _columns(all_definitions(session, study))
-    keyword = _keyword(study.name)
+    keyword, view = _keyword(study.name), KINDS[definition.trial.kind].view
     texts = {
         "dataset_description.json": json.dumps(
             description(study, definition, columns, made), indent=2, ensure_ascii=False
         ),
-        "README.md": _readme(study, definition, made),
+        "README.md": _readme(study, definition, made, origin, view.name),
         "CHANGES.md": f"{made} Exported from version {version.number} of the study.\n",
         "documentation/codebook.md": markdown(definition, columns),
         f"materials/{definition.name}.toml": version.definition_toml,
@@ -77,8 +79,8 @@ def dataset(session: Session, study: Study, made: str) -> Iterator[bytes]:
             archive.writestr(f"{study.name}/{name}", encoded(text))
             yield sink.take()
         tables: tuple[tuple[str, Iterable[Sequence[Any]]], ...] = (
-            ("ratings", _with_header(columns, rating_table(session, study))),
-            ("runs", whole(run_rows(session, study), run_count(session, study), extra=1)),
+            (view.name, _with_header(columns, rating_table(session, study, origin))),
+            ("runs", whole(run_rows(session, study, origin), run_count(session, study, origin), extra=1)),
         )
         for table, rows in tables:
             path = f"{study.name}/data/study-{keyword}_description-{table}_data.csv"
@@ -113,24 +115,31 @@ def _keyword(name: str) -> str:
 def description(study: Study, definition: Experiment, columns: list[Column], made: str) -> dict[str, Any]:
     """The metadata file: schema.org JSON-LD with every column of every table."""
     variables = {column.name: column for column in (*columns, *RUN_COLUMNS)}
+    technique = definition.trial.kind.replace("_", " ")
+    given = KINDS[definition.trial.kind].view.name.capitalize()
     return {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": study.name,
-        "description": f"{definition.title}. Ratings of short clips collected with Palpebra.",
+        "description": f"{definition.title}. {given} of short clips collected with Palpebra.",
         "schemaVersion": "Psych-DS 0.4.0",
         "dateModified": made,
         "citation": definition.source or "",
-        "measurementTechnique": "Rating of single clips in a web browser",
-        "keywords": ["rating study", "video clips", *(factor.label for factor in definition.factors)],
+        "measurementTechnique": f"{technique.capitalize()} in a web browser",
+        "keywords": [
+            technique,
+            "video clips",
+            *(factor.label for factor in definition.factors),
+        ],
         "variableMeasured": variables_measured(list(variables.values())),
     }
 
 
-def _readme(study: Study, definition: Experiment, made: str) -> str:
+def _readme(study: Study, definition: Experiment, made: str, origin: ExportOrigin, table: str) -> str:
+    whose = "all origins, told apart by `run_origin`" if origin == "all" else f"the origin `{origin}` alone"
     return (
-        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}. One row a play in "
-        "`data/*ratings_data.csv`, one row a visit in `data/*runs_data.csv`; every column is explained in "
+        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}; data of {whose}. One row a play in "
+        f"`data/*{table}_data.csv`, one row a visit in `data/*runs_data.csv`; every column is explained in "
         "`documentation/codebook.md`; the declared experiment is in `materials/`.\n\n"
         "Rows with `synthetic` = 1 were not given by people. Rows with `excluded` = 1 were excluded by an "
         "experimenter, with the reason beside them.\n"

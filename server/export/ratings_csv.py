@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from experiments.columns import View, names_of
 from experiments.trials import KINDS
+from server.export.origins import ExportOrigin, of_origin
 from server.models import Rating, Study, StudyRun, StudyVersion
 from server.studies.lookup import active_definition
 
@@ -37,22 +38,22 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
     return tuple(names)
 
 
-def rating_count(session: Session, study: Study) -> int:
+def rating_count(session: Session, study: Study, origin: ExportOrigin) -> int:
     """Rows that `rating_rows` gives."""
     kind = active_definition(session, study).trial.kind
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
-    query = query.where(StudyRun.study_id == study.id, StudyRun.origin != "preview", Rating.kind == kind)
+    query = query.where(of_origin(study, origin), Rating.kind == kind)
     return session.scalar(query) or 0
 
 
-def rating_rows(session: Session, study: Study) -> Iterator[Sequence[Any]]:
+def rating_rows(session: Session, study: Study, origin: ExportOrigin) -> Iterator[Sequence[Any]]:
     """Rows of the view (values in the order of its names) by start of the run, then trial and play.
 
     Booleans are 0 and 1. One run's rows are in memory at a time.
     """
     connection, latest = session.connection(), 0
     of_a_run = _rows_of_a_run(view_of(session, study))
-    while runs := _runs_after(session, study, latest):
+    while runs := _runs_after(session, study, origin, latest):
         latest = runs[-1].id
         for run in runs:
             yield from _plain_rows(connection.execute(of_a_run, {"run": run.public_id}))
@@ -65,8 +66,6 @@ def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
     return rows
 
 
-def _runs_after(session: Session, study: Study, latest: int) -> Sequence[Any]:
-    query = select(StudyRun.id, StudyRun.public_id).where(
-        StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.origin != "preview"
-    )
+def _runs_after(session: Session, study: Study, origin: ExportOrigin, latest: int) -> Sequence[Any]:
+    query = select(StudyRun.id, StudyRun.public_id).where(of_origin(study, origin), StudyRun.id > latest)
     return session.execute(query.order_by(StudyRun.id).limit(RUNS_AT_ONCE)).all()

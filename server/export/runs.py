@@ -12,19 +12,18 @@ from sqlalchemy.orm import Session
 from experiments.columns import RUN_COLUMNS
 from server.clock import iso
 from server.evidence.service import judge_run
+from server.export.origins import ExportOrigin, of_origin
 from server.models import FormAnswer, Study, StudyRun
 from server.runs import service
 
 AT_ONCE = 100
 
 
-def each_run(session: Session, study: Study) -> Iterator[StudyRun]:
-    """The runs of a study but previews, in the order they began."""
+def each_run(session: Session, study: Study, origin: ExportOrigin) -> Iterator[StudyRun]:
+    """The runs of this origin, in the order they began."""
     latest = 0
     while True:
-        query = select(StudyRun).where(
-            StudyRun.study_id == study.id, StudyRun.id > latest, StudyRun.origin != "preview"
-        )
+        query = select(StudyRun).where(of_origin(study, origin), StudyRun.id > latest)
         runs = session.scalars(query.order_by(StudyRun.id).limit(AT_ONCE)).all()
         if not runs:
             return
@@ -33,17 +32,16 @@ def each_run(session: Session, study: Study) -> Iterator[StudyRun]:
         session.expunge_all()
 
 
-def run_count(session: Session, study: Study) -> int:
-    """Runs of a study but previews."""
-    query = select(func.count()).select_from(StudyRun).where(StudyRun.study_id == study.id)
-    return session.scalar(query.where(StudyRun.origin != "preview")) or 0
+def run_count(session: Session, study: Study, origin: ExportOrigin) -> int:
+    """Runs of this origin."""
+    return session.scalar(select(func.count()).select_from(StudyRun).where(of_origin(study, origin))) or 0
 
 
-def run_rows(session: Session, study: Study) -> Iterator[list[Any]]:
+def run_rows(session: Session, study: Study, origin: ExportOrigin) -> Iterator[list[Any]]:
     """Header and rows of the runs CSV, the columns of `RUN_COLUMNS`."""
     yield [column.name for column in RUN_COLUMNS]
     name = study.name
-    for run in each_run(session, study):
+    for run in each_run(session, study, origin):
         values = _values(session, run) | {"study": name}
         yield [values[column.name] for column in RUN_COLUMNS]
 
@@ -96,8 +94,8 @@ def _json(value: Any) -> str:
     return json.dumps(value, sort_keys=True, ensure_ascii=False)
 
 
-def raw_lines(session: Session, study: Study) -> Iterator[str]:
+def raw_lines(session: Session, study: Study, origin: ExportOrigin) -> Iterator[str]:
     """One JSON object a run with every play, drawn frame, event, form and calibration."""
-    query = select(StudyRun.public_id).where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
+    query = select(StudyRun.public_id).where(of_origin(study, origin))
     for public_id in session.scalars(query.order_by(StudyRun.id)).all():
         yield service.timeline(session, study, public_id).model_dump_json() + "\n"

@@ -14,6 +14,7 @@ from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
 from server.monitor.schemas import MonitorSnapshot
+from server.participants.schemas import Origin
 from server.studies.lookup import active_definition, find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
@@ -24,11 +25,11 @@ RETRY_MS = 1000
 """After so long a browser whose stream ended connects again."""
 
 
-def _snapshot(services: Services, name: str, who: Identity) -> MonitorSnapshot:
+def _snapshot(services: Services, name: str, who: Identity, origin: Origin | None) -> MonitorSnapshot:
     with services.database.read() as session:
         study = find_study(session, name)
         lease = timedelta(minutes=active_definition(session, study).session.lease_minutes)
-        shown = service.snapshot(session, study, lease)
+        shown = service.snapshot(session, study, lease, origin)
     if who.sees_persons:
         return shown
     nameless = [run.model_copy(update={"participant": run.run}) for run in shown.runs]
@@ -36,9 +37,11 @@ def _snapshot(services: Services, name: str, who: Identity) -> MonitorSnapshot:
 
 
 @router.get("/monitor")
-def get_monitor(services: ServicesDep, who: Viewer, study: str) -> MonitorSnapshot:
-    """The monitor at this moment."""
-    return _snapshot(services, study, who)
+def get_monitor(
+    services: ServicesDep, who: Viewer, study: str, origin: Origin | None = None
+) -> MonitorSnapshot:
+    """The monitor at this moment, of one origin; that of people now taking part where none is given."""
+    return _snapshot(services, study, who, origin)
 
 
 def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
@@ -58,13 +61,15 @@ async def _waited(services: Services) -> bool:
 
 
 @router.get("/monitor/stream", response_class=StreamingResponse)
-def stream_monitor(request: Request, services: ServicesDep, who: Viewer, study: str) -> StreamingResponse:
+def stream_monitor(
+    request: Request, services: ServicesDep, who: Viewer, study: str, origin: Origin | None = None
+) -> StreamingResponse:
     """Server-sent events: the whole monitor first, then every two seconds what has changed.
 
     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
     when the session ends or the server does; the browser then connects again by itself.
     """
-    first = _snapshot(services, study, who)
+    first = _snapshot(services, study, who, origin)
 
     async def events() -> AsyncIterator[str]:
         before: MonitorSnapshot | None = None
@@ -78,7 +83,7 @@ def stream_monitor(request: Request, services: ServicesDep, who: Viewer, study: 
                 return
             try:
                 await run_in_threadpool(identify, request, services)
-                current = await run_in_threadpool(_snapshot, services, study, who)
+                current = await run_in_threadpool(_snapshot, services, study, who, origin)
             except (NotSignedIn, NotFound):  # signed out, or the study was deleted meanwhile
                 return
 

@@ -38,9 +38,9 @@ class RunCount(NamedTuple):
 
 
 def run_counts(session: Session, study: Study) -> list[RunCount]:
-    """The runs of a study but previews, from an index alone."""
+    """The runs of a study, from an index alone."""
     kinds = (StudyRun.origin, StudyRun.status, StudyRun.stage)
-    query = select(*kinds, func.count()).where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
+    query = select(*kinds, func.count()).where(StudyRun.study_id == study.id)
     return [RunCount(*row) for row in session.execute(query.group_by(*kinds))]
 
 
@@ -69,10 +69,10 @@ def completed_since(
     return number, first
 
 
-def latest_runs(session: Session, study: Study, limit: int) -> Sequence[Any]:
-    """The runs that began last, in the order they began; previews are not shown."""
+def latest_runs(session: Session, study: Study, origin: str, limit: int) -> Sequence[Any]:
+    """The runs of one origin that began last, in the order they began."""
     query = select(*SHOWN).outerjoin(RunTally, RunTally.study_run_id == StudyRun.id)
-    query = query.where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
+    query = query.where(StudyRun.study_id == study.id, StudyRun.origin == origin)
     return session.execute(query.order_by(StudyRun.id.desc()).limit(limit)).all()[::-1]
 
 

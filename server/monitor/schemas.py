@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, Field
 
 from server.evidence.verdict import Verdict
+from server.participants.schemas import Origin
 
 
 class MonitoredRun(BaseModel):
@@ -48,8 +49,8 @@ class MonitorSnapshot(BaseModel):
     study_status: str
     quota: int | None
     server_time: datetime
-    origin: str = Field(description="Whose runs the counts, funnel and expected finish are of.")
-    others: dict[str, int] = Field(description="Runs of other origins, which are listed and not counted.")
+    origin: Origin = Field(description="Whose runs are listed and counted.")
+    others: dict[str, int] = Field(description="Runs of other origins, previews left out.")
     complete: int
     active: int
     dropped: int
@@ -60,5 +61,5 @@ class MonitorSnapshot(BaseModel):
     expected_finish: datetime | None = Field(
         description="When the quota will be full at the pace of the last day; null where it cannot be said."
     )
-    total: int = Field(description="Runs there are, previews aside.")
+    total: int = Field(description="Runs of this origin.")
     runs: list[MonitoredRun] = Field(description="The latest, in the order they began; not more than 500.")

@@ -13,6 +13,7 @@ from server.models.runs import STAGES
 from server.monitor import repository
 from server.monitor.repository import RunCount
 from server.monitor.schemas import FunnelStep, MonitoredRun, MonitorSnapshot
+from server.participants.schemas import Origin
 
 HERE_WITHIN = timedelta(minutes=1)
 PACE_OVER = timedelta(days=1)
@@ -20,13 +21,16 @@ MAX_LISTED = 500
 """Runs that are listed, the latest; all are counted."""
 
 
-def snapshot(session: Session, study: Study, lease: timedelta) -> MonitorSnapshot:
-    """The monitor of `study` at this moment; previews are not shown.
+def snapshot(
+    session: Session, study: Study, lease: timedelta, wanted: Origin | None = None
+) -> MonitorSnapshot:
+    """The monitor of `study` at this moment.
 
-    What is counted has one origin: the pilot's runs where the study is a pilot, else participants'.
+    It is of one origin: where none is wanted, the pilot while the study is one, else participants.
+    Of the others only their number is told, of previews nothing.
     """
     moment = now()
-    origin = "pilot" if study.status == "pilot" else "participant"
+    origin: Origin = wanted or ("pilot" if study.status == "pilot" else "participant")
     every = repository.run_counts(session, study)
     counted = [kind for kind in every if kind.origin == origin]
     by_status = Counter[str]()
@@ -34,7 +38,7 @@ def snapshot(session: Session, study: Study, lease: timedelta) -> MonitorSnapsho
         by_status[kind.status] += kind.runs
     active = repository.under_way(session, study, origin, moment - lease)
     recent = repository.completed_since(session, study, origin, moment - PACE_OVER)
-    runs = repository.latest_runs(session, study, MAX_LISTED)
+    runs = repository.latest_runs(session, study, origin, MAX_LISTED)
     return MonitorSnapshot(
         study=study.name,
         study_status=study.status,
@@ -50,16 +54,16 @@ def snapshot(session: Session, study: Study, lease: timedelta) -> MonitorSnapsho
         refused_browsers=repository.refused_browsers(session, study),
         funnel=funnel(counted),
         expected_finish=expected_finish(by_status["complete"], *recent, study.quota, moment),
-        total=sum(kind.runs for kind in every),
+        total=sum(kind.runs for kind in counted),
         runs=[monitored(run, moment, lease) for run in runs],
     )
 
 
 def others(every: Sequence[RunCount], origin: str) -> dict[str, int]:
-    """Runs of other origins than this."""
+    """Runs of other origins than this, previews left out."""
     counts = Counter[str]()
     for kind in every:
-        if kind.origin != origin:
+        if kind.origin not in (origin, "preview"):
             counts[kind.origin] += kind.runs
     return dict(counts)
 

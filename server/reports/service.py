@@ -112,7 +112,7 @@ def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> 
     try:
         with _one_at_a_time:
             _note(services, public_id, status="running", progress=0.05, message="exporting", started_at=now())
-            series = _export(services, name, inputs, wanted.series)
+            series = _export(services, name, inputs, wanted)
             _note(services, public_id, progress=0.2, message="analysing")
             message = _analyse(inputs, folder, wanted, series)
         status = "failed" if message else "done"
@@ -123,15 +123,15 @@ def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> 
         shutil.rmtree(inputs, ignore_errors=True)
 
 
-def _export(services: Services, name: str, inputs: Path, series: int | None) -> int:
+def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> int:
     """Write the ratings and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
     with services.database.read() as session:
         study = find_study(session, name)
-        version = version_of_series(session, study, series)
+        version = version_of_series(session, study, wanted.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
-        with (inputs / "ratings.csv").open("wb") as stream:
-            for piece in csv_pieces(rating_table(session, study)):
+        with (inputs / "answers.csv").open("wb") as stream:
+            for piece in csv_pieces(rating_table(session, study, wanted.origin)):
                 stream.write(piece)
         return version.series
 
@@ -139,7 +139,7 @@ def _export(services: Services, name: str, inputs: Path, series: int | None) -> 
 def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
     """Run the analysis; return its own error line where it failed, else an empty text."""
     program = Path(sys.executable).with_name("analysis")
-    command = [str(program), "run", str(inputs / "definition.toml"), "--csv", str(inputs / "ratings.csv")]
+    command = [str(program), "run", str(inputs / "definition.toml"), "--csv", str(inputs / "answers.csv")]
     command += ["--origin", wanted.origin, "--series", str(series), "--out", str(folder)]
     command += [] if wanted.sensitivity else ["--no-sensitivity"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603

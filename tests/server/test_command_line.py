@@ -41,7 +41,11 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     simulated = run_server_command(settings, "simulate", "short", "--participants", "2", "--seed", "4")
     assert "2 simulated participants" in simulated.stdout, simulated.stderr
     out = sources / "short.csv"
-    exported = run_server_command(settings, "export", "short", "--out", str(out))
+    people = run_server_command(settings, "export", "short", "--out", str(out))
+    assert people.returncode == 0, people.stderr
+    assert "no runs of origin participant; there are 2 of origin simulated (--origin)" in people.stderr
+    assert len(out.read_text(encoding="utf-8").splitlines()) == 1
+    exported = run_server_command(settings, "export", "short", "--origin", "simulated", "--out", str(out))
     assert exported.returncode == 0, exported.stderr
     rows = list(csv.DictReader(io.StringIO(out.read_text(encoding="utf-8"))))
     assert f"{out.stat().st_size:,} bytes" in exported.stdout.replace("\n", "")

@@ -1005,7 +1005,7 @@ export interface paths {
         };
         /**
          * Get Monitor
-         * @description The monitor at this moment.
+         * @description The monitor at this moment: of one origin, participants' (in a pilot the pilot's) where none is given.
          */
         get: operations["get_monitor"];
         put?: never;
@@ -3014,12 +3014,13 @@ export interface components {
             server_time: string;
             /**
              * Origin
-             * @description Whose runs the counts, funnel and expected finish are of.
+             * @description Whose runs are listed and counted.
+             * @enum {string}
              */
-            origin: string;
+            origin: "participant" | "preview" | "pilot" | "simulated";
             /**
              * Others
-             * @description Runs of other origins, which are listed and not counted.
+             * @description Runs of other origins, previews left out.
              */
             others: {
                 [key: string]: number;
@@ -8248,7 +8249,9 @@ export interface operations {
     };
     get_monitor: {
         parameters: {
-            query?: never;
+            query?: {
+                origin?: ("participant" | "preview" | "pilot" | "simulated") | null;
+            };
             header?: never;
             path: {
                 study: string;
@@ -8288,7 +8291,9 @@ export interface operations {
     };
     stream_monitor: {
         parameters: {
-            query?: never;
+            query?: {
+                origin?: ("participant" | "preview" | "pilot" | "simulated") | null;
+            };
             header?: never;
             path: {
                 study: string;
@@ -8631,7 +8636,9 @@ export interface operations {
     };
     download_ratings: {
         parameters: {
-            query?: never;
+            query?: {
+                origin?: "participant" | "pilot" | "simulated" | "all";
+            };
             header?: never;
             path: {
                 study: string;
@@ -8669,7 +8676,9 @@ export interface operations {
     };
     download_runs: {
         parameters: {
-            query?: never;
+            query?: {
+                origin?: "participant" | "pilot" | "simulated" | "all";
+            };
             header?: never;
             path: {
                 study: string;
@@ -8707,7 +8716,9 @@ export interface operations {
     };
     download_raw: {
         parameters: {
-            query?: never;
+            query?: {
+                origin?: "participant" | "pilot" | "simulated" | "all";
+            };
             header?: never;
             path: {
                 study: string;
@@ -8745,7 +8756,9 @@ export interface operations {
     };
     download_psych_ds: {
         parameters: {
-            query?: never;
+            query?: {
+                origin?: "participant" | "pilot" | "simulated" | "all";
+            };
             header?: never;
             path: {
                 study: string;

@@ -1,6 +1,10 @@
 import csv
 import io
 import json
+import zipfile
+
+import pytest
+from fastapi.testclient import TestClient
 
 from experiments.trials.clip_rating.columns import RATINGS
 from server.export.codebook import RUN_COLUMNS
@@ -26,6 +30,45 @@ def test_the_runs_csv_has_one_row_a_visit_with_its_forms(viewer: Admin, particip
     header, row = table(viewer.get("/studies/short/data/runs.csv").text)
     assert header == [column.name for column in RUN_COLUMNS]
     assert json.loads(dict(zip(header, row, strict=True))["forms"]) == {"about": {"age": 33}}
+
+
+ORIGINS = {"participant": 1, "pilot": 2, "simulated": 3}
+
+
+@pytest.mark.parametrize("form", ["ratings.csv", "runs.csv", "raw.ndjson", "psych-ds.zip"])
+def test_a_download_holds_one_origin_unless_all_are_asked_for(
+    viewer: Admin, study: StudyInDatabase, client: TestClient, form: str
+) -> None:
+    study.change(status="pilot")
+    for _ in range(2):
+        Participant(client, study.link_token).agree().rate_all()
+    study.change(status="live")
+    Participant(client, study.link_token).agree().rate_all()
+    link = study.link(synthetic=True)
+    for _ in range(3):
+        Participant(client, link).agree().rate_all()
+    each = 12 if form in ("ratings.csv", "psych-ds.zip") else 1
+    path = f"/studies/short/data/{form}"
+    assert viewer.get(path).headers["palpebra-rows"] == str(each)
+    for origin, number in ORIGINS.items():
+        answer = viewer.get(f"{path}?origin={origin}")
+        assert answer.headers["palpebra-rows"] == str(number * each)
+        assert found_origins(form, answer.content) == {origin}
+    everything = viewer.get(f"{path}?origin=all")
+    assert everything.headers["palpebra-rows"] == str(6 * each)
+    assert found_origins(form, everything.content) == set(ORIGINS)
+    assert viewer.get(f"{path}?origin=preview").status_code == 422
+
+
+def found_origins(form: str, content: bytes) -> set[str]:
+    if form == "psych-ds.zip":
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            (name,) = (name for name in archive.namelist() if "ratings_data" in name)
+            form, content = "ratings.csv", archive.read(name)
+    if form == "raw.ndjson":
+        *runs, _ = (json.loads(line) for line in content.splitlines())
+        return {run["summary"]["origin"] for run in runs}
+    return {row["run_origin"] for row in csv.DictReader(io.StringIO(content.decode()))}
 
 
 def test_raw_data_are_json_lines(viewer: Admin, participant: Participant) -> None:

@@ -27,8 +27,8 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
         participant.rate(trial, comment=comment)
     with services.database.read() as session:
         study = session.query(Study).one()
-        stream = io.StringIO(b"".join(ratings_csv(session, study)).decode("utf-8"), newline="")
-        rows = [dict(zip(RATINGS.names, row, strict=True)) for row in rating_rows(session, study)]
+        stream = io.StringIO(b"".join(ratings_csv(session, study, "all")).decode("utf-8"), newline="")
+        rows = [dict(zip(RATINGS.names, row, strict=True)) for row in rating_rows(session, study, "all")]
     read = list(csv.DictReader(stream))
     assert len(read) == 5
     factors = RATINGS.factors_in_header(read[0])
@@ -50,5 +50,5 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
 
 def test_an_empty_study_exports_its_header(services: Services, study: Any) -> None:
     with services.database.read() as session:
-        exported = b"".join(ratings_csv(session, session.query(Study).one())).decode("utf-8")
+        exported = b"".join(ratings_csv(session, session.query(Study).one(), "all")).decode("utf-8")
     assert exported.strip() == ",".join(RATINGS.csv_header(["character", "speed"]))

@@ -82,3 +82,20 @@ def test_every_run_is_counted_and_the_latest_are_listed(
     assert (shown["total"], shown["complete"], shown["active"]) == (3, 1, 2)
     reached = {step["stage"]: step["runs"] for step in shown["funnel"]}
     assert (reached["consent"], reached["done"]) == (3, 1)
+
+
+def test_the_monitor_is_of_one_origin_and_tells_how_many_others_there_are(
+    viewer: Admin, study: StudyInDatabase, client: TestClient
+) -> None:
+    Participant(client, study.link_token).agree()
+    for link in (study.link(synthetic=True), study.link(synthetic=True), study.link("preview")):
+        Participant(client, link).agree()
+    shown = viewer.get("/studies/short/monitor").json()
+    assert (shown["origin"], shown["total"], len(shown["runs"])) == ("participant", 1, 1)
+    assert shown["others"] == {"simulated": 2}
+    simulated = viewer.get("/studies/short/monitor?origin=simulated").json()
+    assert (simulated["total"], simulated["active"], simulated["others"]) == (2, 2, {"participant": 1})
+    assert {run["origin"] for run in simulated["runs"]} == {"simulated"}
+    preview = viewer.get("/studies/short/monitor?origin=preview").json()
+    assert (preview["total"], preview["others"]) == (1, {"participant": 1, "simulated": 2})
+    assert viewer.get("/studies/short/monitor?origin=nobody").status_code == 422

@@ -51,7 +51,7 @@ def migrated(empty_database_url: str, tmp_path: Path) -> Iterator[Services]:
 
 def exported(services: Services, study: str) -> bytes:
     with services.database.read() as session:
-        return b"".join(FORMATS["csv"](session, find_study(session, study)))
+        return b"".join(FORMATS["csv"](session, find_study(session, study), "all"))
 
 
 def older_columns_of(content: bytes, header: list[str]) -> bytes:

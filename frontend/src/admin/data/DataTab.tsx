@@ -1,10 +1,12 @@
-import { Anchor, Button, Card, Code, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Button, Card, Code, Group, SegmentedControl, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
+import { useState } from "react";
 import { studyQuery, useMay } from "../queries";
+import { type DataOrigin, ORIGINS } from "../results/origins";
 
 const FILES: [file: string, title: string, words: string][] = [
-  ["ratings.csv", "Ratings", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
+  ["ratings.csv", "Answers", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
   ["runs.csv", "Runs", "One row a visit: times, version, seed, exclusions, questionnaire."],
   ["psych-ds.zip", "Psych-DS dataset", "Data, metadata, codebook and definition in the community's standard folder."],
   ["codebook.md", "Codebook", "What every column means, with type and unit."],
@@ -18,17 +20,27 @@ const IDENTITIES: (typeof FILES)[number] = [
   "Recruiters’ ids beside the pseudonyms, for payment. Kept apart from all data, and noted in the audit log.",
 ];
 
+type ExportOrigin = DataOrigin | "all";
+
+const WHOSE: { value: ExportOrigin; label: string }[] = [...ORIGINS, { value: "all", label: "All together" }];
+
 export function DataTab() {
   const { study = "" } = useParams({ strict: false });
+  const [origin, setOrigin] = useState<ExportOrigin>("participant");
   const detail = useQuery(studyQuery(study)).data;
   const files = useMay("owner") ? [...FILES, IDENTITIES] : FILES;
   const version = detail?.summary.version ?? 1;
+  const chosen = origin === "participant" ? "" : `?origin=${origin}`;
+  const option = origin === "participant" ? "" : ` --origin ${origin}`;
   return (
     <Stack>
-      <Text size="sm">
-        Pilot and live data, excluded runs and simulated people are all in the files, each marked in its column; previews and erased people
-        are not.
-      </Text>
+      <Group>
+        <SegmentedControl aria-label="Data of" value={origin} onChange={setOrigin} data={WHOSE} />
+        <Text size="sm">
+          {origin === "all" ? "Data of all origins are told apart by the column run_origin. " : ""}
+          Excluded runs are in the files, marked in their column; previews and erased people are not.
+        </Text>
+      </Group>
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
         {files.map(([file, title, words]) => (
           <Card withBorder key={file}>
@@ -43,7 +55,7 @@ export function DataTab() {
               variant="default"
               mt="auto"
               style={{ alignSelf: "flex-start" }}
-              href={`/api/admin/studies/${study}/data/${file}`}
+              href={`/api/admin/studies/${study}/data/${file}${chosen}`}
               download
             >
               Download {file}
@@ -62,7 +74,7 @@ export function DataTab() {
         block
         tabIndex={0}
         aria-label="Commands"
-      >{`server export ${study} --out ${study}.csv\nserver export ${study} --format psych-ds --out ${study}.zip\nanalysis run ${study}.toml --csv ${study}.csv`}</Code>
+      >{`server export ${study}${option} --out ${study}.csv\nserver export ${study}${option} --format psych-ds --out ${study}.zip\nanalysis run ${study}.toml --csv ${study}.csv${option}`}</Code>
     </Stack>
   );
 }

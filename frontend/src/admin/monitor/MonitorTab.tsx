@@ -1,5 +1,8 @@
-import { Alert, Center, Loader, SimpleGrid, Stack, Text } from "@mantine/core";
+import { Alert, Center, Group, Loader, SegmentedControl, SimpleGrid, Stack, Text } from "@mantine/core";
 import { useParams } from "@tanstack/react-router";
+import { useState } from "react";
+import { ORIGINS } from "../results/origins";
+import type { Schemas } from "../api";
 import { Figures } from "../ui/Figures";
 import { soon } from "../ui/format";
 import { Funnel } from "./Funnel";
@@ -7,9 +10,20 @@ import { Quality } from "./Quality";
 import { RunTable } from "./RunTable";
 import { useMonitor } from "./useMonitor";
 
+type Origin = Schemas["MonitorSnapshot"]["origin"];
+
+const MONITORED = [...ORIGINS, { value: "preview", label: "Preview" }] satisfies { value: Origin; label: string }[];
+
+/** How many runs of other origins there are, in words. */
+function othersIn(others: Record<string, number>): string {
+  const named = Object.entries(others).map(([origin, runs]) => `${runs} ${origin}`);
+  return named.length === 0 ? "" : `Other origins: ${named.join(", ")}`;
+}
+
 export function MonitorTab() {
   const { study = "" } = useParams({ strict: false });
-  const { snapshot, connected } = useMonitor(study);
+  const [chosen, setOrigin] = useState<Origin | null>(null);
+  const { snapshot, connected } = useMonitor(study, chosen);
   const interrupted = connected ? null : (
     <Alert color="yellow" role="status">
       The connection is interrupted; trying again.
@@ -26,6 +40,12 @@ export function MonitorTab() {
   return (
     <Stack>
       {interrupted}
+      <Group>
+        <SegmentedControl aria-label="Runs of" value={chosen ?? snapshot.origin} onChange={(word) => setOrigin(word)} data={MONITORED} />
+        <Text size="sm" c="dimmed">
+          {othersIn(snapshot.others)}
+        </Text>
+      </Group>
       <Figures
         figures={[
           ["complete", snapshot.quota === null ? snapshot.complete : `${snapshot.complete} of ${snapshot.quota}`],
@@ -37,7 +57,7 @@ export function MonitorTab() {
         ]}
       />
       {snapshot.runs.length === 0 ? (
-        <Text c="dimmed">Nobody has begun yet. Whoever opens a link appears here within two seconds.</Text>
+        <Text c="dimmed">No run of origin {snapshot.origin} yet. Whoever opens a link appears here within two seconds.</Text>
       ) : (
         <>
           <SimpleGrid cols={{ base: 1, md: 2 }}>

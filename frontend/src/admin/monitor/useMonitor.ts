@@ -10,13 +10,13 @@ type Snapshot = Schemas["MonitorSnapshot"];
 const AGAIN_MS = 3_000;
 
 /** `connected` is false while the browser tries to reach the server again. */
-export function useMonitor(study: string): { snapshot: Snapshot | null; connected: boolean } {
+export function useMonitor(study: string, origin: Snapshot["origin"] | null): { snapshot: Snapshot | null; connected: boolean } {
   const [snapshot, setSnapshot] = useState<Snapshot | null>(null);
   const [connected, setConnected] = useState(true);
   const queries = useQueryClient();
   useEffect(() => {
     const stop = listen(
-      `/api/admin/studies/${encodeURIComponent(study)}/monitor/stream`,
+      `/api/admin/studies/${encodeURIComponent(study)}/monitor/stream${origin === null ? "" : `?origin=${origin}`}`,
       (fresh, first) => {
         setConnected(true);
         // Many rows may change at once: the browser goes on answering meanwhile.
@@ -29,7 +29,7 @@ export function useMonitor(study: string): { snapshot: Snapshot | null; connecte
       },
     );
     return stop;
-  }, [study, queries]);
+  }, [study, origin, queries]);
   return { snapshot, connected };
 }
 
