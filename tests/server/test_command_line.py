@@ -10,10 +10,12 @@ import pytest
 
 from experiments.load import parse_experiment
 from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.clip_rating.declaration import SCALE_NAME
 from server.context import Services
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
-from server.results.repository import Pool, clip_counts
+from server.results.repository import Pool
 from server.settings import Settings
+from server.tallies.pools import pooled
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 from tests.helpers.tiny_clips import make_clip_folder
@@ -219,6 +221,6 @@ def test_a_draft_is_rehearsed_and_no_count_of_people_knows(
         pools = (
             Pool(study_id=1, origin=origin, series=1) for origin in ("participant", "pilot", "simulated")
         )
-        counts = [sum(count.times for count in clip_counts(session, pool)) for pool in pools]
+        counts = [pooled(session, pool.runs(), SCALE_NAME, ()).answers.total() for pool in pools]
     assert counts[:2] == [0, 0]
     assert counts[2] >= 15
