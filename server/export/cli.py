@@ -64,7 +64,7 @@ def export(
         there = runs_by_origin(session, found)
     if str(out_file) != "-":
         out.print(f"{out_file}: {size:,} bytes")
-    if form != "codebook" and origin != "all" and origin not in there and there:
+    if form not in ("codebook", "identities") and origin != "all" and origin not in there and there:
         others = ", ".join(f"{number} of origin {name}" for name, number in sorted(there.items()))
         typer.echo(f"no runs of origin {origin}; there are {others} (--origin)", err=True)
 

@@ -1005,7 +1005,7 @@ export interface paths {
         };
         /**
          * Get Monitor
-         * @description The monitor at this moment: of one origin, participants' (in a pilot the pilot's) where none is given.
+         * @description The monitor at this moment, of one origin; that of people now taking part where none is given.
          */
         get: operations["get_monitor"];
         put?: never;
