@@ -3046,7 +3046,7 @@ export interface components {
             expected_finish: string | null;
             /**
              * Total
-             * @description Runs there are, previews aside.
+             * @description Runs of this origin.
              */
             total: number;
             /**
