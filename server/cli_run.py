@@ -24,7 +24,7 @@ from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.operations.modes import close_to_others
 from server.protocol import BoundedHttp
 from server.settings import Settings
-from server.studies.links import general_link, link_url
+from server.studies.links import general_links, link_url
 
 GRACE_S = 20
 WORKER_START_S = 60
@@ -114,9 +114,10 @@ def _welcome(services: Services) -> None:
         for study in session.scalars(
             select(Study).where(Study.status.in_(("pilot", "live"))).order_by(Study.id)
         ):
-            link = general_link(session, settings.key, study)
-            url = link_url(settings.public_url, settings.key, link.public_id)
-            out.print(f"{study.name} ({study.status}): {url}")
+            for link in general_links(session, settings.key, study):
+                url = link_url(settings.public_url, settings.key, link.public_id)
+                group = f", {link.group_name}" if link.group_name else ""
+                out.print(f"{study.name} ({study.status}{group}): {url}")
         first = not _has_accounts(session)
     out.print(f"admin site: {settings.public_url}/admin/")
     if first:

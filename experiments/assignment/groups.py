@@ -1,5 +1,6 @@
 """Groups of participants: one for each combination of the levels of the factors between participants."""
 
+from collections.abc import Iterable
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,6 +22,16 @@ def groups(experiment: "Experiment") -> list[tuple[tuple[str, str], ...]]:
     """The levels of each group, last factor fastest; one group without levels where no factor is between."""
     between = [factor for factor in experiment.factors if factor.between]
     return list(product(*([(factor.name, level.name) for level in factor.levels] for factor in between)))
+
+
+def name_of(levels: Iterable[tuple[str, str]]) -> str:
+    """A group as quotas, links and exports name it; empty where there is one group only."""
+    return "/".join(level for _, level in levels)
+
+
+def names(experiment: "Experiment") -> list[str]:
+    """The groups by name, in the order of their turns."""
+    return [name_of(levels) for levels in groups(experiment)]
 
 
 def place_of(experiment: "Experiment", slot: int) -> Place:

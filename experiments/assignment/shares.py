@@ -1,12 +1,13 @@
 """Which clips a participant sees, by the declared assignment, and how often each clip is seen in all."""
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from experiments import design
 from experiments.assignment import lists
 from experiments.assignment.every import every_clip
-from experiments.assignment.groups import Place, clips_of, groups, place_of
+from experiments.assignment.groups import Place, clips_of, groups, name_of, names, place_of
 from experiments.assignment.sample import sampled
 from experiments.design import ClipSpec
 
@@ -25,30 +26,46 @@ def share(experiment: "Experiment", place: Place) -> frozenset[ClipSpec]:
     return every_clip(clips)
 
 
-def expected_counts(experiment: "Experiment", participants: int) -> dict[ClipSpec, int]:
-    """How often each clip is seen by this many participants, repeats of blocks included."""
-    counts = Counter(
-        clip for slot in range(participants) for clip in share(experiment, place_of(experiment, slot))
-    )
+def expected_slots(experiment: "Experiment") -> list[int]:
+    """The slots that will be held: those of full quotas where every group has one, else the first ones."""
+    every, quotas = names(experiment), experiment.groups.quotas
+    if len(every) > 1 and set(quotas) == set(every):
+        return [
+            turn + len(every) * number for turn, name in enumerate(every) for number in range(quotas[name])
+        ]
+    return list(range(experiment.participants))
+
+
+def expected_counts(experiment: "Experiment", slots: Iterable[int]) -> dict[ClipSpec, int]:
+    """How often each clip is seen by the participants with these slots, repeats of blocks included."""
+    counts = Counter(clip for slot in slots for clip in share(experiment, place_of(experiment, slot)))
     return {clip: counts[clip] * experiment.blocks.repeats for clip in design.clips(experiment)}
 
 
 def lines(experiment: "Experiment") -> tuple[str, ...]:
     """What a plan says of it; nothing where everybody sees every clip."""
-    every, people = groups(experiment), experiment.participants
-    said: list[str] = []
-    if len(every) > 1:
-        sizes = Counter(place_of(experiment, slot).levels for slot in range(people))
-        named = (f"{'/'.join(level for _, level in group)} ({sizes[group]})" for group in every)
-        said.append(f"{len(every)} groups of participants in turn: {', '.join(named)}")
+    every, slots = groups(experiment), expected_slots(experiment)
+    said: list[str] = [_said_of_groups(experiment)] if len(every) > 1 else []
     if len(every) > 1 or experiment.assignment != type(experiment.assignment)():
-        counts = expected_counts(experiment, people)
+        counts = expected_counts(experiment, slots)
         low, high = min(counts.values()), max(counts.values())
         each = f"{low}" if low == high else f"{low} to {high}"
-        said.append(f"with {people} participants each clip is seen {each} times")
+        said.append(f"with {len(slots)} participants each clip is seen {each} times")
         if unseen := [lists.label(clip) for clip, count in counts.items() if not count]:
             said.append(f"{len(unseen)} clips are seen by nobody, {unseen[0]} first")
     return tuple(said)
+
+
+def _said_of_groups(experiment: "Experiment") -> str:
+    declared, named = experiment.groups, names(experiment)
+    ways = {"turn": "in turn", "link": "by link"}
+    way = ways.get(declared.by) or f"by the answer to '{declared.question}'"
+    sizes = {name: str(declared.quotas.get(name, "no quota")) for name in named}
+    if not declared.quotas and declared.by == "turn":
+        turns = Counter(name_of(place_of(experiment, slot).levels) for slot in expected_slots(experiment))
+        sizes = {name: str(turns[name]) for name in named}
+    listed = (f"{name} ({size})" for name, size in sizes.items())
+    return f"{len(named)} groups of participants {way}: {', '.join(listed)}"
 
 
 def fault(experiment: "Experiment") -> str | None:

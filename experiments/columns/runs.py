@@ -58,6 +58,7 @@ RUN_COLUMNS: tuple[Column, ...] = (
     Column("device", "text", "JSON object of what the browser said of itself."),
     Column("run_origin", "text", "Where the run came from, fixed at its start.", values=ORIGINS),
     Column("data_series", "integer", "Data series of the run's version of the study."),
+    Column("group_name", "text", "Group of the participant, levels joined by slashes; empty without groups."),
     Column(
         "evidence_verdict",
         "text",

@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
-from experiments.assignment import shares
+from experiments.assignment import grouping, shares
 from experiments.base import Declaration, Language, Name
 from experiments.definition.analysis_plan import AnalysisPlan
 from experiments.definition.assignment import Assignment
@@ -12,6 +12,7 @@ from experiments.definition.blocks import Blocks, Practice
 from experiments.definition.display import Display
 from experiments.definition.factors import Exemplars, Factor
 from experiments.definition.forms import Form
+from experiments.definition.groups import Groups
 from experiments.definition.names import refuse_repeats, refuse_reserved
 from experiments.definition.session import Session
 from experiments.definition.texts import Texts
@@ -54,6 +55,8 @@ class Experiment(Declaration):
     """How many clips a cell has."""
     assignment: Assignment = Assignment()
     """Who sees which clips."""
+    groups: Groups = Groups()
+    """How participants come into the groups that factors between them make."""
     blocks: Blocks = Blocks()
     """Blocks and their order."""
     practice: Practice = Practice()
@@ -114,7 +117,7 @@ class Experiment(Declaration):
             if between or self.assignment != Assignment():
                 key = f"factors: '{between}' is between participants; " if between else "assignment: "
                 raise ValueError(f"{key}trials of the kind {self.trial.kind} are dealt by their own design")
-        if fault := shares.fault(self):
+        if fault := shares.fault(self) or grouping.fault(self):
             raise ValueError(fault)
         return self
 

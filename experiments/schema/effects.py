@@ -27,6 +27,10 @@ EFFECTS: Mapping[str, Effect] = {
     "render": "measured",
     "exemplars": "measured",
     "assignment": "measured",
+    "groups.by": "measured",
+    "groups.answers": "measured",
+    # How many take part, as `participants`.
+    "groups.quotas": "wording",
     "blocks.split_by": "measured",
     "blocks.repeats": "measured",
     "blocks.order": "measured",

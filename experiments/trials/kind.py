@@ -1,11 +1,12 @@
 """What a kind of trial is made of. Everything else reads it from here."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
+from experiments.assignment.compared import Compared
 from experiments.assignment.trial import Trial
 from experiments.base import Declaration
 from experiments.columns.view import View
@@ -62,6 +63,12 @@ def nothing_more(experiment: "Experiment") -> tuple[str, ...]:
     return ()
 
 
+def never(experiment: "Experiment") -> bool:
+    """No kind's trials depend on what is stored unless it says so."""
+    del experiment
+    return False
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of trial.
@@ -81,6 +88,7 @@ class Kind:
     shares_clips: whether it follows [assignment] and factors between participants; else they are refused.
     plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
     adapts: whether answers decide what is shown next: the server then follows its series.
+    chooses: whether a run's trials are chosen by the comparisons stored before it. assign_by: then does so.
     check_response: the number that an answer, as stored, is to an attention check, which asks for one.
     """
 
@@ -99,6 +107,8 @@ class Kind:
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     shares_clips: bool = False
     adapts: bool = False
+    chooses: "Callable[[Experiment], bool]" = never
+    assign_by: "Callable[[Experiment, int, int, Sequence[Compared]], list[Trial]] | None" = None
 
     @property
     def name(self) -> str:

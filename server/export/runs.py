@@ -13,7 +13,7 @@ from experiments.columns import RUN_COLUMNS
 from server.clock import iso
 from server.evidence.service import judge_run
 from server.export.origins import ExportOrigin, of_origin
-from server.models import FormAnswer, Study, StudyRun
+from server.models import NO_SLOT, FormAnswer, Study, StudyRun
 from server.runs import service
 
 AT_ONCE = 100
@@ -60,7 +60,8 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "version": run.version.number,
         "definition_sha256": run.version.definition_sha256,
         "seed": run.seed,
-        "slot": run.slot,
+        "slot": run.slot if run.slot != NO_SLOT else "",
+        "group_name": run.group_name,
         "started_at": _time(run.started_at),
         "consented_at": _time(run.consented_at),
         "completed_at": _time(run.completed_at),

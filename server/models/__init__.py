@@ -12,6 +12,7 @@ from server.models.accounts import (
 from server.models.base import Base, UtcDateTime
 from server.models.evidence import AnswerEvidence
 from server.models.runs import (
+    NO_SLOT,
     RUN_STATUSES,
     STAGES,
     AssignedTrial,
@@ -30,6 +31,7 @@ from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
 from server.models.tallies import RunTally
 
 __all__ = [
+    "NO_SLOT",
     "ROLES",
     "RUN_STATUSES",
     "STAGES",

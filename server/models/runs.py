@@ -23,6 +23,7 @@ STAGES = (
 )
 ORIGINS = ("participant", "preview", "pilot", "simulated")
 CLIP_ROLES = ("shown", "left", "right", "first", "second", "reference")
+NO_SLOT = -1
 RUN_STATUSES = ("active", "complete", "screened_out", "withdrawn")
 
 
@@ -30,7 +31,8 @@ class StudyRun(Base):
     """A participant's visit. No internet address is stored, here or anywhere.
 
     participant: the study's pseudonym of the person, see `server.participants.identities`.
-    slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease.
+    slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease;
+    NO_SLOT while an answer of a form is still to decide the group. group_name: empty without groups.
     origin: where its answers come from, given at its start; the database refuses to change it.
     seed: of the trial order. trials_answered: trials that need no further play, practice and checks included.
     elapsed_ms: latest `time_elapsed`, from which the clock goes on after a reload.
@@ -71,6 +73,7 @@ class StudyRun(Base):
     language: Mapped[str] = mapped_column(String(10))
     seed: Mapped[int] = mapped_column(BigInteger)
     slot: Mapped[int]
+    group_name: Mapped[str] = mapped_column(Text, default="")
     trials_total: Mapped[int]
     trials_answered: Mapped[int] = mapped_column(default=0)
     started_at: Mapped[datetime] = mapped_column(default=now)

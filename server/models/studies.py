@@ -113,6 +113,7 @@ class Link(Base):
 
     kind: general (any number of people), personal (one person, resumes on any device), preview (nothing is
     counted or exported). label: who or what it is for. synthetic: its runs are simulated, not people.
+    group_name: the group its participants come into, where links decide; else empty.
     """
 
     __tablename__ = "links"
@@ -128,6 +129,7 @@ class Link(Base):
     token_hash: Mapped[str] = mapped_column(String(64), unique=True)
     label: Mapped[str] = mapped_column(String(200), default="")
     synthetic: Mapped[bool] = mapped_column(default=False)
+    group_name: Mapped[str] = mapped_column(Text, default="")
     quota: Mapped[int | None]
     recruiter: Mapped[dict[str, Any] | None]
     expires_at: Mapped[datetime | None]

@@ -3,7 +3,6 @@
 import asyncio
 import time
 from collections.abc import AsyncIterator
-from datetime import timedelta
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
@@ -28,8 +27,7 @@ RETRY_MS = 1000
 def _snapshot(services: Services, name: str, who: Identity, origin: Origin | None) -> MonitorSnapshot:
     with services.database.read() as session:
         study = find_study(session, name)
-        lease = timedelta(minutes=active_definition(session, study).session.lease_minutes)
-        shown = service.snapshot(session, study, lease, origin)
+        shown = service.snapshot(session, study, active_definition(session, study), origin)
     if who.sees_persons:
         return shown
     nameless = [run.model_copy(update={"participant": run.run}) for run in shown.runs]

@@ -1,5 +1,6 @@
 """What the monitor reads: counts of runs by the database, and the latest runs with their heat maps."""
 
+from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
@@ -53,6 +54,23 @@ def under_way(session: Session, study: Study, origin: str, seen_after: datetime)
         StudyRun.last_seen_at >= seen_after,
     )
     return session.scalar(query) or 0
+
+
+def by_group(
+    session: Session, study: Study, origin: str, seen_after: datetime
+) -> tuple[Counter[str], Counter[str]]:
+    """Complete and active runs of one origin by group; those that are excluded, or silent since, not counted."""
+    query = select(StudyRun.group_name, StudyRun.status, func.count()).where(
+        StudyRun.study_id == study.id,
+        StudyRun.origin == origin,
+        StudyRun.excluded.is_(False),
+        (StudyRun.status == "complete")
+        | ((StudyRun.status == "active") & (StudyRun.last_seen_at > seen_after)),
+    )
+    counts = {"complete": Counter[str](), "active": Counter[str]()}
+    for group, status, number in session.execute(query.group_by(StudyRun.group_name, StudyRun.status)):
+        counts[status][group] += number
+    return counts["complete"], counts["active"]
 
 
 def completed_since(

@@ -42,6 +42,15 @@ class FunnelStep(BaseModel):
     runs: int
 
 
+class GroupCount(BaseModel):
+    """How many took part in one group."""
+
+    name: str
+    quota: int | None
+    complete: int
+    active: int
+
+
 class MonitorSnapshot(BaseModel):
     """Everything the monitor shows at one moment."""
 
@@ -57,6 +66,7 @@ class MonitorSnapshot(BaseModel):
     screened_out: int
     withdrawn: int
     refused_browsers: int
+    groups: list[GroupCount] = Field(description="Groups of participants; empty where there is one only.")
     funnel: list[FunnelStep]
     expected_finish: datetime | None = Field(
         description="When the quota will be full at the pace of the last day; null where it cannot be said."

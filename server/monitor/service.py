@@ -7,12 +7,14 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.assignment.groups import names
+from experiments.definition import Experiment
 from server.clock import now
 from server.models import Study
 from server.models.runs import STAGES
 from server.monitor import repository
 from server.monitor.repository import RunCount
-from server.monitor.schemas import FunnelStep, MonitoredRun, MonitorSnapshot
+from server.monitor.schemas import FunnelStep, GroupCount, MonitoredRun, MonitorSnapshot
 from server.participants.schemas import Origin
 
 HERE_WITHIN = timedelta(minutes=1)
@@ -22,13 +24,14 @@ MAX_LISTED = 500
 
 
 def snapshot(
-    session: Session, study: Study, lease: timedelta, wanted: Origin | None = None
+    session: Session, study: Study, experiment: Experiment, wanted: Origin | None = None
 ) -> MonitorSnapshot:
     """The monitor of `study` at this moment.
 
     It is of one origin: where none is wanted, the pilot while the study is one, else participants.
     Of the others only their number is told, of previews nothing.
     """
+    lease = timedelta(minutes=experiment.session.lease_minutes)
     moment = now()
     origin: Origin = wanted or ("pilot" if study.status == "pilot" else "participant")
     every = repository.run_counts(session, study)
@@ -52,6 +55,7 @@ def snapshot(
         withdrawn=by_status["withdrawn"],
         others=others(every, origin),
         refused_browsers=repository.refused_browsers(session, study),
+        groups=group_counts(session, study, experiment, origin, moment - lease),
         funnel=funnel(counted),
         expected_finish=expected_finish(by_status["complete"], *recent, study.quota, moment),
         total=sum(kind.runs for kind in counted),
@@ -66,6 +70,20 @@ def others(every: Sequence[RunCount], origin: str) -> dict[str, int]:
         if kind.origin not in (origin, "preview"):
             counts[kind.origin] += kind.runs
     return dict(counts)
+
+
+def group_counts(
+    session: Session, study: Study, experiment: Experiment, origin: str, seen_after: datetime
+) -> list[GroupCount]:
+    """Places taken in each group, excluded runs not counted; nothing where there is one group only."""
+    every, quotas = names(experiment), experiment.groups.quotas
+    if len(every) < 2:
+        return []
+    complete, active = repository.by_group(session, study, origin, seen_after)
+    return [
+        GroupCount(name=name, quota=quotas.get(name), complete=complete[name], active=active[name])
+        for name in every
+    ]
 
 
 def monitored(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:

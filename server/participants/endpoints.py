@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from server.context import DatabaseDep, ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.participants import completion, links, runs
+from server.participants import completion, form_answers, links, runs
 from server.participants.next_trials import follow
 from server.participants.refusals import RunUnknown
 from server.participants.schemas import (
@@ -120,10 +120,10 @@ def put_device(
 
 
 @router.put("/run/forms/{name}")
-def put_form(services: ServicesDep, token: RunToken, name: str, form: FormAnswers) -> Saved:
-    """Store the answers of a declared form."""
+def put_form(services: ServicesDep, request: Request, token: RunToken, name: str, form: FormAnswers) -> Saved:
+    """Store the answers of a declared form; the one that decides the group gives the run with its trials."""
     with services.database.write() as session:
-        return runs.save_form(services, session, token, name, form.answers)
+        return form_answers.save_form(services, session, token, name, form.answers, services.time_of(request))
 
 
 @router.put("/run/stage")

@@ -2,23 +2,23 @@
 
 import secrets
 from datetime import timedelta
-from typing import Any, Literal
+from typing import Literal
 from uuid import UUID
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.trial import Trial
+from experiments.assignment.grouping import deciding
 from experiments.definition import Display, Experiment
 from experiments.errors import did_you_mean
-from experiments.trials import KINDS
 from experiments.trials.counts import expected_minutes
 from server.clock import now
 from server.context import Services
 from server.evidence.intake import ENFORCED_ORIGINS
 from server.evidence.repository import has_older_runs
-from server.models import Link, RecruiterIdentity, Study, StudyRun
-from server.participants import repository, returning
+from server.models import NO_SLOT, Link, RecruiterIdentity, Study, StudyRun
+from server.participants import grouping, repository, returning
 from server.participants.bounds import checked_device
+from server.participants.placing import place
 from server.participants.recruiter import NO_RECRUITER, Recruiter
 from server.participants.refusals import (
     LanguageUnknown,
@@ -31,7 +31,6 @@ from server.participants.refusals import (
 from server.participants.schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
 from server.participants.screening import screens_devices
 from server.tokens import derived_token, hash_token, new_public_id, new_token
-from server.trials.series import service as series
 from server.versions import LoadedVersion
 
 RUN_PURPOSE = "run"
@@ -70,6 +69,7 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
         run is not None and run.status == "active" and returning.refusal_to_resume(experiment, run) is None
     )
     over = run is not None and not resumable and not returning.restarts(experiment, run)
+    status = _status(session, link, link.study, version_id, experiment)
     return LinkState(
         study=LinkedStudy(
             name=link.study.name,
@@ -78,7 +78,7 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
             background=experiment.display.background,
             expected_minutes=expected_minutes(experiment),
         ),
-        status="open" if resumable else "used" if over else _status(session, link, link.study, experiment),
+        status="open" if resumable else "used" if over else status,
         kind=link.kind,
         resumable=resumable,
         screens_devices=screens_devices(experiment),
@@ -119,7 +119,8 @@ def _begun(services: Services, session: Session, link: Link, study: Study, start
     """A new visit, or the reason why there is none."""
     version_id = repository.active_version_id(session, study)
     loaded = services.versions.get(session, version_id)
-    status = _status(session, link, study, loaded.experiment)
+    grouping.check_parameter(loaded.experiment, link, start.query)
+    status = _status(session, link, study, version_id, loaded.experiment)
     if status != "open":
         refusal, message = _REFUSALS[status]
         raise refusal(message)
@@ -133,13 +134,13 @@ def _begun(services: Services, session: Session, link: Link, study: Study, start
 Status = Literal["open", "closed", "expired", "full", "paused"]
 
 
-def _status(session: Session, link: Link, study: Study, experiment: Experiment) -> Status:
+def _status(session: Session, link: Link, study: Study, version_id: int, experiment: Experiment) -> Status:
     """Whether a new run may begin: open, or the reason why not."""
     if link.expires_at is not None and link.expires_at <= now():
         return "expired"
     if link.kind == "preview" or link.synthetic:
         return "open"
-    if study.status not in ("pilot", "live"):
+    if study.status not in ("pilot", "live") or grouping.leads_nowhere(experiment, link):
         return "closed"
     if study.paused:
         return "paused"
@@ -152,7 +153,15 @@ def _status(session: Session, link: Link, study: Study, experiment: Experiment) 
             taken = repository.places_taken(session, column, ident, _origin(link, study), lease)
             if taken >= quota:
                 return "full"
-    return "open"
+    turns = grouping.open_turns(
+        session, experiment, version_id, _origin(link, study), _group(experiment, link)
+    )
+    return "open" if turns else "full"
+
+
+def _group(experiment: Experiment, link: Link) -> str:
+    """The group that a link is for; empty where it decides none."""
+    return link.group_name if experiment.groups.by == "link" else ""
 
 
 def _origin(link: Link, study: Study) -> Origin:
@@ -184,15 +193,11 @@ def _new_run(
     loaded: LoadedVersion,
     start: RunStart,
 ) -> tuple[StudyRun, str]:
-    """Draw slot, seed and order, and store them with the run."""
+    """Draw a seed, store the run, and give it its place, unless an answer is to decide its group."""
     origin, phase = _origin(link, study), "live" if study.status == "live" else "pilot"
     if origin == "preview":
         keep = timedelta(hours=services.settings.preview_keep_hours)
         repository.delete_previews(session, study, now() - keep)
-    lease = timedelta(minutes=loaded.experiment.session.lease_minutes)
-    slot = repository.free_slot(session, version_id, origin, lease)
-    seed = secrets.randbits(SEED_BITS)
-    trials = KINDS[loaded.experiment.trial.kind].assign(loaded.experiment, seed, slot)
     public_id = new_public_id()
     token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
     identifier = recruiter_of(link).participant(start.query) or ""
@@ -207,9 +212,9 @@ def _new_run(
         phase=phase,
         origin=origin,
         language=start.language,
-        seed=seed,
-        slot=slot,
-        trials_total=len(trials),
+        seed=secrets.randbits(SEED_BITS),
+        slot=NO_SLOT,
+        trials_total=0,
         completion_code=new_token()[:10],
         device=checked_device(start.device),
         evidence=_evidence(services, session, origin, start),
@@ -218,9 +223,11 @@ def _new_run(
     if start.query:
         known_as = RecruiterIdentity(study_run_id=run.id, identifier=identifier, parameters=start.query)
         repository.add_all(session, [known_as])
-    repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
-    if KINDS[loaded.experiment.trial.kind].adapts:
-        series.add_places(session.connection(), run, loaded, trials)
+    if deciding(loaded.experiment) is None:
+        group = _group(loaded.experiment, link)
+        place(
+            session, run, loaded, grouping.open_turns(session, loaded.experiment, version_id, origin, group)
+        )
     return run, token
 
 
@@ -233,31 +240,3 @@ def _evidence(
     if origin not in ENFORCED_ORIGINS and not services.intake.rehearses:
         return "none"
     return "older" if has_older_runs(session, now() - OLD_PAGES_ACCEPTED) else "asked"
-
-
-def _trial_rows(run: StudyRun, trials: list[Trial]) -> list[dict[str, Any]]:
-    return [
-        {
-            "study_run_id": run.id,
-            "trial_index": index,
-            "kind": trial.kind,
-            "block": trial.block,
-            "block_label": trial.block_label,
-            "expected_response": trial.expected_response,
-        }
-        for index, trial in enumerate(trials)
-    ]
-
-
-def _clip_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
-    return [
-        {
-            "study_run_id": run.id,
-            "trial_index": index,
-            "role": shown.role,
-            "position": position,
-            "version_clip_id": loaded.places[shown.clip.cell, shown.clip.exemplar],
-        }
-        for index, trial in enumerate(trials)
-        for position, shown in enumerate(trial.shown)
-    ]

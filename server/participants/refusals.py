@@ -33,6 +33,18 @@ class StudyFull(Conflict):
     code = "study_full"
 
 
+class GroupRefused(Invalid):
+    """The address asks for a group that its link is not for."""
+
+    code = "group_refused"
+
+
+class GroupDecided(Conflict):
+    """An answer that decided the group is not changed afterwards."""
+
+    code = "group_decided"
+
+
 class RunTooOld(Conflict):
     """The visit began too long ago to be taken up again."""
 

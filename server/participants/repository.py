@@ -1,14 +1,16 @@
 """Reads and writes of links and runs; no rules here."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
 from typing import Any, cast
 
-from sqlalchemy import ARRAY, Table, bindparam, delete, func, insert, literal, select, union_all
+from sqlalchemy import ARRAY, Select, Table, bindparam, delete, func, insert, literal, select, union_all
 from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.models import (
+    NO_SLOT,
     AssignedTrial,
     Calibration,
     FormAnswer,
@@ -103,6 +105,24 @@ def places_taken(session: Session, column: Any, ident: int, origin: str, lease: 
     return session.scalar(query.where(StudyRun.origin == origin)) or 0
 
 
+def versions_of_series(version_id: int) -> Select[int]:
+    """The versions whose answers may be pooled with those of this one, itself included."""
+    own = select(StudyVersion.study_id, StudyVersion.series).where(StudyVersion.id == version_id).subquery()
+    return select(StudyVersion.id).join(
+        own, (own.c.study_id == StudyVersion.study_id) & (own.c.series == StudyVersion.series)
+    )
+
+
+def places_by_group(session: Session, version_id: int, origin: str, lease: timedelta) -> Counter[str]:
+    """Places taken as `places_taken` counts them, by group, in the data series of a version."""
+    query = select(StudyRun.group_name, func.count()).where(
+        StudyRun.version_id.in_(versions_of_series(version_id)),
+        StudyRun.origin == origin,
+        *_holding(now() - lease),
+    )
+    return Counter(dict(session.execute(query.group_by(StudyRun.group_name)).all()))
+
+
 def complete_runs(session: Session, study: Study, origin: str) -> int:
     """Complete runs of this origin, excluded ones not counted."""
     query = (
@@ -135,19 +155,35 @@ def _holding(seen_after: Any) -> tuple[Any, ...]:
     )
 
 
-def _free_slot_statement() -> Any:
-    held = select(StudyRun.slot).where(
-        StudyRun.version_id == bindparam("version"),
-        StudyRun.origin == bindparam("origin"),
-        *_holding(bindparam("seen_after")),
+def _held(version: Any, origin: Any, seen_after: Any) -> Select[int]:
+    """The slots that runs hold; those that have none yet stay aside."""
+    return select(StudyRun.slot).where(
+        StudyRun.version_id == version,
+        StudyRun.origin == origin,
+        StudyRun.slot != NO_SLOT,
+        *_holding(seen_after),
     )
-    taken = held.cte("taken")
+
+
+def _free_slot_statement() -> Any:
+    taken = _held(bindparam("version"), bindparam("origin"), bindparam("seen_after")).cte("taken")
     candidates = union_all(select(literal(0).label("slot")), select(taken.c.slot + 1)).subquery()
     return select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
 
 
 # Built once: the expressions cost a start more than the database's answer does.
 _FREE_SLOT = _free_slot_statement()
+
+
+def free_slot_of(
+    session: Session, version_id: int, origin: str, lease: timedelta, groups: int, turns: Sequence[int]
+) -> int:
+    """As `free_slot`, among the slots that are one of `turns` modulo `groups`."""
+    taken = _held(version_id, origin, now() - lease).where((StudyRun.slot % groups).in_(turns)).cte("taken")
+    firsts = [select(literal(turn).label("slot")) for turn in turns]
+    candidates = union_all(*firsts, select(taken.c.slot + groups)).subquery()
+    free = select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
+    return session.scalar(free) or 0
 
 
 def add_trials(session: Session, trials: list[dict[str, Any]], clips: list[dict[str, Any]]) -> None:

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from server.clock import now
 from server.context import Services
-from server.models import Link, Study, StudyRun
+from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participants import repository
 from server.participants.identities import fits, pseudonym, resume_code, run_prefix
 from server.participants.recruiter import Recruiter
@@ -97,6 +97,7 @@ def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunToo
 def resumable_until(experiment: Experiment, run: StudyRun) -> datetime | None:
     """Until when a reloaded page may go on by itself, without a connection; None where it must ask first."""
     kept = experiment.session.resume == "resume" and run.status == "active" and run.origin != "preview"
+    kept = kept and run.slot != NO_SLOT  # only the server knows which clips follow from an answer
     return _oldest(experiment, run) if kept else None
 
 

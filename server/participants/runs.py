@@ -14,15 +14,13 @@ from server.context import Services
 from server.db import insert_once
 from server.evidence.schemas import Tickets
 from server.evidence.tickets import issue, tickets
-from server.models import Calibration, FormAnswer, RunEvent, StudyRun
+from server.models import NO_SLOT, Calibration, RunEvent, StudyRun
 from server.participants import bounds, repository, screening
 from server.participants.completion import completion_code
-from server.participants.forms import checked_answers
 from server.participants.links import find_link
 from server.participants.lookup import find_run, open_run
 from server.participants.refusals import (
     ConsentMissing,
-    FormUnknown,
     LanguageUnknown,
     ScreeningUndeclared,
 )
@@ -47,10 +45,17 @@ BEFORE_CONSENT = ("consent",)
 def run_state(services: Services, session: Session, token: str, moment: datetime) -> RunState:
     """Everything the page needs to begin or to go on; refused where this run may not be taken up again."""
     run = find_run(session, token)
+    if (
+        refusal := refusal_to_resume(services.versions.get(session, run.version_id).experiment, run)
+    ) is not None:
+        raise refusal
+    return state_of(services, session, run, moment)
+
+
+def state_of(services: Services, session: Session, run: StudyRun, moment: datetime) -> RunState:
+    """The run as the page gets it."""
     loaded = services.versions.get(session, run.version_id)
     experiment = loaded.experiment
-    if (refusal := refusal_to_resume(experiment, run)) is not None:
-        raise refusal
     calibration = repository.latest_calibration(session, run)
     trials = trial_list(session, run, loaded)
     blocks = [
@@ -74,6 +79,7 @@ def run_state(services: Services, session: Session, token: str, moment: datetime
         if calibration
         else None,
         answered_forms=repository.answered_forms(session, run),
+        awaits_group=run.slot == NO_SLOT,
         blocks=blocks,
         trials=trials,
         elapsed_ms_before=run.elapsed_ms,
@@ -93,7 +99,8 @@ def _tickets(services: Services, run: StudyRun, experiment: Experiment, moment: 
     return Tickets(batch=batch.text, by_trial=tickets(services.intake.key, batch, plays))
 
 
-def _saved(run: StudyRun) -> Saved:
+def saved(run: StudyRun) -> Saved:
+    """The answer to a write."""
     return Saved(saved_at=now(), stage=run.stage, status=run.status)
 
 
@@ -108,7 +115,7 @@ def save_consent(services: Services, session: Session, token: str, agreed: bool)
         calibrates = experiment.display.calibrate != "off"
         run.consented_at = now()
         run.stage = "forms_before" if before else "calibration" if calibrates else "instructions"
-    return _saved(run)
+    return saved(run)
 
 
 def save_calibration(session: Session, token: str, result: CalibrationResult) -> Saved:
@@ -117,32 +124,14 @@ def save_calibration(session: Session, token: str, result: CalibrationResult) ->
     bounds.check_calibrations(repository.calibrations(session, run))
     session.add(Calibration(study_run_id=run.id, **result.model_dump()))
     run.px_per_mm, run.viewing_distance_mm = result.px_per_mm, result.viewing_distance_mm
-    return _saved(run)
+    return saved(run)
 
 
 def save_device(session: Session, token: str, device: dict[str, Any]) -> Saved:
     """Add what the page found out about browser and screen to what is known."""
     run = open_run(session, token)
     run.device = bounds.checked_device({**run.device, **device})
-    return _saved(run)
-
-
-def save_form(services: Services, session: Session, token: str, name: str, answers: dict[str, Any]) -> Saved:
-    """Store a form's answers once they fit the declaration; sending it again replaces them."""
-    run = open_run(session, token)
-    _need_consent(run)
-    experiment = services.versions.get(session, run.version_id).experiment
-    forms = {form.name: form for form in experiment.forms}
-    if name not in forms:
-        raise FormUnknown(f"The study declares no form '{name}'{did_you_mean(name, forms)}.")
-    checked = checked_answers(forms[name], answers)
-    stored = repository.form_answer(session, run, name)
-    if stored is None:
-        session.add(FormAnswer(study_run_id=run.id, form=name, answers=checked))
-    else:
-        stored.answers, stored.saved_at = checked, now()
-    screening.by_form(session, run, experiment, name, checked)
-    return _saved(run)
+    return saved(run)
 
 
 def screen_out_device(services: Services, session: Session, token: str, found: ScreenOut) -> Saved:
@@ -151,7 +140,7 @@ def screen_out_device(services: Services, session: Session, token: str, found: S
     if not screening.screens_devices(services.versions.get(session, run.version_id).experiment):
         raise ScreeningUndeclared("This study declares no screening by device; the run goes on.")
     screening.by_device(session, run, found.reason, found.data)
-    return _saved(run)
+    return saved(run)
 
 
 def save_stage(session: Session, token: str, stage: Stage) -> Saved:
@@ -161,10 +150,10 @@ def save_stage(session: Session, token: str, stage: Stage) -> Saved:
     """
     run = find_run(session, token, lock=True)
     if stage not in BEFORE_CONSENT and run.status == "active":
-        _need_consent(run)
+        need_consent(run)
     if run.status in ("active", "complete"):
         run.stage, run.last_seen_at = stage, now()
-    return _saved(run)
+    return saved(run)
 
 
 def save_language(services: Services, session: Session, token: str, language: str) -> Saved:
@@ -174,10 +163,11 @@ def save_language(services: Services, session: Session, token: str, language: st
     if language not in languages:
         raise LanguageUnknown(f"The study has no texts in '{language}'{did_you_mean(language, languages)}.")
     run.language = language
-    return _saved(run)
+    return saved(run)
 
 
-def _need_consent(run: StudyRun) -> None:
+def need_consent(run: StudyRun) -> None:
+    """ConsentMissing where the participant has not agreed."""
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
 
@@ -218,4 +208,4 @@ def withdraw(session: Session, token: str) -> Saved:
     run = find_run(session, token, lock=True)
     if run.status == "active":
         run.status, run.last_seen_at = "withdrawn", now()
-    return _saved(run)
+    return saved(run)

@@ -137,6 +137,7 @@ class RunState(BaseModel):
     consented_at: datetime | None
     calibration: CalibrationState | None
     answered_forms: list[str]
+    awaits_group: bool = Field(description="There are no trials yet: an answer of a form decides the group.")
     blocks: list[BlockInfo]
     trials: list[TrialInfo]
     elapsed_ms_before: float
@@ -225,6 +226,9 @@ class Saved(BaseModel):
     saved_at: datetime
     stage: Stage
     status: RunStatus
+    run: "RunState | None" = Field(
+        default=None, description="The run anew, where this answer decided its group and with it its trials."
+    )
 
 
 class Completion(BaseModel):

@@ -61,6 +61,11 @@ def by_device(session: Session, run: StudyRun, reason: str, data: Mapping[str, A
     _end(session, run, checked_data({**data, "rule": "device", "reason": reason}))
 
 
+def by_full_group(session: Session, run: StudyRun, group: str) -> None:
+    """End the run where every place of its group is taken."""
+    _end(session, run, {"rule": "group_full", "group": group})
+
+
 def _end(session: Session, run: StudyRun, data: dict[str, Any]) -> None:
     run.status = "screened_out"
     session.add(RunEvent(event_id=new_public_id(), study_run_id=run.id, type=EVENT, data=data))

@@ -43,6 +43,8 @@ class Actor(Person):
         self.run_id = state["run_id"]
         if not self._before(state):
             return None
+        if self.placed is not None:
+            state, self.tickets = self.placed, self.placed["tickets"]
         for _ in range(MAX_ROUNDS):
             due = [trial for trial in state["trials"] if not trial["answered"]]
             if not due or self.refused:

@@ -70,6 +70,8 @@ class Person:
         self.ratings = 0
         self.following: dict[str, Any] | None = None
         self.brings_evidence = False
+        self.placed: dict[str, Any] | None = None
+        """The run anew, where an answer decided its group."""
 
     def take_part(
         self, link_token: str, *, stop_after: int | None = None, progress: Callable[[], None] = lambda: None
@@ -79,6 +81,7 @@ class Person:
         state = self.client.get("/api/run")
         if not self._before(state):
             return None
+        state = self.placed or state
         due = [trial for trial in state["trials"] if not trial["answered"]]
         while due:
             trial = due.pop(0)
@@ -124,6 +127,7 @@ class Person:
                 saved = self.client.put(f"/api/run/forms/{form['name']}", {"answers": answers})
                 if saved["status"] != "active":
                     return False
+                self.placed = saved["run"] or self.placed
         return True
 
     def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:

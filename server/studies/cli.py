@@ -23,13 +23,14 @@ from server.studies.links import (
     LinkKind,
     LinkOptions,
     add_links,
-    general_link,
+    check_group,
+    general_links,
     link_url,
     links_of,
     numbered_labels,
     prepared_links,
 )
-from server.studies.lookup import active_version, find_study
+from server.studies.lookup import active_definition, active_version, find_study
 
 study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
 link_app = typer.Typer(help="Links for participants.", no_args_is_help=True)
@@ -82,8 +83,9 @@ def add(
                 )
             if open_:
                 _set_status(session, study, "live")
-                link = _url(services, session, study)
-                out.print(f"link for participants, once the server runs: {link}", soft_wrap=True)
+                for group, url in _urls(services, session, study):
+                    to = f" of the group {group}" if group else ""
+                    out.print(f"link for participants{to}, once the server runs: {url}", soft_wrap=True)
 
 
 def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:
@@ -96,9 +98,11 @@ def _same_version(session: Session, study: Study, sha256: str, manifest: Manifes
     return version if version.definition_sha256 == sha256 and known == given else None
 
 
-def _url(services: Services, session: Session, study: Study) -> str:
-    link = general_link(session, services.settings.key, study)
-    return link_url(services.settings.public_url, services.settings.key, link.public_id)
+def _urls(services: Services, session: Session, study: Study) -> list[tuple[str, str]]:
+    """The group and the address of each of the study's general links."""
+    settings = services.settings
+    links = general_links(session, settings.key, study)
+    return [(link.group_name, link_url(settings.public_url, settings.key, link.public_id)) for link in links]
 
 
 def _set_status(session: Session, study: Study, status: str) -> None:
@@ -164,6 +168,9 @@ def create(
     count: Annotated[int, typer.Option(min=1, max=10_000, help="How many personal links.")] = 1,
     quota: Annotated[int | None, typer.Option(min=1, help="Most participants by this link.")] = None,
     expires_hours: Annotated[float | None, typer.Option(min=0.0, help="Hours until it expires.")] = None,
+    group: Annotated[
+        str, typer.Option(help="Group of who comes by it, such as fast, where links decide groups.")
+    ] = "",
 ) -> None:
     """Make a link (or many personal ones) and print its address, with its label where there are several.
 
@@ -176,12 +183,13 @@ def create(
             "expected --count with --kind personal only; a general link serves any number of people"
         )
     expires = now() + timedelta(hours=expires_hours) if expires_hours is not None else None
-    options = LinkOptions(KINDS[kind], quota=quota, expires_at=expires)
+    options = LinkOptions(KINDS[kind], group_name=group, quota=quota, expires_at=expires)
     with migrated_services() as services:
         settings = services.settings
         rows = prepared_links(settings.key, options, numbered_labels(label, count) if count > 1 else [label])
         with services.database.write() as session:
             found = find_study(session, study)
+            check_group(active_definition(session, found), KINDS[kind], group)
             add_links(session, found, rows)
             record(session, None, "links created", "study", found.name, kind=kind, count=count)
     for row in rows:

@@ -17,6 +17,7 @@ from server.models import Link
 from server.studies.links import (
     LinkOptions,
     add_links,
+    check_group,
     link_url,
     links_with_runs,
     number_of_links,
@@ -25,7 +26,7 @@ from server.studies.links import (
     prepared_links,
     runs_by_link,
 )
-from server.studies.lookup import find_study
+from server.studies.lookup import active_definition, find_study
 from server.studies.schemas import LinkOut, LinkPage, NewLinks
 
 router = APIRouter(prefix="/api/admin/studies/{study}/links", tags=["links"], responses=ERROR_RESPONSES)
@@ -33,11 +34,12 @@ router = APIRouter(prefix="/api/admin/studies/{study}/links", tags=["links"], re
 
 Limit = Annotated[int, Query(ge=1, le=1000)]
 LINKS_READ_AT_ONCE = 1000
+_SHOWN = ("kind", "label", "group_name", "quota", "expires_at", "created_at", "recruiter")
 
 
 def _link_out(services: Services, row: Link | dict[str, Any], runs: int = 0, complete: int = 0) -> LinkOut:
     values = row if isinstance(row, dict) else vars(row)
-    own = {name: values[name] for name in ("kind", "label", "quota", "expires_at", "created_at", "recruiter")}
+    own = {name: values[name] for name in _SHOWN}
     url = link_url(services.settings.public_url, services.settings.key, values["public_id"])
     return LinkOut(id=values["public_id"], url=url, runs=runs, complete=complete, **own)
 
@@ -66,6 +68,7 @@ def create_links(services: ServicesDep, who: Experimenter, study: str, body: New
         labels = body.labels or numbered_labels(body.label, body.count)
     options = LinkOptions(
         body.kind,
+        group_name=body.group,
         quota=body.quota,
         expires_at=now() + timedelta(days=body.days) if body.days else None,
         recruiter=body.recruiter.model_dump() if body.recruiter else None,
@@ -73,22 +76,24 @@ def create_links(services: ServicesDep, who: Experimenter, study: str, body: New
     )
     rows = prepared_links(services.settings.key, options, labels)
     with services.database.write() as session:
-        add_links(session, find_study(session, study), rows)
+        found = find_study(session, study)
+        check_group(active_definition(session, found), body.kind, body.group)
+        add_links(session, found, rows)
         record(session, who, "links made", "study", study, links=body.kind, number=len(rows))
     return [_link_out(services, row) for row in rows]
 
 
 @router.get("/personal.csv", response_class=Response)
 def download_personal_links(services: ServicesDep, _who: Experimenter, study: str) -> Response:
-    """The personal links as CSV: label, link, runs, complete."""
+    """The personal links as CSV: label, link, runs, complete, group."""
     stream = io.StringIO()
     writer = csv.writer(stream)
-    writer.writerow(["label", "url", "runs", "complete"])
+    writer.writerow(["label", "url", "runs", "complete", "group"])
     with services.database.read() as session:
         found = find_study(session, study)
         for link, runs, complete in links_with_runs(session, found, LINKS_READ_AT_ONCE, "personal"):
             url = link_url(services.settings.public_url, services.settings.key, link.public_id)
-            writer.writerow([link.label, url, runs, complete])
+            writer.writerow([link.label, url, runs, complete, link.group_name])
     headers = {"content-disposition": f'attachment; filename="{study}-links.csv"'}
     return Response(stream.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)
 

@@ -8,9 +8,13 @@ from typing import Any, Literal
 from sqlalchemy import Select, case, func, insert, select
 from sqlalchemy.orm import Session
 
+from experiments.assignment.groups import names
+from experiments.definition import Experiment
+from experiments.errors import did_you_mean
 from server.clock import now
-from server.errors import NotFound
+from server.errors import Invalid, NotFound
 from server.models import Link, Study, StudyRun
+from server.studies.lookup import active_definition
 from server.tokens import derived_token, hash_token, new_public_id
 
 LinkKind = Literal["general", "personal", "preview"]
@@ -23,6 +27,7 @@ class LinkOptions:
 
     kind: LinkKind
     synthetic: bool = False
+    group_name: str = ""
     quota: int | None = None
     expires_at: datetime | None = None
     recruiter: dict[str, Any] | None = None
@@ -50,6 +55,19 @@ def prepared_links(key: bytes, options: LinkOptions, labels: Iterable[str]) -> l
             }
         )
     return rows
+
+
+def check_group(experiment: Experiment, kind: LinkKind, group: str) -> None:
+    """Invalid unless a link for this group (empty: for none) leads into the study."""
+    known, by_link = names(experiment), experiment.groups.by == "link"
+    if group and not by_link:
+        raise Invalid(f"Expected a link without a group, got '{group[:60]}': links decide no groups here.")
+    if group and group not in known:
+        raise Invalid(
+            f"There is no group '{group[:60]}'{did_you_mean(group, known)}; there are: {', '.join(known)}."
+        )
+    if by_link and not group and kind != "preview":
+        raise Invalid(f"Expected the group of the link, one of {', '.join(known)}; got none.")
 
 
 def add_links(session: Session, study: Study, rows: Sequence[dict[str, Any]]) -> None:
@@ -120,7 +138,15 @@ def _shown(study: Study) -> Select[Link]:
     return query.order_by(Link.id)
 
 
-def general_link(session: Session, key: bytes, study: Study) -> Link:
-    """The study's first general link, made where there is none."""
-    query = _shown(study).where(Link.kind == "general", Link.recruiter.is_(None)).limit(1)
-    return session.scalar(query) or create_link(session, key, study, "general", label="general")
+def general_links(session: Session, key: bytes, study: Study) -> list[Link]:
+    """The study's first general link, one a group where links decide groups; made where there is none."""
+    experiment = active_definition(session, study)
+    groups = names(experiment) if experiment.groups.by == "link" else [""]
+    return [_general_link(session, key, study, group) for group in groups]
+
+
+def _general_link(session: Session, key: bytes, study: Study, group: str) -> Link:
+    query = _shown(study).where(Link.kind == "general", Link.recruiter.is_(None), Link.group_name == group)
+    return session.scalar(query.limit(1)) or create_link(
+        session, key, study, "general", label=group or "general", group_name=group
+    )

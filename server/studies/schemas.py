@@ -66,6 +66,8 @@ class DesignOut(BaseModel):
     trials_per_participant: int
     blocks: list[BlockOut]
     expected_minutes: float
+    notes: list[str] = Field(description="Groups, and how often each clip or pair is expected to be shown.")
+    groups: list[str] = Field(description="Groups that links decide; empty where they decide none.")
 
 
 class Checked(BaseModel):
@@ -165,6 +167,9 @@ class NewLinks(_In):
 
     kind: Literal["general", "personal", "preview"]
     label: Label = ""
+    group: Annotated[str, StringConstraints(max_length=600)] = Field(
+        default="", description="Group of who comes by it, where links decide."
+    )
     labels: Annotated[list[Label], Field(max_length=5000)] = []
     count: Annotated[int, Field(ge=1, le=5000)] = 1
     quota: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
@@ -178,6 +183,7 @@ class LinkOut(BaseModel):
     id: str
     kind: str
     label: str
+    group_name: str = Field(description="Group of who comes by it; empty where links decide none.")
     url: str
     quota: int | None
     expires_at: datetime | None

@@ -8,11 +8,13 @@ from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 
 from experiments import design
+from experiments.assignment.groups import names
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.schema.stored import load_stored
+from experiments.trials import KINDS
 from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
 from server.accounts.audit import record
 from server.accounts.identity import Identity
@@ -77,7 +79,17 @@ def design_out(experiment: Experiment) -> DesignOut:
         trials_per_participant=trials_per_participant(experiment),
         blocks=[BlockOut(label=label, trials=count) for label, count in block_sizes(experiment)],
         expected_minutes=expected_minutes(experiment),
+        notes=_notes(experiment),
+        groups=names(experiment) if experiment.groups.by == "link" else [],
     )
+
+
+def _notes(experiment: Experiment) -> list[str]:
+    """What the kind's plan adds, or why the design cannot be analysed as it stands."""
+    try:
+        return list(KINDS[experiment.trial.kind].plan(experiment))
+    except InputError as error:
+        return [str(error)]
 
 
 def check(text: str) -> Checked:
@@ -87,6 +99,10 @@ def check(text: str) -> Checked:
     except DefinitionError as error:
         problems = [ProblemOut(line=p.line, path=p.path, message=p.message) for p in error.problems]
         return Checked(problems=problems, design=None)
+    try:
+        KINDS[experiment.trial.kind].plan(experiment)
+    except InputError as error:
+        return Checked(problems=[ProblemOut(line=None, path="trial", message=str(error))], design=None)
     return Checked(problems=[], design=design_out(experiment))
 
 

@@ -6,7 +6,7 @@ from experiments.trials.paired_comparison.answer import ComparisonAnswer, check_
 from experiments.trials.paired_comparison.columns import COMPARISONS
 from experiments.trials.paired_comparison.declaration import PairedComparison
 from experiments.trials.paired_comparison.page import ShownPairedComparison, shown
-from experiments.trials.paired_comparison.plan import assign, block_size, plan
+from experiments.trials.paired_comparison.plan import assign, block_size, chooses, plan
 
 EFFECTS: dict[str, Effect] = {
     "kind": "measured",
@@ -14,6 +14,7 @@ EFFECTS: dict[str, Effect] = {
     "presentation": "measured",
     "pairs": "measured",
     "pairs_per_person": "measured",
+    "dealing": "measured",
     "ties": "measured",
     "reference": "measured",
     "pointer_delay_ms": "wording",
@@ -28,6 +29,7 @@ pairs = { among = "all", exemplars = "matched" }
 presentation = { arrangement = "side_by_side", gap_mm = 8.0, if_too_narrow = "stack" }
 ties = { label = { en = "No difference", de = "Kein Unterschied" } }
 pairs_per_person = 12
+dealing = { by = "active", random_share = 0.2 }
 pointer_delay_ms = 1500
 expected_seconds = 8.0
 """
@@ -39,6 +41,7 @@ kind = "paired_comparison"
 question = { en = "Which of the two is more like the reference?" }
 presentation = { arrangement = "one_after_the_other", gap_ms = 500 }
 pairs = { among = "within", factor = "lower_lid" }
+dealing = { by = "bibd", clips_per_block = 3, blocks_per_person = 4 }
 reference = { cell = "both", label = { en = "Reference" }, gap_ms = 500 }
 """,
     """\
@@ -47,6 +50,7 @@ kind = "paired_comparison"
 question = { en = "Which blink looked more natural?" }
 presentation = { arrangement = "stacked", gap_mm = 8.0 }
 pairs = { among = "declared", cells = [{ cell = "both", other = "none" }] }
+dealing = { by = "turn" }
 """,
 )
 
@@ -64,4 +68,6 @@ PAIRED_COMPARISON = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     check_response=check_response,
+    chooses=chooses,
+    assign_by=assign,
 )

@@ -87,6 +87,40 @@ class DeclaredPairs(Declaration):
 Pairs = Annotated[AllPairs | WithinFactor | DeclaredPairs, Field(discriminator="among")]
 
 
+class InTurn(Declaration):
+    """Every participant gets all pairs, or the next `pairs_per_person` of one order drawn for the study."""
+
+    by: Literal["turn"] = "turn"
+    """Names this way of dealing."""
+
+
+class IncompleteBlocks(Declaration):
+    """Each participant sees a few of the clips and compares each of them with each other.
+
+    The blocks are those of a balanced incomplete design: over a whole round of it every pair is compared
+    equally often, and every clip is in as many blocks as any other.
+    """
+
+    by: Literal["bibd"] = "bibd"
+    """Names this way of dealing."""
+    clips_per_block: Annotated[int, Field(ge=2, le=100)]
+    """Clips in a block; all pairs of them are compared. Where no design has them, near sizes are named."""
+    blocks_per_person: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Blocks of one participant."""
+
+
+class Active(Declaration):
+    """The server chooses, when a participant begins, the pairs that tell most by what is answered so far."""
+
+    by: Literal["active"] = "active"
+    """Names this way of dealing."""
+    random_share: Annotated[float, Field(ge=0, le=1)] = 0.2
+    """Share of a participant's pairs that is drawn by lot from the others, whatever they tell."""
+
+
+Dealing = Annotated[InTurn | IncompleteBlocks | Active, Field(discriminator="by")]
+
+
 class Ties(Declaration):
     """The answer that neither clip is chosen, and its label."""
 
@@ -119,6 +153,8 @@ class PairedComparison(TrialDeclaration):
     """How the two clips are shown; there is no default."""
     pairs: Pairs
     """Which clips are compared."""
+    dealing: Dealing = InTurn()
+    """Who compares which of the pairs: in turn, in balanced incomplete blocks, or the most telling next."""
     ties: Ties | None = None
     """Allows the answer that neither is chosen."""
     reference: Reference | None = None
@@ -134,6 +170,17 @@ class PairedComparison(TrialDeclaration):
         """The question and what may be answered."""
         tie = f" or tie ({self.ties.label.get(language, '')})" if self.ties else ""
         return f"Question: {self.question.get(language, '')} Answers: left, right{tie}."
+
+    @model_validator(mode="after")
+    def _dealing_fits(self) -> Self:
+        each = self.pairs_per_person
+        if self.dealing.by == "bibd" and each is not None:
+            raise ValueError("pairs_per_person: blocks say how many pairs there are; leave it out")
+        if self.dealing.by == "bibd" and self.pairs.among == "declared":
+            raise ValueError("dealing: blocks need pairs among all or within a factor, not a list")
+        if self.dealing.by == "active" and each is None:
+            raise ValueError("pairs_per_person: say how many pairs are chosen for each participant")
+        return self
 
     @property
     def roles(self) -> tuple[str, str]:

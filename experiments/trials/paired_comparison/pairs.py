@@ -4,16 +4,18 @@ Pure functions of the declaration. A pair is deterministic in its order; sides a
 """
 
 import random
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import combinations, islice, starmap
 from typing import TYPE_CHECKING, NamedTuple
 
 from experiments import design
+from experiments.assignment.incomplete_blocks import balanced_blocks, near_sizes
 from experiments.design import ClipSpec
 from experiments.errors import InputError, did_you_mean
 from experiments.trials.paired_comparison.declaration import (
     AllPairs,
+    IncompleteBlocks,
     PairedComparison,
     WithinFactor,
     paired_comparison_of,
@@ -59,7 +61,24 @@ def fault(experiment: "Experiment", trial: PairedComparison) -> str | None:
     unknown = next(((path, cell) for path, cell in named if cell not in cells), None)
     if unknown:
         return f"{unknown[0]}: no cell is called '{unknown[1]}'{did_you_mean(unknown[1], cells)}"
-    return _no_pairs_or_split(experiment)
+    return _no_pairs_or_split(experiment) or _fault_of_blocks(experiment, trial)
+
+
+def _fault_of_blocks(experiment: "Experiment", trial: PairedComparison) -> str | None:
+    if not isinstance(trial.dealing, IncompleteBlocks):
+        return None
+    clips, size = len(alike(experiment)[0]), trial.dealing.clips_per_block
+    if size > clips:
+        return (
+            f"trial.dealing.clips_per_block: expected at most the {clips} clips that are compared, got {size}"
+        )
+    if balanced_blocks(clips, size) is None:
+        near = ", ".join(map(str, near_sizes(clips, size))) or "2"
+        return (
+            f"trial.dealing.clips_per_block: no balanced design of {clips} clips in blocks of {size} is "
+            f"known here; take {near}, or deal the pairs in turn"
+        )
+    return None
 
 
 def _no_pairs_or_split(experiment: "Experiment") -> str | None:
@@ -100,17 +119,26 @@ def _every(experiment: "Experiment") -> Iterator[Pair]:
         matched = declared.exemplars == "matched"
         yield from (Pair(a, b) for a, b in combinations(clips, 2) if not matched or a.exemplar == b.exemplar)
     elif isinstance(declared, WithinFactor):
-        alike: dict[object, list[ClipSpec]] = {}
-        for clip in clips:
-            rest = tuple(level for level in clip.levels if level[0] != declared.factor)
-            alike.setdefault((rest, clip.exemplar), []).append(clip)
-        for group in alike.values():
+        for group in alike(experiment):
             yield from starmap(Pair, combinations(group, 2))
     else:
         at = {(clip.cell, clip.exemplar): clip for clip in clips}
         numbers = range(1, experiment.exemplars.per_cell + 1)
         for cells in declared.cells:
             yield from (Pair(at[cells.cell, number], at[cells.other, number]) for number in numbers)
+
+
+def alike(experiment: "Experiment") -> list[list[ClipSpec]]:
+    """Sets of clips: every two of one are compared, none with another set's. Not for lists of pairs."""
+    declared, sets = paired_comparison_of(experiment).pairs, dict[object, list[ClipSpec]]()
+    for clip in design.clips(experiment):
+        key: object = clip.exemplar
+        if isinstance(declared, WithinFactor):
+            key = (*(level for level in clip.levels if level[0] != declared.factor), clip.exemplar)
+        elif isinstance(declared, AllPairs) and declared.exemplars == "any":
+            key = None
+        sets.setdefault(key, []).append(clip)
+    return list(sets.values())
 
 
 class Deal:
@@ -168,8 +196,8 @@ def groups(edges: Iterable[tuple[str, str]], items: Iterable[str]) -> list[list[
     return sorted(sorted(group) for group in distinct.values())
 
 
-def check_connected(experiment: "Experiment", pairs: Iterable[Pair]) -> None:
-    """InputError where these pairs leave items that cannot be put on one scale, naming the groups."""
+def check_connected(experiment: "Experiment", pairs: Sequence[Pair]) -> None:
+    """InputError where these pairs leave items on two scales, or clips out, naming them."""
     items = {item_of(experiment, clip) for clip in design.clips(experiment)}
     edges = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
     found = groups(edges, items)
@@ -179,10 +207,18 @@ def check_connected(experiment: "Experiment", pairs: Iterable[Pair]) -> None:
             f"compared with one another: {_named(found)}; declare a pair between them, or more participants "
             "or pairs_per_person"
         )
+    compared = {clip for pair in pairs for clip in pair}
+    left_out = [f"{clip.cell}/{clip.exemplar}" for clip in design.clips(experiment) if clip not in compared]
+    if left_out:
+        raise InputError(
+            f"'{experiment.name}': expected every clip to be compared, got {len(left_out)} clips that nobody "
+            f"sees: {_short(left_out, ', ')}; declare more participants or pairs_per_person"
+        )
 
 
-def _named(found: list[list[str]], limit: int = 6) -> str:
-    def short(names: list[str], joint: str) -> str:
-        return joint.join(names[:limit] + (["..."] if len(names) > limit else []))
+def _named(found: list[list[str]]) -> str:
+    return _short(["{" + _short(group, ", ") + "}" for group in found], " and ")
 
-    return short(["{" + short(group, ", ") + "}" for group in found], " and ")
+
+def _short(names: list[str], joint: str, limit: int = 6) -> str:
+    return joint.join(names[:limit] + (["..."] if len(names) > limit else []))

@@ -2,29 +2,38 @@
 
 import random
 from collections import Counter
+from collections.abc import Iterable
+from math import gcd
 from typing import TYPE_CHECKING, Literal
 
+from experiments.assignment.compared import Compared
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec, ClipSpec
-from experiments.trials.paired_comparison.declaration import paired_comparison_of
-from experiments.trials.paired_comparison.pairs import Deal, Pair, check_connected, every_pair
+from experiments.errors import InputError
+from experiments.trials.paired_comparison.blocks import BlockDeal
+from experiments.trials.paired_comparison.choosing import chosen_pairs
+from experiments.trials.paired_comparison.declaration import Active, IncompleteBlocks, paired_comparison_of
+from experiments.trials.paired_comparison.pairs import Deal, Pair, check_connected, every_pair, item_of
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 
-def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
+def assign(experiment: "Experiment", seed: int, slot: int, compared: Iterable[Compared] = ()) -> list[Trial]:
     """The trials of one participant in order.
 
     Parameters
     ----------
     seed: of the order of trials and of practice. slot: place in the counterbalancing, which deals the pairs
-    and their sides.
+    and their sides. compared: what is stored, where pairs are chosen by it.
     """
     rng = random.Random(seed)
     trials = _practice(experiment, rng)
-    dealt, times = Deal(experiment).of_slot(slot), Counter[str]()
+    dealt = (
+        chosen_pairs(experiment, seed, compared) if chooses(experiment) else deal(experiment).of_slot(slot)
+    )
+    times = Counter[str]()
     choices = 3 if paired_comparison_of(experiment).ties else 2
     for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
         members = set(block.clips)
@@ -58,26 +67,80 @@ def _trial(
     return Trial(kind, block, label, tuple(shown))
 
 
+def chooses(experiment: "Experiment") -> bool:
+    """True where a participant's pairs are chosen by the comparisons that are stored when they begin."""
+    return isinstance(paired_comparison_of(experiment).dealing, Active)
+
+
+def deal(experiment: "Experiment") -> Deal:
+    """Who gets which pairs, where that follows from the slot."""
+    dealing = paired_comparison_of(experiment).dealing
+    return BlockDeal(experiment, dealing) if isinstance(dealing, IncompleteBlocks) else Deal(experiment)
+
+
 def block_size(experiment: "Experiment", block: BlockSpec) -> int:
     """Pairs that the first slot compares in a block; other slots have as many, or one more or less."""
     members = set(block.clips)
-    return sum(pair.left in members for pair in Deal(experiment).of_slot(0))
+    first = chosen_pairs(experiment, 0, ()) if chooses(experiment) else deal(experiment).of_slot(0)
+    return sum(pair.left in members for pair in first)
 
 
 def plan(experiment: "Experiment") -> tuple[str, ...]:
     """Counts over the declared participants, in words; InputError where the pairs do not hang together."""
-    deal, repeats = Deal(experiment), experiment.blocks.repeats
-    shown = [pair for slot in range(experiment.participants) for pair in deal.of_slot(slot)]
+    return _plan_of_choice(experiment) if chooses(experiment) else _plan_of_deal(experiment)
+
+
+def _plan_of_choice(experiment: "Experiment") -> tuple[str, ...]:
+    trial, pairs, repeats = (
+        paired_comparison_of(experiment),
+        every_pair(experiment),
+        experiment.blocks.repeats,
+    )
+    each, people = min(trial.pairs_per_person or 0, len(pairs)), experiment.participants
+    check_connected(experiment, pairs)
+    items = {item_of(experiment, clip) for pair in pairs for clip in pair}
+    if each * people < len(items) - 1:
+        raise InputError(
+            f"'{experiment.name}': expected at least {len(items) - 1} comparisons to connect {len(items)} "
+            f"items, got {each} by each of {people} participants; declare more of either"
+        )
+    share = trial.dealing.random_share if isinstance(trial.dealing, Active) else 0.0
+    again = f", {repeats} times each" if repeats > 1 else ""
+    on_average = repeats * each * people / len(pairs)
+    clips = {clip for pair in pairs for clip in pair}
+    return (
+        f"{len(pairs)} pairs; each participant makes {each} comparisons{again}, {round(share * each)} "
+        "of them drawn at random, the others chosen by what is answered so far",
+        f"over {people} participants each pair is compared {on_average:.1f} times on average, each clip "
+        f"is in {2 * repeats * each * people / len(clips):.1f} comparisons; close pairs more often",
+    )
+
+
+def _plan_of_deal(experiment: "Experiment") -> tuple[str, ...]:
+    dealt, repeats = deal(experiment), experiment.blocks.repeats
+    shown = [pair for slot in range(experiment.participants) for pair in dealt.of_slot(slot)]
     check_connected(experiment, shown)
     times = Counter(frozenset(pair) for pair in shown)
-    per_pair = [repeats * times[frozenset(pair)] for pair in deal.pairs]
+    per_pair = [repeats * times[frozenset(pair)] for pair in dealt.pairs]
     clips = Counter(clip for pair in shown for clip in pair)
-    per_clip = [repeats * clips[clip] for clip in {clip for pair in deal.pairs for clip in pair}]
+    per_clip = [repeats * clips[clip] for clip in {clip for pair in dealt.pairs for clip in pair}]
     again = f", {repeats} times each" if repeats > 1 else ""
     return (
-        f"{len(deal.pairs)} pairs; each participant makes {deal.each} comparisons{again}",
+        f"{len(dealt.pairs)} pairs; each participant makes {dealt.each} comparisons{again}",
+        *_said_of_blocks(experiment, dealt),
         f"over {experiment.participants} participants each pair is compared {_range(per_pair)} times, "
         f"each clip is in {_range(per_clip)} comparisons",
+    )
+
+
+def _said_of_blocks(experiment: "Experiment", dealt: Deal) -> tuple[str, ...]:
+    dealing = paired_comparison_of(experiment).dealing
+    if not isinstance(dealt, BlockDeal) or not isinstance(dealing, IncompleteBlocks):
+        return ()
+    people = dealt.round // gcd(dealt.round, dealing.blocks_per_person)
+    return (
+        f"{dealing.blocks_per_person} of {dealt.round} blocks of {dealing.clips_per_block} clips to each; "
+        f"every pair equally often with {people} participants, and with each multiple of {people}",
     )
 
 

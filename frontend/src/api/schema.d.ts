@@ -210,7 +210,7 @@ export interface paths {
         get?: never;
         /**
          * Put Form
-         * @description Store the answers of a declared form.
+         * @description Store the answers of a declared form; the one that decides the group gives the run with its trials.
          */
         put: operations["put_form"];
         post?: never;
@@ -965,7 +965,7 @@ export interface paths {
         };
         /**
          * Download Personal Links
-         * @description The personal links as CSV: label, link, runs, complete.
+         * @description The personal links as CSV: label, link, runs, complete, group.
          */
         get: operations["download_personal_links"];
         put?: never;
@@ -2068,6 +2068,16 @@ export interface components {
             blocks: components["schemas"]["BlockOut"][];
             /** Expected Minutes */
             expected_minutes: number;
+            /**
+             * Notes
+             * @description Groups, and how often each clip or pair is expected to be shown.
+             */
+            notes: string[];
+            /**
+             * Groups
+             * @description Groups that links decide; empty where they decide none.
+             */
+            groups: string[];
         };
         /**
          * Display
@@ -2435,6 +2445,15 @@ export interface components {
              */
             assignment: components["schemas"]["Assignment"];
             /**
+             * @description How participants come into the groups that factors between them make.
+             * @default {
+             *       "by": "turn",
+             *       "quotas": {},
+             *       "answers": {}
+             *     }
+             */
+            groups: components["schemas"]["Groups"];
+            /**
              * @description Blocks and their order.
              * @default {
              *       "repeats": 1,
@@ -2653,6 +2672,51 @@ export interface components {
             viewing_distance: boolean;
             /** Inter Ocular Mm */
             inter_ocular_mm: number;
+        };
+        /**
+         * GroupCount
+         * @description How many took part in one group.
+         */
+        GroupCount: {
+            /** Name */
+            name: string;
+            /** Quota */
+            quota: number | null;
+            /** Complete */
+            complete: number;
+            /** Active */
+            active: number;
+        };
+        /**
+         * Groups
+         * @description How participants come into groups: one for each combination of levels of the factors `between` them.
+         *
+         *     A group is named by its levels in factor order, joined by slashes. A place in a group that is given up, or
+         *     screened out, goes to the next participant of that group.
+         */
+        Groups: {
+            /**
+             * By
+             * @description `turn`: groups take turns. `link`: each link is for a group. `form:question`: the answer to a required
+             *     choice of a form before the trials decides.
+             * @default turn
+             */
+            by: string;
+            /**
+             * Quotas
+             * @description Participants a group takes, by its name; a group without a quota takes any number. Pilot and live runs
+             *     are counted apart, those of simulated people and previews not at all.
+             */
+            quotas: {
+                [key: string]: number;
+            };
+            /**
+             * Answers
+             * @description Group of each answer, where answers (the values of the options) are not named as the groups are.
+             */
+            answers: {
+                [key: string]: string;
+            };
         };
         /**
          * Health
@@ -2876,6 +2940,11 @@ export interface components {
             kind: string;
             /** Label */
             label: string;
+            /**
+             * Group Name
+             * @description Group of who comes by it; empty where links decide none.
+             */
+            group_name: string;
             /** Url */
             url: string;
             /** Quota */
@@ -3037,6 +3106,11 @@ export interface components {
             withdrawn: number;
             /** Refused Browsers */
             refused_browsers: number;
+            /**
+             * Groups
+             * @description Groups of participants; empty where there is one only.
+             */
+            groups: components["schemas"]["GroupCount"][];
             /** Funnel */
             funnel: components["schemas"]["FunnelStep"][];
             /**
@@ -3220,6 +3294,12 @@ export interface components {
              * @default
              */
             label?: string;
+            /**
+             * Group
+             * @description Group of who comes by it, where links decide.
+             * @default
+             */
+            group?: string;
             /**
              * Labels
              * @default []
@@ -4275,6 +4355,11 @@ export interface components {
             calibration: components["schemas"]["CalibrationState"] | null;
             /** Answered Forms */
             answered_forms: string[];
+            /**
+             * Awaits Group
+             * @description There are no trials yet: an answer of a form decides the group.
+             */
+            awaits_group: boolean;
             /** Blocks */
             blocks: components["schemas"]["BlockInfo"][];
             /** Trials */
@@ -4377,6 +4462,8 @@ export interface components {
              * @enum {string}
              */
             status: "active" | "complete" | "screened_out" | "withdrawn";
+            /** @description The run anew, where this answer decided its group and with it its trials. */
+            run?: components["schemas"]["RunState"] | null;
         };
         /**
          * Scale
@@ -5754,6 +5841,8 @@ export type Form = components['schemas']['Form'];
 export type FormAnswers = components['schemas']['FormAnswers'];
 export type FunnelStep = components['schemas']['FunnelStep'];
 export type Gates = components['schemas']['Gates'];
+export type GroupCount = components['schemas']['GroupCount'];
+export type Groups = components['schemas']['Groups'];
 export type Health = components['schemas']['Health'];
 export type Interaction = components['schemas']['Interaction'];
 export type InvitationOut = components['schemas']['InvitationOut'];

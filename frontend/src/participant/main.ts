@@ -151,7 +151,10 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   for (const { reason } of found) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
   if (kept) session.events.add("offline", { loaded_without_server: true });
   if (run.resumable_until) serveOffline();
-  await play(session, started, store.durable);
+  await play(session, started, store.durable, () => {
+    keeping.begin({ link, started, run: session.run });
+    if (session.run.resumable_until) serveOffline();
+  });
   if (session.completion) keeping.forget();
 }
 
@@ -191,7 +194,8 @@ async function oneTab(root: HTMLElement, t: Translate, link_token: string): Prom
   return (await claimTab(`palpebra ${link_token}`, true, taken)) === "held";
 }
 
-async function play(session: Session, started: RunStarted, durable: boolean): Promise<void> {
+/** `hasTrials` is called where an answer in this visit decides the group, and with it the trials. */
+async function play(session: Session, started: RunStarted, durable: boolean, hasTrials: () => void): Promise<void> {
   const { root, run, outbox, over } = session;
   const end = (): void => {
     over.abort();
@@ -206,6 +210,11 @@ async function play(session: Session, started: RunStarted, durable: boolean): Pr
   watch(session);
   void describeDevice(session, durable);
   root.replaceChildren();
+  if (run.awaits_group) {
+    await runTimeline(root, timeline(session, started.run_token), simulation(run));
+    hasTrials();
+    root.replaceChildren();
+  }
   await runTimeline(root, timeline(session, started.run_token), simulation(run));
   if (!session.completion) return;
   storageOf("sessionStorage")?.removeItem(RETURNED);

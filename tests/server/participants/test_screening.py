@@ -158,15 +158,14 @@ def test_a_device_is_screened_out_only_where_declared(
 
 
 def test_the_monitor_counts_who_was_screened_out(screened: Screened, services: Services) -> None:
-    from datetime import timedelta
-
     from server.models import Study
     from server.monitor.service import snapshot
+    from server.studies.lookup import active_definition
 
     screened().request("PUT", "/forms/about", {"answers": {"age": 90}})
     screened()
     with services.database.read() as session:
         study = session.query(Study).filter_by(name="screened").one()
-        shown = snapshot(session, study, timedelta(hours=1))
+        shown = snapshot(session, study, active_definition(session, study))
     assert (shown.active, shown.complete, shown.screened_out) == (1, 0, 1)
     assert {step.stage: step.runs for step in shown.funnel}["calibration"] == 0

@@ -231,7 +231,7 @@ def test_personal_links_are_made_at_once_and_listed(experimenter: Admin, study: 
     ).json()
     assert [link["label"] for link in made] == ["S001", "S002", "S003"]
     table = experimenter.get("/studies/short/links/personal.csv").text.splitlines()
-    assert table[0] == "label,url,runs,complete"
+    assert table[0] == "label,url,runs,complete,group"
     assert len(table) == 4
     assert experimenter.send("DELETE", f"/studies/short/links/{made[0]['id']}").status_code == 204
     token = made[0]["url"].rpartition("/")[2]

@@ -6,6 +6,7 @@ import type { Schemas } from "../api";
 import { Figures } from "../ui/Figures";
 import { soon } from "../ui/format";
 import { Funnel } from "./Funnel";
+import { Groups } from "./Groups";
 import { Quality } from "./Quality";
 import { RunTable } from "./RunTable";
 import { useMonitor } from "./useMonitor";
@@ -63,6 +64,7 @@ export function MonitorTab() {
           <SimpleGrid cols={{ base: 1, md: 2 }}>
             <Funnel steps={snapshot.funnel} />
             <Quality runs={snapshot.runs} of={snapshot.total} />
+            {snapshot.groups.length > 0 && <Groups groups={snapshot.groups} />}
           </SimpleGrid>
           <RunTable study={study} snapshot={snapshot} />
         </>

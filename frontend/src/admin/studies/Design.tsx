@@ -1,6 +1,6 @@
 /** What a definition expands to: factors, cells, blocks, minutes. */
 
-import { Badge, Group, Stack, Table, Title } from "@mantine/core";
+import { Badge, Group, List, Stack, Table, Title } from "@mantine/core";
 import type { Schemas } from "../api";
 import { Figures } from "../ui/Figures";
 
@@ -15,6 +15,13 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
   return (
     <Stack>
       <Figures figures={figures} />
+      {design.notes.length > 0 && (
+        <List size="sm">
+          {design.notes.map((note) => (
+            <List.Item key={note}>{note}</List.Item>
+          ))}
+        </List>
+      )}
       <Title order={2} size="h4">
         Factors
       </Title>

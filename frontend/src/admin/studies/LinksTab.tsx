@@ -51,6 +51,9 @@ function LinkTable({ study, rows }: { study: string; rows: Schemas["LinkOut"][] 
       columns={[
         { title: "Link", cell: (row) => <Address url={row.url} /> },
         { title: "For", wrap: true, cell: (row) => row.label || "–" },
+        ...(rows.some((row) => row.group_name !== "")
+          ? [{ title: "Group", cell: (row: Schemas["LinkOut"]) => row.group_name || "–" }]
+          : []),
         { title: "Kind", wide: true, cell: (row) => `${row.kind}${row.recruiter === null ? "" : ` (${String(row.recruiter["kind"])})`}` },
         { title: "Runs", number: true, cell: (row) => row.runs },
         { title: "Complete", number: true, wide: true, cell: (row) => `${row.complete}${row.quota === null ? "" : ` of ${row.quota}`}` },

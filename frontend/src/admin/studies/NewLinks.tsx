@@ -1,8 +1,10 @@
 /** Make links: one for everybody, one a person, or to look at the study oneself. */
 
 import { Button, Card, Group, NumberInput, SegmentedControl, Select, Stack, Text, Textarea, TextInput, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
+import { studyQuery } from "../queries";
 import { useChange } from "../ui/useChange";
 
 const MEANS: Record<Schemas["NewLinks"]["kind"], string> = {
@@ -19,6 +21,9 @@ export function NewLinks({ study }: { study: string }) {
   const [count, setCount] = useState<number | string>(20);
   const [recruiter, setRecruiter] = useState<(typeof RECRUITERS)[number]>("none");
   const [code, setCode] = useState("");
+  const groups = useQuery(studyQuery(study)).data?.design.groups ?? [];
+  const [chosen, setChosen] = useState<string | null>(null);
+  const group = kind === "preview" ? "" : (chosen ?? groups[0] ?? "");
   const make = useChange(
     () => {
       const labels = names
@@ -29,7 +34,7 @@ export function NewLinks({ study }: { study: string }) {
         recruiter === "none"
           ? null
           : { kind: recruiter, code_complete: code, id_parameter: "", redirect_url: "", code_failed_check: "", code_screened_out: "" };
-      const body = { kind, label, labels: kind === "personal" ? labels : [], count: Number(count) || 1, recruiter: sent };
+      const body = { kind, label, group, labels: kind === "personal" ? labels : [], count: Number(count) || 1, recruiter: sent };
       return unwrap(api.POST("/api/admin/studies/{study}/links", { params: { path: { study } }, body }));
     },
     { touches: [["links", study]], done: "The links are made." },
@@ -53,6 +58,9 @@ export function NewLinks({ study }: { study: string }) {
         <Text size="sm">{MEANS[kind]}</Text>
         <Group align="end">
           <TextInput label="Label" value={label} onChange={(event) => setLabel(event.currentTarget.value)} />
+          {kind !== "preview" && groups.length > 0 && (
+            <Select label="Group" data={groups} value={group} allowDeselect={false} onChange={setChosen} />
+          )}
           {kind === "personal" && <NumberInput label="How many" min={1} max={5000} value={count} onChange={setCount} w={110} />}
           {kind === "general" && (
             <>

@@ -6,6 +6,7 @@ import { backoff } from "../outbox/backoff";
 import { showNotice } from "../screens/notice";
 import type { Abilities, GateFinding } from "./gates";
 import type { Kept } from "./kept-visit";
+import { withoutPractice } from "./placed";
 
 /** Who has begun need not wait long for a server that does not answer. */
 const KEPT_WAIT_MS = 4_000;
@@ -31,10 +32,9 @@ export function isNoAnswer(error: unknown): boolean {
 const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkState> =>
   call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
 
-/** The run as the page sees it: practice is no block. */
+/** The run as it stands. */
 export async function fetchRun(token: string): Promise<RunState> {
-  const run = await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 });
-  return { ...run, blocks: run.blocks.filter(({ block }) => block > 0) };
+  return withoutPractice(await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 }));
 }
 
 export const startRun = (link_token: string, body: object): Promise<RunStarted> =>

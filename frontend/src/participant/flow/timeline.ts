@@ -12,7 +12,9 @@ import { counted, type Session } from "../session";
 import { blockNodes, practiceNodes, restNodes } from "./blocks";
 import { enterStage } from "./stages";
 
+/** The whole visit; where an answer is to decide which clips there are, no further than that answer. */
 export function timeline(session: Session, token: string): Node[] {
+  if (session.run.awaits_group) return beginning(session);
   const steps = [...beginning(session), ...middle(session), ...ending(session)];
   return [...steps, trial(finish(session), { token })];
 }

@@ -4,6 +4,7 @@ import type { FormAnswers } from "./fields";
 import { pick } from "../../i18n";
 import { h } from "../../ui/element";
 import { alertLine, button, showPage, statusLine } from "../../ui/page";
+import { placed } from "../flow/placed";
 import { plugin, OBJECT, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 import { fieldView, type FieldView } from "./fields";
@@ -29,7 +30,8 @@ export function formPage(session: Session): PluginClass<Parameters> {
     show: (display, { form, eyebrow }) => new Promise((resolve) => showForm(session, display, form, eyebrow, resolve)),
     async simulate({ form }) {
       const answers = Object.fromEntries(form.fields.map((field) => [field.name, simulatedAnswer(field)]));
-      await session.api.form(form.name, answers);
+      const outcome = await session.api.form(form.name, answers);
+      if (outcome.accepted) placed(session.run, outcome.body);
       return { answers };
     },
     act(display) {
@@ -49,9 +51,11 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
     if (bad.length) return bad[0]?.focus();
     go.disabled = true;
     const answers = answersOf(views);
-    void saveShown(session, status, session.api.form(form.name, answers)).then((outcome) =>
-      outcome.accepted ? done({ answers }) : (go.disabled = false),
-    );
+    void saveShown(session, status, session.api.form(form.name, answers)).then((outcome) => {
+      if (!outcome.accepted) return void (go.disabled = false);
+      placed(session.run, outcome.body);
+      done({ answers });
+    });
   });
   const body = h(
     "form",

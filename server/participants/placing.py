@@ -1,0 +1,74 @@
+"""A run gets its place: group, slot, and the trials that follow from them."""
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.assignment.groups import name_of, names, place_of
+from experiments.assignment.trial import Trial
+from experiments.definition import Experiment
+from experiments.trials import KINDS
+from server.models import StudyRun
+from server.participants import repository
+from server.participants.comparisons import compared
+from server.trials.series import service as series
+from server.versions import LoadedVersion
+
+
+def place(session: Session, run: StudyRun, loaded: LoadedVersion, turns: Sequence[int]) -> None:
+    """Give a stored run the first free slot of the groups with these turns, and its trials.
+
+    The study must be held (`repository.lock_study`): two runs that look at once would get one slot.
+    """
+    experiment = loaded.experiment
+    lease = timedelta(minutes=experiment.session.lease_minutes)
+    every = len(names(experiment))
+    if len(turns) == every:
+        run.slot = repository.free_slot(session, run.version_id, run.origin, lease)
+    else:
+        run.slot = repository.free_slot_of(session, run.version_id, run.origin, lease, every, turns)
+    run.group_name = name_of(place_of(experiment, run.slot).levels)
+    trials = _trials(session, run, experiment, lease)
+    run.trials_total = len(trials)
+    session.flush()
+    repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
+    if KINDS[experiment.trial.kind].adapts:
+        series.add_places(session.connection(), run, loaded, trials)
+
+
+def _trials(session: Session, run: StudyRun, experiment: Experiment, lease: timedelta) -> list[Trial]:
+    kind = KINDS[experiment.trial.kind]
+    if kind.assign_by is None or not kind.chooses(experiment):
+        return kind.assign(experiment, run.seed, run.slot)
+    stored = compared(session, run.version_id, run.origin, lease)
+    return kind.assign_by(experiment, run.seed, run.slot, stored)
+
+
+def _trial_rows(run: StudyRun, trials: list[Trial]) -> list[dict[str, Any]]:
+    return [
+        {
+            "study_run_id": run.id,
+            "trial_index": index,
+            "kind": trial.kind,
+            "block": trial.block,
+            "block_label": trial.block_label,
+            "expected_response": trial.expected_response,
+        }
+        for index, trial in enumerate(trials)
+    ]
+
+
+def _clip_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
+    return [
+        {
+            "study_run_id": run.id,
+            "trial_index": index,
+            "role": shown.role,
+            "position": position,
+            "version_clip_id": loaded.places[shown.clip.cell, shown.clip.exemplar],
+        }
+        for index, trial in enumerate(trials)
+        for position, shown in enumerate(trial.shown)
+    ]
