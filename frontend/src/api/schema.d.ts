@@ -1420,6 +1420,23 @@ export interface components {
             created_at: string;
         };
         /**
+         * Active
+         * @description The server chooses, when a participant begins, the pairs that tell most by what is answered so far.
+         */
+        Active: {
+            /**
+             * @description Names this way of dealing. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            by: "active";
+            /**
+             * Random Share
+             * @description Share of a participant's pairs that is drawn by lot from the others, whatever they tell.
+             * @default 0.2
+             */
+            random_share: number;
+        };
+        /**
          * AllPairs
          * @description Every clip with every other; `matched` compares clips of the same exemplar number only.
          */
@@ -2727,6 +2744,42 @@ export interface components {
             status: string;
         };
         /**
+         * InTurn
+         * @description Every participant gets all pairs, or the next `pairs_per_person` of one order drawn for the study.
+         */
+        InTurn: {
+            /**
+             * @description Names this way of dealing. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            by: "turn";
+        };
+        /**
+         * IncompleteBlocks
+         * @description Each participant sees a few of the clips and compares each of them with each other.
+         *
+         *     The blocks are those of a balanced incomplete design: over a whole round of it every pair is compared
+         *     equally often, and every clip is in as many blocks as any other.
+         */
+        IncompleteBlocks: {
+            /**
+             * @description Names this way of dealing. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            by: "bibd";
+            /**
+             * Clips Per Block
+             * @description Clips in a block; all pairs of them are compared. Where no design has them, near sizes are named.
+             */
+            clips_per_block: number;
+            /**
+             * Blocks Per Person
+             * @description Blocks of one participant.
+             * @default 1
+             */
+            blocks_per_person: number;
+        };
+        /**
          * Interaction
          * @description How the participant acted between two answers, summed up on the page; no trace is sent.
          *
@@ -3567,6 +3620,14 @@ export interface components {
              * @description Which clips are compared.
              */
             pairs: components["schemas"]["AllPairs"] | components["schemas"]["WithinFactor"] | components["schemas"]["DeclaredPairs"];
+            /**
+             * Dealing
+             * @description Who compares which of the pairs: in turn, in balanced incomplete blocks, or the most telling next.
+             * @default {
+             *       "by": "turn"
+             *     }
+             */
+            dealing: components["schemas"]["InTurn"] | components["schemas"]["IncompleteBlocks"] | components["schemas"]["Active"];
             /** @description Allows the answer that neither is chosen. */
             ties: components["schemas"]["Ties"] | null;
             /** @description A clip shown before each pair. */
@@ -5783,6 +5844,7 @@ export interface components {
     pathItems: never;
 }
 export type AccountOut = components['schemas']['AccountOut'];
+export type Active = components['schemas']['Active'];
 export type AllPairs = components['schemas']['AllPairs'];
 export type AnalysisPlan = components['schemas']['AnalysisPlan'];
 export type Answer = components['schemas']['Answer'];
@@ -5844,6 +5906,8 @@ export type Gates = components['schemas']['Gates'];
 export type GroupCount = components['schemas']['GroupCount'];
 export type Groups = components['schemas']['Groups'];
 export type Health = components['schemas']['Health'];
+export type InTurn = components['schemas']['InTurn'];
+export type IncompleteBlocks = components['schemas']['IncompleteBlocks'];
 export type Interaction = components['schemas']['Interaction'];
 export type InvitationOut = components['schemas']['InvitationOut'];
 export type InvitationState = components['schemas']['InvitationState'];
