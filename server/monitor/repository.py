@@ -59,7 +59,7 @@ def under_way(session: Session, study: Study, origin: str, seen_after: datetime)
 def by_group(
     session: Session, study: Study, origin: str, seen_after: datetime
 ) -> tuple[Counter[str], Counter[str]]:
-    """Complete and active runs of one origin by group; those that are excluded, or silent since, not counted."""
+    """Complete and active runs of one origin by group, without those that are excluded or silent since."""
     query = select(StudyRun.group_name, StudyRun.status, func.count()).where(
         StudyRun.study_id == study.id,
         StudyRun.origin == origin,

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.assignment.groups import names
 from experiments.definition import Experiment
-from experiments.errors import did_you_mean
+from experiments.errors import InputError, did_you_mean
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.schema.stored import load_stored
