@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from server.results.schemas import Results
+from server.results.schemas import AnyResults
 
 SLOW_S = 0.5
 """Counting that takes longer goes on behind the page's back."""
@@ -36,7 +36,7 @@ class Counted:
     """Results and what they were counted from."""
 
     revision: Revision
-    results: Results
+    results: AnyResults
     seconds: float
     at: float
 
@@ -48,7 +48,7 @@ class Counted:
 
 Key = tuple[int, str, int]
 """Study, origin and data series."""
-Count = Callable[[], tuple[Revision, Results]]
+Count = Callable[[], tuple[Revision, AnyResults]]
 
 
 class ResultsCache:

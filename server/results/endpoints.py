@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
+from pydantic import Field
 from sqlalchemy.orm import Session
 
 from server.accounts.identity import Viewer
@@ -10,24 +11,35 @@ from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.models import Study
 from server.participants.schemas import Origin
-from server.results import repository, service
+from server.results import repository
 from server.results.cache import Revision
+from server.results.kinds import summary_of
 from server.results.repository import Pool
-from server.results.schemas import Results
-from server.studies.lookup import find_study
+from server.results.schemas import AnyResults
+from server.studies.lookup import definition_of, find_study
 from server.studies.series import version_of_series
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["results"], responses=ERROR_RESPONSES)
 
 
-def _counted(session: Session, study: Study, origin: Origin, series: int | None) -> tuple[Revision, Results]:
+ByKind = Annotated[AnyResults, Field(discriminator="kind")]
+
+
+def _counted(
+    session: Session, study: Study, origin: Origin, series: int | None
+) -> tuple[Revision, AnyResults]:
     # The revision is read first: a rating that comes in between is counted again, never left out.
     version = version_of_series(session, study, series)
     revision = repository.revision(session, study, Pool(study.id, origin, version.series))
-    return revision, service.results(session, study, version, origin)
+    summarise = summary_of(definition_of(version).trial.kind)
+    return revision, summarise(session, study, version, origin)
 
 
-@router.get("/results", response_model=Results, responses={304: {"description": "Nothing has changed."}})
+@router.get(
+    "/results",
+    response_model=Annotated[AnyResults, Field(discriminator="kind")],
+    responses={304: {"description": "Nothing has changed."}},
+)
 def get_results(
     services: ServicesDep,
     _who: Viewer,
@@ -36,14 +48,14 @@ def get_results(
     series: int | None = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
-    """Means with within-participant error bars, distributions, response times and playback so far.
+    """What the answers so far look like, by kind of trial, with response times and playback.
 
     They are of one origin and one data series, that of the active version where none is given. With the ETag
     of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting takes long
     `counted_at` may lie some time back.
     """
 
-    def count() -> tuple[Revision, Results]:
+    def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
             return _counted(session, find_study(session, study), origin, series)
 

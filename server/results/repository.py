@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, and_, func, select
+from sqlalchemy import ColumnElement, Select, and_, func, select
 from sqlalchemy.orm import Session
 
 from server.models import Rating, Study, StudyRun, StudyVersion
@@ -18,13 +18,16 @@ class Pool(NamedTuple):
 
     def runs(self) -> ColumnElement[bool]:
         """True for the runs of this pool."""
-        versions = select(StudyVersion.id).where(
-            StudyVersion.study_id == self.study_id, StudyVersion.series == self.series
-        )
         return and_(
             StudyRun.study_id == self.study_id,
             StudyRun.origin == self.origin,
-            StudyRun.version_id.in_(versions),
+            StudyRun.version_id.in_(self.versions()),
+        )
+
+    def versions(self) -> Select[int]:
+        """The ids of the versions whose answers may be pooled."""
+        return select(StudyVersion.id).where(
+            StudyVersion.study_id == self.study_id, StudyVersion.series == self.series
         )
 
 

@@ -1,6 +1,7 @@
 """What the results page shows."""
 
 from datetime import datetime
+from typing import Literal
 
 from pydantic import BaseModel, Field
 
@@ -60,19 +61,66 @@ class Playback(BaseModel):
     )
 
 
-class Results(BaseModel):
-    """The results of a study so far; nothing here replaces the analysis."""
+class StudyResults(BaseModel):
+    """The results of a study so far, whatever its kind of trial; nothing here replaces the analysis."""
 
     study: str
     origin: str
     series: int
     counted_at: datetime
     participants: int
-    ratings: int
+    ratings: int = Field(description="Answers of any kind that count.")
+    response_times: list[TimeBin]
+    playback: Playback
+
+
+class Results(StudyResults):
+    """Ratings of single clips."""
+
+    kind: Literal["clip_rating"] = "clip_rating"
     scale_minimum: int
     scale_maximum: int
     margins: list[Margin]
     cells: list[CellResult]
     clips: list[ClipResult]
-    response_times: list[TimeBin]
-    playback: Playback
+
+
+class PairChoices(BaseModel):
+    """What was chosen between two cells, sides and exemplars taken together."""
+
+    first: str
+    second: str
+    n: int
+    first_chosen: int
+    second_chosen: int
+    ties: int
+
+
+class LevelChoices(BaseModel):
+    """A level of a factor in comparisons with cells of another level."""
+
+    factor: str
+    level: str
+    n: int
+    share: float | None = Field(description="Share in which the level was chosen, ties as half.")
+
+
+class PairResults(StudyResults):
+    """Paired comparisons."""
+
+    kind: Literal["paired_comparison"] = "paired_comparison"
+    pairs: list[PairChoices]
+    levels: list[LevelChoices]
+    left: int = Field(description="Answers for the clip on the left, or the first.")
+    right: int
+    ties: int
+
+
+class OtherResults(StudyResults):
+    """Of a kind of trial without a summary."""
+
+    kind: Literal["other"] = "other"
+    note: str
+
+
+AnyResults = Results | PairResults | OtherResults

@@ -39,10 +39,8 @@ def results(session: Session, study: Study, version: StudyVersion, origin: str) 
         ),
         cells=_cells(clips),
         clips=clips,
-        response_times=[
-            TimeBin(start_ms=RT_MS * place, answers=n) for place, n in sorted(tally.times.items())
-        ],
-        playback=_playback(tally),
+        response_times=time_bins(tally),
+        playback=playback_of(tally),
     )
 
 
@@ -112,7 +110,13 @@ def _weighted(clips: list[ClipResult]) -> float | None:
     return sum(clip.ratings * clip.mean for clip in clips if clip.mean is not None) / total if total else None
 
 
-def _playback(tally: PooledTally) -> Playback:
+def time_bins(tally: PooledTally) -> list[TimeBin]:
+    """Response times in bins of 250 ms."""
+    return [TimeBin(start_ms=RT_MS * place, answers=n) for place, n in sorted(tally.times.items())]
+
+
+def playback_of(tally: PooledTally) -> Playback:
+    """How the clips were shown."""
     counts: tuple[Counter[str], ...] = (Counter(), Counter(), Counter())
     for words, number in tally.plays.items():
         for count, word in zip(counts, words, strict=True):

@@ -1048,7 +1048,7 @@ export interface paths {
         };
         /**
          * Get Results
-         * @description Means with within-participant error bars, distributions, response times and playback so far.
+         * @description What the answers so far look like, by kind of trial, with response times and playback.
          *
          *     They are of one origin and one data series, that of the active version where none is given. With the ETag
          *     of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting takes long
@@ -2901,6 +2901,23 @@ export interface components {
             render: components["schemas"]["RenderOverrides"];
         };
         /**
+         * LevelChoices
+         * @description A level of a factor in comparisons with cells of another level.
+         */
+        LevelChoices: {
+            /** Factor */
+            factor: string;
+            /** Level */
+            level: string;
+            /** N */
+            n: number;
+            /**
+             * Share
+             * @description Share in which the level was chosen, ties as half.
+             */
+            share: number | null;
+        };
+        /**
          * LevelOut
          * @description A level of a factor.
          */
@@ -3563,6 +3580,40 @@ export interface components {
             };
         };
         /**
+         * OtherResults
+         * @description Of a kind of trial without a summary.
+         */
+        OtherResults: {
+            /** Study */
+            study: string;
+            /** Origin */
+            origin: string;
+            /** Series */
+            series: number;
+            /**
+             * Counted At
+             * Format: date-time
+             */
+            counted_at: string;
+            /** Participants */
+            participants: number;
+            /**
+             * Ratings
+             * @description Answers of any kind that count.
+             */
+            ratings: number;
+            /** Response Times */
+            response_times: components["schemas"]["TimeBin"][];
+            playback: components["schemas"]["Playback"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "other";
+            /** Note */
+            note: string;
+        };
+        /**
          * OwnClips
          * @description What to ask about one's own clips, where no definition is given.
          */
@@ -3584,6 +3635,69 @@ export interface components {
              * @default very natural
              */
             high?: string;
+        };
+        /**
+         * PairChoices
+         * @description What was chosen between two cells, sides and exemplars taken together.
+         */
+        PairChoices: {
+            /** First */
+            first: string;
+            /** Second */
+            second: string;
+            /** N */
+            n: number;
+            /** First Chosen */
+            first_chosen: number;
+            /** Second Chosen */
+            second_chosen: number;
+            /** Ties */
+            ties: number;
+        };
+        /**
+         * PairResults
+         * @description Paired comparisons.
+         */
+        PairResults: {
+            /** Study */
+            study: string;
+            /** Origin */
+            origin: string;
+            /** Series */
+            series: number;
+            /**
+             * Counted At
+             * Format: date-time
+             */
+            counted_at: string;
+            /** Participants */
+            participants: number;
+            /**
+             * Ratings
+             * @description Answers of any kind that count.
+             */
+            ratings: number;
+            /** Response Times */
+            response_times: components["schemas"]["TimeBin"][];
+            playback: components["schemas"]["Playback"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "paired_comparison";
+            /** Pairs */
+            pairs: components["schemas"]["PairChoices"][];
+            /** Levels */
+            levels: components["schemas"]["LevelChoices"][];
+            /**
+             * Left
+             * @description Answers for the clip on the left, or the first.
+             */
+            left: number;
+            /** Right */
+            right: number;
+            /** Ties */
+            ties: number;
         };
         /**
          * PairedComparison
@@ -4241,7 +4355,7 @@ export interface components {
         };
         /**
          * Results
-         * @description The results of a study so far; nothing here replaces the analysis.
+         * @description Ratings of single clips.
          */
         Results: {
             /** Study */
@@ -4257,8 +4371,19 @@ export interface components {
             counted_at: string;
             /** Participants */
             participants: number;
-            /** Ratings */
+            /**
+             * Ratings
+             * @description Answers of any kind that count.
+             */
             ratings: number;
+            /** Response Times */
+            response_times: components["schemas"]["TimeBin"][];
+            playback: components["schemas"]["Playback"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "clip_rating";
             /** Scale Minimum */
             scale_minimum: number;
             /** Scale Maximum */
@@ -4269,9 +4394,6 @@ export interface components {
             cells: components["schemas"]["CellResult"][];
             /** Clips */
             clips: components["schemas"]["ClipResult"][];
-            /** Response Times */
-            response_times: components["schemas"]["TimeBin"][];
-            playback: components["schemas"]["Playback"];
         };
         /**
          * RunIdentity
@@ -5914,6 +6036,7 @@ export type InvitationState = components['schemas']['InvitationState'];
 export type JudgedEdit = components['schemas']['JudgedEdit'];
 export type LanguageChange = components['schemas']['LanguageChange'];
 export type Level = components['schemas']['Level'];
+export type LevelChoices = components['schemas']['LevelChoices'];
 export type LevelOut = components['schemas']['LevelOut'];
 export type LevelsPattern = components['schemas']['LevelsPattern'];
 export type LevelsTable = components['schemas']['LevelsTable'];
@@ -5941,7 +6064,10 @@ export type NextTrials = components['schemas']['NextTrials'];
 export type NumberField = components['schemas']['NumberField'];
 export type OneAfterTheOther = components['schemas']['OneAfterTheOther'];
 export type Option = components['schemas']['Option'];
+export type OtherResults = components['schemas']['OtherResults'];
 export type OwnClips = components['schemas']['OwnClips'];
+export type PairChoices = components['schemas']['PairChoices'];
+export type PairResults = components['schemas']['PairResults'];
 export type PairedComparison = components['schemas']['PairedComparison'];
 export type Playback = components['schemas']['Playback'];
 export type PlaybackLog = components['schemas']['PlaybackLog'];
@@ -8504,7 +8630,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Results"];
+                    "application/json": components["schemas"]["Results"] | components["schemas"]["PairResults"] | components["schemas"]["OtherResults"];
                 };
             };
             /** @description Nothing has changed. */

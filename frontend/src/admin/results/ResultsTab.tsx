@@ -5,11 +5,13 @@ import { useMemo, useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
-import { when, words } from "../ui/format";
+import { when } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
+import { HowShown } from "./HowShown";
+import { PairResults } from "./PairResults";
 import { type DataOrigin, ORIGINS, originOf } from "./origins";
-import { cellPlot, delayPlot, type Factors, labelsOf, marginPlot, timePlot } from "./plots";
+import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from "./plots";
 import { Reports } from "./Reports";
 
 export function ResultsTab() {
@@ -42,9 +44,9 @@ export function ResultsTab() {
       <Answer of={results}>
         {(data) =>
           data.ratings === 0 ? (
-            <Text c="dimmed">No ratings of origin {origin} in this data series yet.</Text>
+            <Text c="dimmed">No answers of origin {origin} in this data series yet.</Text>
           ) : (
-            <Shown study={study} data={data} factors={detail?.design.factors ?? []} />
+            <OfKind study={study} data={data} factors={detail?.design.factors ?? []} />
           )
         }
       </Answer>
@@ -53,17 +55,39 @@ export function ResultsTab() {
   );
 }
 
-function Shown({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
-  const singles = data.margins.filter((margin) => margin.factors.length <= 2);
-  const cells = useMemo(() => cellPlot(data), [data]);
-  const times = useMemo(() => timePlot(data), [data]);
-  const delays = useMemo(() => delayPlot(data), [data]);
+interface ShownProps<Results> {
+  study: string;
+  data: Results;
+  factors: Factors;
+}
+
+/** The results as the study's kind of trial shows them. */
+function OfKind({ study, data, factors }: ShownProps<AnyResults>) {
   return (
     <Stack>
       <Alert>
-        Data series {data.series}, {data.origin}: {data.participants} runs, {data.ratings.toLocaleString()} ratings, counted{" "}
-        {when(data.counted_at)}. These are means as data arrive, for a look at whether all is well; the analysis is the report below.
+        Data series {data.series}, {data.origin}: {data.participants} runs, {data.ratings.toLocaleString()} answers, counted{" "}
+        {when(data.counted_at)}. This is what arrives, for a look at whether all is well; the analysis is the report below.
       </Alert>
+      {data.kind === "clip_rating" && <Shown study={study} data={data} factors={factors} />}
+      {data.kind === "paired_comparison" && <PairResults data={data} factors={factors} />}
+      {data.kind === "other" && (
+        <>
+          <Text>{data.note}</Text>
+          <SimpleGrid cols={{ base: 1, md: 2 }}>
+            <HowShown data={data} />
+          </SimpleGrid>
+        </>
+      )}
+    </Stack>
+  );
+}
+
+function Shown({ study, data, factors }: ShownProps<Schemas["Results"]>) {
+  const singles = data.margins.filter((margin) => margin.factors.length <= 2);
+  const cells = useMemo(() => cellPlot(data), [data]);
+  return (
+    <Stack>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {singles.map((margin) => (
           <MarginCard key={margin.factors.join(":")} margin={margin} data={data} factors={factors} />
@@ -74,34 +98,10 @@ function Shown({ study, data, factors }: { study: string; data: Schemas["Results
           </Title>
           <PlotFigure options={cells} label="Distribution of answers in each cell" />
         </Card>
-        <Card withBorder>
-          <Title order={2} size="h5">
-            Response times from the clip's end
-          </Title>
-          <PlotFigure options={times} label="Histogram of response times" />
-        </Card>
-        <Card withBorder>
-          <Title order={2} size="h5">
-            How clips were shown
-          </Title>
-          <Counts title="Verdicts" counts={data.playback.verdicts} />
-          <Counts title="Reasons" counts={data.playback.rules} />
-          <Counts title="Played by" counts={data.playback.methods} />
-          <PlotFigure options={delays} label="Histogram of the time from key to first frame" />
-        </Card>
+        <HowShown data={data} />
       </SimpleGrid>
       <ClipResults study={study} data={data} />
     </Stack>
-  );
-}
-
-function Counts({ title, counts }: { title: string; counts: Record<string, number> }) {
-  const entries = Object.entries(counts);
-  if (entries.length === 0) return null;
-  return (
-    <Text size="sm">
-      {title}: {entries.map(([word, count]) => `${words(word)} ${count.toLocaleString()}`).join(", ")}
-    </Text>
   );
 }
 

@@ -4,6 +4,7 @@ import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../api";
 
 type Results = Schemas["Results"];
+export type AnyResults = Results | Schemas["PairResults"] | Schemas["OtherResults"];
 export type Factors = Schemas["DesignOut"]["factors"];
 
 /** The label of a level, and the labels of a factor in declared order. */
@@ -98,7 +99,7 @@ function histogram(bins: { from: number; count: number }[], step: number, label:
   };
 }
 
-export function timePlot({ response_times }: Results): Plot.PlotOptions {
+export function timePlot({ response_times }: AnyResults): Plot.PlotOptions {
   const bins = response_times.map(({ start_ms, answers }) => ({ from: start_ms, count: answers }));
   return histogram(
     bins.filter(({ from }) => from <= 10_000),
@@ -108,7 +109,7 @@ export function timePlot({ response_times }: Results): Plot.PlotOptions {
   );
 }
 
-export function delayPlot({ playback }: Results): Plot.PlotOptions {
+export function delayPlot({ playback }: AnyResults): Plot.PlotOptions {
   const bins = playback.key_to_first_frame_ms.map((count, place) => ({ from: 10 * place, count }));
   return histogram(bins, 10, "from key to first frame (ms; last bin: 100 and more)", "plays");
 }

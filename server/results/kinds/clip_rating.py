@@ -1,0 +1,12 @@
+"""Single-clip ratings: means, distributions, response times and playback."""
+
+from sqlalchemy.orm import Session
+
+from server.models import Study, StudyVersion
+from server.results import service
+from server.results.schemas import Results
+
+
+def summarise(session: Session, study: Study, version: StudyVersion, origin: str) -> Results:
+    """Results on the declared scale."""
+    return service.results(session, study, version, origin)

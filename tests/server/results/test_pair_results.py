@@ -1,0 +1,82 @@
+"""Results of paired comparisons, against the exported rows counted by hand."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from server.context import Services
+from server.results import kinds
+from tests.helpers.admins import Admin
+from tests.helpers.comparisons import comparisons
+from tests.helpers.studies import Participant, StudyInDatabase, add_study
+from tests.server.trials.test_comparisons import PAIRS, compare, mains
+
+
+@pytest.fixture
+def pairs(services: Services, tmp_path: Path) -> StudyInDatabase:
+    return add_study(services, tmp_path / "clips", PAIRS)
+
+
+@pytest.fixture
+def results(viewer: Admin, client: TestClient, pairs: StudyInDatabase) -> dict[str, Any]:
+    for answers in (("left", "left", "tie"), ("right", "left", "left")):
+        person = Participant(client, pairs.link_token).agree()
+        for place, trial in enumerate(mains(person)):
+            assert compare(person, trial, answers[place % 3]).status_code == 201
+    return viewer.get("/studies/short/results").json()
+
+
+def test_every_pair_of_cells_has_its_choices(results: dict[str, Any], services: Services) -> None:
+    with services.database.read() as session:
+        rows = [row for row in comparisons(session) if row["kind"] == "main"]
+    expected = Counter[tuple[str, str, str]]()
+    for row in rows:
+        left, right = row["left_cell"], row["right_cell"]
+        chosen = {"left": left, "right": right, "tie": "tie"}[row["winner"]]
+        expected[(*sorted((left, right)), chosen)] += 1
+    shown = Counter[tuple[str, str, str]]()
+    for pair in results["pairs"]:
+        key = tuple(sorted((pair["first"], pair["second"])))
+        shown[(*key, pair["first"])] += pair["first_chosen"]
+        shown[(*key, pair["second"])] += pair["second_chosen"]
+        shown[(*key, "tie")] += pair["ties"]
+        assert pair["n"] == pair["first_chosen"] + pair["second_chosen"] + pair["ties"]
+    assert +shown == expected
+    assert (results["kind"], results["participants"], results["ratings"]) == (
+        "paired_comparison",
+        2,
+        len(rows),
+    )
+    assert results["left"] == sum(row["winner"] == "left" for row in rows)
+
+
+def test_a_level_is_compared_with_other_levels_only(results: dict[str, Any], services: Services) -> None:
+    with services.database.read() as session:
+        rows = [row for row in comparisons(session) if row["kind"] == "main"]
+    levels = {(level["factor"], level["level"]): level for level in results["levels"]}
+    assert levels["speed", "slow"]["n"] == 0
+    assert levels["speed", "slow"]["share"] is None
+    won = 0.0
+    for row in rows:
+        first = "left" if row["left_cell"].startswith("photorealistic") else "right"
+        won += 1.0 if row["winner"] == first else 0.5 if row["winner"] == "tie" else 0.0
+    assert levels["character", "photorealistic"]["n"] == len(rows)
+    assert levels["character", "photorealistic"]["share"] == pytest.approx(won / len(rows))
+    other = levels["character", "cartoon"]["share"]
+    assert other == pytest.approx(1 - won / len(rows))
+
+
+def test_a_kind_without_a_summary_says_so(
+    results: dict[str, Any], services: Services, viewer: Admin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(services, "results", type(services.results)())
+    monkeypatch.setattr(
+        "server.results.endpoints.summary_of", lambda kind: kinds.summary_of(f"{kind}_of_the_future")
+    )
+    shown = viewer.get("/studies/short/results").json()
+    assert (shown["kind"], shown["ratings"]) == ("other", results["ratings"])
+    assert shown["note"].startswith("Answers of paired comparison trials have no summary here")
+    assert shown["playback"] == results["playback"]
