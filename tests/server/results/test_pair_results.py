@@ -21,12 +21,17 @@ def pairs(services: Services, tmp_path: Path) -> StudyInDatabase:
 
 
 @pytest.fixture
-def results(viewer: Admin, client: TestClient, pairs: StudyInDatabase) -> dict[str, Any]:
+def answered(client: TestClient, pairs: StudyInDatabase) -> None:
     for answers in (("left", "left", "tie"), ("right", "left", "left")):
         person = Participant(client, pairs.link_token).agree()
         for place, trial in enumerate(mains(person)):
             assert compare(person, trial, answers[place % 3]).status_code == 201
-    return viewer.get("/studies/short/results").json()
+
+
+@pytest.fixture
+def results(viewer: Admin, answered: None) -> dict[str, Any]:
+    shown: dict[str, Any] = viewer.get("/studies/short/results").json()
+    return shown
 
 
 def test_every_pair_of_cells_has_its_choices(results: dict[str, Any], services: Services) -> None:
@@ -61,22 +66,21 @@ def test_a_level_is_compared_with_other_levels_only(results: dict[str, Any], ser
     assert levels["speed", "slow"]["share"] is None
     won = 0.0
     for row in rows:
-        first = "left" if row["left_cell"].startswith("photorealistic") else "right"
+        first = "left" if row["left_cell"].startswith("a/") else "right"
         won += 1.0 if row["winner"] == first else 0.5 if row["winner"] == "tie" else 0.0
-    assert levels["character", "photorealistic"]["n"] == len(rows)
-    assert levels["character", "photorealistic"]["share"] == pytest.approx(won / len(rows))
-    other = levels["character", "cartoon"]["share"]
+    assert levels["character", "a"]["n"] == len(rows)
+    assert levels["character", "a"]["share"] == pytest.approx(won / len(rows))
+    other = levels["character", "b"]["share"]
     assert other == pytest.approx(1 - won / len(rows))
 
 
 def test_a_kind_without_a_summary_says_so(
-    results: dict[str, Any], services: Services, viewer: Admin, monkeypatch: pytest.MonkeyPatch
+    answered: None, services: Services, viewer: Admin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(services, "results", type(services.results)())
-    monkeypatch.setattr(
-        "server.results.endpoints.summary_of", lambda kind: kinds.summary_of(f"{kind}_of_the_future")
-    )
+    monkeypatch.setattr("server.results.endpoints.summary_of", lambda _: kinds.summary_of("of_the_future"))
     shown = viewer.get("/studies/short/results").json()
-    assert (shown["kind"], shown["ratings"]) == ("other", results["ratings"])
+    with services.database.read() as session:
+        number = sum(row["kind"] == "main" for row in comparisons(session))
+    assert (shown["kind"], shown["ratings"], shown["participants"]) == ("other", number, 2)
     assert shown["note"].startswith("Answers of paired comparison trials have no summary here")
-    assert shown["playback"] == results["playback"]
+    assert sum(shown["playback"]["verdicts"].values()) == number
