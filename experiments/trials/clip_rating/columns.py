@@ -28,6 +28,7 @@ RATINGS = View(
         *base.SAVED,
         *base.ORIGIN,
         *base.CLOCK,
+        *base.VIEWS,
     ),
     rows=rows_of("clip_rating", {"shown": "c"}),
 )

@@ -102,6 +102,7 @@ export const messages: Messages = {
   decoding: "Der Film wird vorbereitet …",
   trial_of: "{number} von {total}",
   clip_name: "Der Film",
+  already_seen: "Diesen Clip haben Sie schon gesehen. Bitte antworten Sie jetzt.",
   clip_playing: "Der Film läuft.",
   clip_over: "Der Film ist zu Ende. Bitte bewerten Sie ihn.",
   clip_broken_title: "Dieser Film lässt sich nicht zeigen",

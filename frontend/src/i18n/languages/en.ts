@@ -99,6 +99,7 @@ export const messages = {
   decoding: "Preparing the clip …",
   trial_of: "{number} of {total}",
   clip_name: "The clip",
+  already_seen: "You have already seen this clip. Please answer now.",
   clip_playing: "The clip is running.",
   clip_over: "The clip is over. Please rate it.",
   clip_broken_title: "This clip cannot be shown",
