@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.schema.keys import Key, is_tag, keys
+from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
 from experiments.toml_lines import line_of
 
@@ -92,7 +92,7 @@ def _line_in(message: str) -> int | None:
 
 
 def _problem(detail: Any, text: str) -> Problem:
-    location = tuple(part for part in detail["loc"] if not _is_union_tag(part))
+    location = tuple(_without_tags(detail["loc"]))
     if detail["type"] == "union_tag_invalid":
         location = (*location, detail["ctx"]["discriminator"].strip("'"))
     path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
@@ -118,20 +118,29 @@ def _problem(detail: Any, text: str) -> Problem:
     return Problem(line_of(text, location), path, message)
 
 
-def _is_union_tag(part: object) -> bool:
-    return any(part == key.field.default for key in keys() if is_tag(key.field))
+def _walk(location: Sequence[object]) -> Iterator[tuple[object, type[BaseModel], bool]]:
+    """Each part of a place, the model after it, and whether the part only tells members of a union apart."""
+    model: type[BaseModel] = Experiment
+    tables: list[type[BaseModel]] = []
+    for part in location:
+        member = next((table for table in tables if _tag_of(table) == part), None)
+        is_key = isinstance(part, str) and part in model.model_fields
+        if member is not None:
+            model = member
+        elif isinstance(part, str) and is_key:
+            tables = Key(part, model, model.model_fields[part]).tables
+            model = tables[0] if tables else model
+        yield part, model, member is not None and not is_key
+
+
+def _without_tags(location: Sequence[object]) -> Iterator[object]:
+    return (part for part, _, is_tag in _walk(location) if not is_tag)
 
 
 def _keys_at(location: Sequence[object]) -> list[str]:
     """The keys allowed at a place of the declaration, by walking the models."""
-    model: type[BaseModel] = Experiment
-    tables: list[type[BaseModel]] = []
-    for part in location:
-        if isinstance(part, str) and part in model.model_fields:
-            tables = Key(part, model, model.model_fields[part]).tables
-            model = tables[0] if tables else model
-        model = next((table for table in tables if _tag_of(table) == part), model)
-    return list(model.model_fields)
+    models: list[type[BaseModel]] = [Experiment, *(model for _, model, _ in _walk(location))]
+    return list(models[-1].model_fields)
 
 
 def _tag_of(model: type[BaseModel]) -> object:

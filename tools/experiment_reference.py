@@ -197,6 +197,7 @@ class Examples:
 
     def __init__(self) -> None:
         self._set: dict[tuple[str, type[BaseModel]], Any] = {}
+        self._anywhere: dict[tuple[str, type[BaseModel]], Any] = {}
         for path in (EXAMPLES, *sorted(EXAMPLES.parent.glob("*.toml"))):
             self._collect(parse_experiment(path.read_text(encoding="utf-8"), path.name), "")
         for kind in KINDS.values():
@@ -208,6 +209,7 @@ class Examples:
             for name in value.model_fields_set:
                 inner = getattr(value, name)
                 self._set.setdefault((f"{path}{name}", type(value)), inner)
+                self._anywhere.setdefault((name, type(value)), inner)
                 self._collect(inner, f"{path}{name}.")
         elif isinstance(value, Mapping):
             for item in value.values():
@@ -217,14 +219,14 @@ class Examples:
                 self._collect(item, path)
 
     def has(self, key: Key) -> bool:
-        """True where an example sets the key."""
-        return (key.path, key.model) in self._set
+        """True where an example sets the key, of its table in this place or of the same in another."""
+        return (key.name, key.model) in self._anywhere
 
     def of(self, key: Key) -> str:
         """The key's example as TOML, shortened where it is long; tables have a section of their own."""
         if not self.has(key) or key.tables:
             return ""
-        written = toml(self._set[key.path, key.model])
+        written = toml(self._set.get((key.path, key.model), self._anywhere[key.name, key.model]))
         if len(written) > LONGEST_EXAMPLE:
             written = f"{written[:LONGEST_EXAMPLE]}..."
         return f"`{written}`"

@@ -17,20 +17,22 @@ from analysis.within.cell_means import cell_table
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.scales import scale_called
 
 READING = Reading(RATINGS, numbers=("response",), further=("exemplar",))
 
 
 def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     """Refuse a rating off the declared scale, and an unknown level."""
-    scale = clip_rating_of(experiment).scale
+    scale = scale_called(experiment)
     given = rows["response"].to_numpy()
-    off = ~np.isnan(given) & ((given < scale.minimum) | (given > scale.maximum) | (given != np.round(given)))
-    if off.any():
+    steps = (given - scale.minimum) / scale.step
+    off = (given < scale.minimum) | (given > scale.maximum) | (np.abs(steps - np.round(steps)) > 1e-6)
+    if off.any():  # an empty answer is off nothing: comparisons with NaN are false
         at = int(np.argmax(off))
+        rating = "a whole rating" if scale.step == 1 else f"a rating in steps of {scale.step:g}"
         raise InputError(
-            f"{source}: {where(rows, at)}: expected a whole rating from {scale.minimum} to {scale.maximum}, "
+            f"{source}: {where(rows, at)}: expected {rating} from {scale.minimum:g} to {scale.maximum:g}, "
             f"got {given[at]:g}"
         )
     for factor in experiment.factors:

@@ -11,7 +11,7 @@ from scipy import special
 from analysis.synthetic.population import Population
 from analysis.synthetic.synthesise import Plan, population_of
 from experiments.errors import InputError
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.scales import scale_called
 
 Floats = NDArray[np.float64]
 Statistic = Literal["multivariate", "greenhouse-geisser"]
@@ -109,7 +109,7 @@ def _draw(plan: Plan, population: Population, count: int, n: int, rng: np.random
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     y = population.means + rng.normal(size=(count, n, len(values))) @ root.T
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
-    scale = clip_rating_of(plan.experiment).scale
+    scale = scale_called(plan.experiment)
     return np.asarray(np.rint(np.clip(y, scale.minimum, scale.maximum) * trials) / trials)
 
 

@@ -16,7 +16,7 @@ from analysis.plans.result import Analysis
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, write_note
 from analysis.within.marginal_means import level_combinations, margin
 from experiments.error_bars import within_participant_errors
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.scales import scale_called
 
 Floats = NDArray[np.float64]
 
@@ -160,9 +160,11 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
     axes.set_ylabel("Naturalness rating" if analysis.experiment else analysis.rating)
     if analysis.experiment is not None:
-        scale = clip_rating_of(analysis.experiment).scale
-        axes.set_ylim(scale.minimum - 0.2, scale.maximum + 0.2)
-        axes.set_yticks(range(scale.minimum, scale.maximum + 1))
+        scale = scale_called(analysis.experiment)
+        margin = (scale.maximum - scale.minimum) / 30
+        axes.set_ylim(scale.minimum - margin, scale.maximum + margin)
+        if scale.type == "points":
+            axes.set_yticks(range(round(scale.minimum), round(scale.maximum) + 1))
     axes.grid(axis="y", linewidth=0.4, alpha=0.5)
     axes.set_axisbelow(True)
     if spec.colour:

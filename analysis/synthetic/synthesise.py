@@ -22,7 +22,7 @@ from experiments.errors import InputError
 from experiments.files import whole_file
 from experiments.load import load_experiment
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.scales import scale_called
 
 ATTEMPTS = 40
 """Fresh draws of participants before the best is kept and what it misses is reported."""
@@ -115,8 +115,8 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     """
     rng = np.random.default_rng(seed)
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
-    declared = clip_rating_of(plan.experiment).scale
-    scale = (declared.minimum, declared.maximum)
+    declared = scale_called(plan.experiment)
+    scale = (round(declared.minimum), round(declared.maximum))
     found: list[Repaired] = []
     rounds = 0
     attempts = ATTEMPTS if plan.as_published else WISHED_ATTEMPTS

@@ -12,7 +12,7 @@ from experiments.definition import Experiment
 from experiments.design import BlockSpec, ClipSpec, blocks, clips, exemplar_key
 from experiments.schema.canonical import definition_sha256
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.scales import scale_called
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]
@@ -67,10 +67,10 @@ def rating_rows(
 def _cell_answers(
     experiment: Experiment, specs: list[ClipSpec], total: int, own: dict[str, float], rng: np.random.Generator
 ) -> dict[ClipSpec, list[int]]:
-    repeats, scale = experiment.blocks.repeats, clip_rating_of(experiment).scale
+    repeats, scale = experiment.blocks.repeats, scale_called(experiment)
     offsets = np.repeat([own[exemplar_key(experiment, spec)] for spec in specs], repeats)
     means = total / len(offsets) + offsets - offsets.mean()
-    drawn = split_sum(total, means, scale.minimum, scale.maximum, rng)
+    drawn = split_sum(total, means, round(scale.minimum), round(scale.maximum), rng)
     return {spec: drawn[i * repeats : (i + 1) * repeats].tolist() for i, spec in enumerate(specs)}
 
 

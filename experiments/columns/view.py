@@ -1,13 +1,13 @@
 """A view: the columns of one kind of trial's rows, the SQL that selects them, and their place in a CSV."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 from experiments.columns.base import LEVELS
-from experiments.columns.column import JOINED, Column, ColumnType, names_of
+from experiments.columns.column import Column, ColumnType, names_of
 
 Dialect = Literal["sqlite", "postgresql"]
 
@@ -16,8 +16,7 @@ _TIME: dict[Dialect, str] = {
     "postgresql": """to_char({} AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
 }
 _JSON: dict[Dialect, str] = {"sqlite": "{}", "postgresql": "CAST({} AS text)"}
-_JOIN: dict[Dialect, str] = {"sqlite": "group_concat", "postgresql": "string_agg"}
-_CAST: dict[ColumnType, str] = {"integer": "integer", "number": "double precision", "boolean": "boolean"}
+_CAST: dict[ColumnType, str] = {"integer": "integer", "number": "numeric", "boolean": "boolean"}
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,13 @@ class View:
     name: of the view in the database.
     title: what one row is, as a heading of the codebook says it.
     columns: in order. One of them may be `LEVELS`: the CSV has a column a factor in its place.
-    rows: the SQL after SELECT: tables, joins, and which rows count.
+    rows: the SQL after SELECT: tables, joins, and which rows count; by database where they differ.
     """
 
     name: str
     title: str
     columns: tuple[Column, ...]
-    rows: str
+    rows: str | Callable[[Dialect], str]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -52,7 +51,8 @@ class View:
         selected = ",\n       ".join(
             f"{_spelled(column, dialect)} AS {column.name}" for column in self.columns
         )
-        return f"CREATE VIEW {self.name} AS\nSELECT {selected}\n{self.rows}"
+        rows = self.rows if isinstance(self.rows, str) else self.rows(dialect)
+        return f"CREATE VIEW {self.name} AS\nSELECT {selected}\n{rows}"
 
     def csv_header(self, factors: Sequence[str]) -> list[str]:
         """Column names of the CSV export: as the view, with a column a factor in the place of `levels`."""
@@ -82,12 +82,11 @@ class View:
 
 def _spelled(column: Column, dialect: Dialect) -> str:
     if column.member:
-        return _member(column, dialect)
+        member = _member(column, dialect)
+        return f"coalesce({member}, {column.otherwise})" if column.otherwise else member
     if column.type == "time":
         return _TIME[dialect].format(column.expression)
-    if column.json:
-        return _JSON[dialect].format(column.expression)
-    return column.expression.replace(JOINED, _JOIN[dialect])
+    return _JSON[dialect].format(column.expression) if column.json else column.expression
 
 
 def _member(column: Column, dialect: Dialect) -> str:

@@ -42,6 +42,12 @@ class RatedScale:
         steps = (value - self.minimum) / self.step
         return self.minimum <= value <= self.maximum and abs(steps - round(steps)) < 1e-6
 
+    def nearest(self, value: float) -> float:
+        """The answer of this scale that is nearest to `value`, a whole number as one."""
+        clipped = min(self.maximum, max(self.minimum, value))
+        answer = self.minimum + round((clipped - self.minimum) / self.step) * self.step
+        return int(answer) if float(answer).is_integer() else round(answer, 6)
+
 
 def scales_of(experiment: "Experiment") -> tuple[RatedScale, ...]:
     """The scales of the experiment's trials in order; none for kinds that are not rated on scales."""

@@ -48,7 +48,17 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
 
 def _response(payload: Mapping[str, Any]) -> int | str | None:
     """An answer of any kind as one value that can be compared; None where nothing was answered."""
-    said = {name: value for name, value in payload.items() if value is not None}
+    said = {name: _without_time(value) for name, value in payload.items() if value is not None}
     if said.keys() == {"response"}:
-        return int(said["response"])
+        return said["response"] if isinstance(said["response"], int) else str(said["response"])
+    scales = payload.get("answers", {}).values()
+    if scales and all(one["response"] is None and not one.get("not_applicable") for one in scales):
+        return None
     return json.dumps(said, sort_keys=True) if said else None
+
+
+def _without_time(value: Any) -> Any:
+    """An answer on several scales without the times that each took: equal answers must be equal."""
+    if not isinstance(value, dict):
+        return value
+    return {name: {**one, "rt": None} if isinstance(one, dict) else one for name, one in value.items()}

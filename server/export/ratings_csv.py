@@ -21,7 +21,8 @@ def _rows_of_a_run(view: View) -> TextClause:
     booleans = names_of(view.columns, "boolean")
     # PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
     columns = ", ".join(f"CAST({name} AS INTEGER)" if name in booleans else name for name in view.names)
-    return text(f"SELECT {columns} FROM {view.name} WHERE run = :run ORDER BY trial_index, play")  # noqa: S608
+    order = ", ".join(name for name in ("trial_index", "play", "scale") if name in view.names)
+    return text(f"SELECT {columns} FROM {view.name} WHERE run = :run ORDER BY {order}")  # noqa: S608
 
 
 def view_of(session: Session, study: Study) -> View:
@@ -40,7 +41,11 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 
 def rating_count(session: Session, study: Study, origin: ExportOrigin) -> int:
     """Rows that `rating_rows` gives."""
-    kind = active_definition(session, study).trial.kind
+    trial = active_definition(session, study).trial
+    kind, view = trial.kind, KINDS[trial.kind].view
+    if len(trial.rated_scales()) > 1:  # a rating is a row a scale
+        rows = text(f"SELECT count(*) FROM {view.name} WHERE study = :study")  # noqa: S608
+        return session.scalar(rows, {"study": study.name}) or 0
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
     query = query.where(of_origin(study, origin), Rating.kind == kind)
     return session.scalar(query) or 0

@@ -46,8 +46,8 @@ class Counted:
         return f'"{hashlib.sha256(repr(self.revision).encode()).hexdigest()[:32]}"'
 
 
-Key = tuple[int, str, int]
-"""Study, origin and data series."""
+Key = tuple[int, str, int, str]
+"""Study, origin, data series and scale."""
 Count = Callable[[], tuple[Revision, AnyResults]]
 
 

@@ -11,10 +11,9 @@ from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.models import Study
 from server.participants.schemas import Origin
-from server.results import repository
+from server.results import repository, service
 from server.results.cache import Revision
 from server.results.kinds import summary_of
-from server.results.repository import Pool
 from server.results.schemas import AnyResults
 from server.studies.lookup import definition_of, find_study
 from server.studies.series import version_of_series
@@ -26,13 +25,13 @@ ByKind = Annotated[AnyResults, Field(discriminator="kind")]
 
 
 def _counted(
-    session: Session, study: Study, origin: Origin, series: int | None
+    session: Session, study: Study, origin: Origin, series: int | None, scale: str | None
 ) -> tuple[Revision, AnyResults]:
     # The revision is read first: a rating that comes in between is counted again, never left out.
     version = version_of_series(session, study, series)
-    revision = repository.revision(session, study, Pool(study.id, origin, version.series))
+    pool = service.pool(study, version, origin, scale)
     summarise = summary_of(definition_of(version).trial.kind)
-    return revision, summarise(session, study, version, origin)
+    return repository.revision(session, study, pool), summarise(session, study, version, pool)
 
 
 @router.get(
@@ -46,22 +45,23 @@ def get_results(
     study: str,
     origin: Origin = "participant",
     series: int | None = None,
+    scale: str | None = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
     """What the answers so far look like, by kind of trial, with response times and playback.
 
-    They are of one origin and one data series, that of the active version where none is given. With the ETag
-    of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting takes long
-    `counted_at` may lie some time back.
+    They are of one origin, one data series (that of the active version where none is given) and, where
+    clips are rated, one scale (the first). With the ETag of an earlier answer as `If-None-Match` it is 304
+    where nothing has changed. Where counting takes long `counted_at` may lie some time back.
     """
 
     def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
-            return _counted(session, find_study(session, study), origin, series)
+            return _counted(session, find_study(session, study), origin, series, scale)
 
     with services.database.read() as session:
         found = find_study(session, study)
-        key = Pool(found.id, origin, version_of_series(session, found, series).series)
+        key = service.pool(found, version_of_series(session, found, series), origin, scale)
         revision = repository.revision(session, found, key)
     counted = services.results.get(key, revision, count)
     headers = {"etag": counted.etag, "cache-control": "private, no-cache"}

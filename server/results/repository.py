@@ -10,11 +10,12 @@ from server.results.cache import Revision
 
 
 class Pool(NamedTuple):
-    """Whose answers are shown together: one study, one origin, one data series."""
+    """Which answers are shown together: one study, one origin, one data series, the scale of one name."""
 
     study_id: int
     origin: str
     series: int
+    scale: str
 
     def runs(self) -> ColumnElement[bool]:
         """True for the runs of this pool."""

@@ -31,7 +31,7 @@ class ClipResult(BaseModel):
     exemplar: int
     ratings: int
     mean: float | None
-    counts: list[int] = Field(description="Answers per scale point, from the lowest.")
+    counts: list[int] = Field(description="Answers a bin, from the lowest.")
 
 
 class CellResult(BaseModel):
@@ -74,12 +74,25 @@ class StudyResults(BaseModel):
     playback: Playback
 
 
+class ResultScale(BaseModel):
+    """A scale as declared; answers are shown as they were chosen, reverse-keyed or not."""
+
+    name: str
+    type: str
+    minimum: float
+    maximum: float
+    reverse: bool
+
+
 class Results(StudyResults):
     """Ratings of single clips."""
 
     kind: Literal["clip_rating"] = "clip_rating"
-    scale_minimum: int
-    scale_maximum: int
+    scales: list[ResultScale] = Field(description="Every scale of the study, in order.")
+    scale: ResultScale = Field(description="The one whose answers these are.")
+    bins: list[float] = Field(
+        description="Lowest answer of each count: the scale's points, or equal parts of a slider."
+    )
     margins: list[Margin]
     cells: list[CellResult]
     clips: list[ClipResult]

@@ -1,5 +1,6 @@
 """The results of a study as data arrive."""
 
+from bisect import bisect_right
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from itertools import combinations
@@ -7,33 +8,58 @@ from itertools import combinations
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from experiments.trials.clip_rating.declaration import SCALE_NAME, clip_rating_of
+from experiments.trials.scales import RatedScale, scale_called, scales_of
 from server.clock import now
 from server.models import Study, StudyVersion, VersionClip
 from server.results import summary
 from server.results.repository import Pool
-from server.results.schemas import CellResult, ClipResult, Margin, Mean, Playback, Results, TimeBin
+from server.results.schemas import (
+    CellResult,
+    ClipResult,
+    Margin,
+    Mean,
+    Playback,
+    Results,
+    ResultScale,
+    TimeBin,
+)
 from server.studies.lookup import definition_of
 from server.tallies.pools import PooledTally, pooled
 from server.tallies.tally import RT_MS
 
+MAX_BINS = 20
+ROUNDING = 1e-9
+"""An answer on a step may lie a rounding error below it."""
 
-def results(session: Session, study: Study, version: StudyVersion, origin: str) -> Results:
-    """Means, distributions, response times and playback of one origin and of the data series of `version`."""
-    definition, of = definition_of(version), Pool(study.id, origin, version.series)
-    scale = clip_rating_of(definition).scale
+
+def pool(study: Study, version: StudyVersion, origin: str, scale: str | None) -> Pool:
+    """The answers that results are of, on the first scale where none is named; InputError for none such.
+
+    Kinds that are not rated on scales have the empty name.
+    """
+    definition = definition_of(version)
+    name = scale_called(definition, scale).name if scale is not None or scales_of(definition) else ""
+    return Pool(study.id, origin, version.series, name)
+
+
+def results(session: Session, study: Study, version: StudyVersion, of: Pool) -> Results:
+    """Means, distributions, response times and playback of one pool, which is of the series of `version`."""
+    definition = definition_of(version)
+    scale = scale_called(definition, of.scale)
+    bins = bins_of(scale)
     factors = list(definition.factor_names)
-    tally = pooled(session, of.runs(), SCALE_NAME, factors)
-    clips = _clips(session, version, tally, scale.minimum, scale.maximum)
+    tally = pooled(session, of.runs(), of.scale, factors)
+    clips = _clips(session, version, tally, bins, scale.maximum)
     return Results(
         study=study.name,
-        origin=origin,
+        origin=of.origin,
         series=version.series,
         counted_at=now(),
         participants=len(tally.means),
         ratings=sum(clip.ratings for clip in clips),
-        scale_minimum=scale.minimum,
-        scale_maximum=scale.maximum,
+        scales=[_shown(one) for one in scales_of(definition)],
+        scale=_shown(scale),
+        bins=bins,
         margins=margins(
             tally.means, factors, [factor.name for factor in definition.factors if factor.between]
         ),
@@ -59,13 +85,32 @@ def margins(means: summary.CellMeans, factors: list[str], between: Sequence[str]
     ]
 
 
+def bins_of(scale: RatedScale) -> list[float]:
+    """Lowest answer of each count: every answer there is, or twenty equal parts where there are more."""
+    steps = round((scale.maximum - scale.minimum) / scale.step)
+    count, width = (steps + 1, scale.step) if steps <= MAX_BINS else (MAX_BINS, steps * scale.step / MAX_BINS)
+    return [scale.minimum + place * width for place in range(count)]
+
+
+def _shown(scale: RatedScale) -> ResultScale:
+    return ResultScale(
+        name=scale.name,
+        type=scale.type,
+        minimum=scale.minimum,
+        maximum=scale.maximum,
+        reverse=scale.reverse,
+    )
+
+
 def _clips(
-    session: Session, version: StudyVersion, tally: PooledTally, lowest: int, highest: int
+    session: Session, version: StudyVersion, tally: PooledTally, bins: list[float], highest: float
 ) -> list[ClipResult]:
-    counts: dict[int, list[int]] = defaultdict(lambda: [0] * (highest - lowest + 1))
+    counts: dict[int, list[int]] = defaultdict(lambda: [0] * len(bins))
+    sums: dict[int, float] = defaultdict(float)
     for (clip, _, response), number in tally.answers.items():
-        if lowest <= response <= highest:
-            counts[clip][int(response) - lowest] += number
+        if bins[0] <= response <= highest:
+            counts[clip][bisect_right(bins, response + ROUNDING) - 1] += number
+            sums[clip] += response * number
     query = select(VersionClip).where(VersionClip.version_id == version.id)
     shown = {row.id: row for row in session.scalars(query)}
     older = set(counts) - set(shown)
@@ -78,16 +123,11 @@ def _clips(
             cell=row.cell,
             exemplar=row.exemplar,
             ratings=sum(counts[number]),
-            mean=_mean(counts[number], lowest),
+            mean=sums[number] / sum(counts[number]) if sum(counts[number]) else None,
             counts=counts[number],
         )
         for number, row in sorted(shown.items())
     ]
-
-
-def _mean(counts: list[int], lowest: int) -> float | None:
-    total = sum(counts)
-    return sum(n * (lowest + place) for place, n in enumerate(counts)) / total if total else None
 
 
 def _cells(clips: list[ClipResult]) -> list[CellResult]:

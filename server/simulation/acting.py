@@ -5,7 +5,7 @@ import uuid
 from datetime import datetime, timedelta
 from typing import Any
 
-from experiments.trials.clip_rating.declaration import SCALE_NAME
+from experiments.trials.clip_rating.page import ShownClipRating
 from server.clock import now
 from server.context import SIMULATED_TIME
 from server.evidence.clip_bytes import clip_digest
@@ -73,9 +73,8 @@ class Actor(Person):
             clip_s = trial["frames"] / trial["fps"] if clip else 0.0
             self.moment += timedelta(seconds=clip_s + rt / 1000 + READY_S)
         body = self.rating(trial, declared) | {"rt": round(rt, 2)}
-        if "scale" in declared:  # other kinds are answered as the rater model does
-            given = body["answer"]["answers"][SCALE_NAME]
-            given["response"] = self._response(trial, declared["scale"], given["response"])
+        if body["answer"]["kind"] == "clip_rating":  # other kinds are answered as the rater model does
+            self._answer_in_manner(body["answer"]["answers"], trial, declared)
         body["answered_at_client"] = (self.moment + self.clock_off).isoformat()
         if manner.tickets:
             body["evidence"] = self._evidence(trial)
@@ -96,15 +95,19 @@ class Actor(Person):
             self._deliver()
             self._state()
 
-    def _response(self, trial: dict[str, Any], scale: dict[str, Any], modelled: int) -> int:
-        minimum, maximum = int(scale["minimum"]), int(scale["maximum"])
+    def _answer_in_manner(
+        self, answers: dict[str, dict[str, Any]], trial: dict[str, Any], declared: dict[str, Any]
+    ) -> None:
+        told = ShownClipRating.model_validate(declared)
         if trial["kind"] == "attention" and self.manner.reads:
-            return modelled
-        if self.manner.answers == "same":
-            return (minimum + maximum) // 2
-        if self.manner.answers == "any" or trial["kind"] == "attention":
-            return self.rng.randint(minimum, maximum)
-        return modelled
+            return
+        asked = (told.check_scale,) if trial["kind"] == "attention" else told.scales
+        for scale in (one.rated("") for one in asked):
+            if self.manner.answers == "same":
+                answers[scale.name] = {"response": scale.nearest((scale.minimum + scale.maximum) / 2)}
+            elif self.manner.answers == "any" or trial["kind"] == "attention":
+                drawn = self.rng.uniform(scale.minimum - scale.step / 2, scale.maximum + scale.step / 2)
+                answers[scale.name] = {"response": scale.nearest(drawn)}
 
     def _evidence(self, trial: dict[str, Any]) -> dict[str, Any] | None:
         if self.tickets is None:

@@ -11,6 +11,8 @@ from experiments.trials.kind import Kind
 EFFECTS: dict[str, Effect] = {
     "kind": "measured",
     "scale": "measured",
+    "scales": "measured",
+    "arrangement": "measured",
     "views": "measured",
     "start": "measured",
     "fixation_ms": "measured",
@@ -34,6 +36,41 @@ low = { en = "very unnatural" }
 high = { en = "very natural" }
 """
 
+FURTHER_EXAMPLES = (
+    """\
+[trial]
+kind = "clip_rating"
+arrangement = "one_screen"
+
+[[trial.scales]]
+name = "naturalness"
+type = "points"
+minimum = 1
+maximum = 5
+question = { en = "How natural was this blink?" }
+labels = [
+    { en = "not at all" },
+    { en = "a little" },
+    { en = "moderately" },
+    { en = "rather" },
+    { en = "very" },
+]
+
+[[trial.scales]]
+name = "eeriness"
+type = "slider"
+minimum = 0.0
+maximum = 100.0
+step = 1.0
+question = { en = "How eerie was it?" }
+low = { en = "not at all" }
+high = { en = "extremely" }
+show_value = true
+reverse = true
+not_applicable = { en = "I cannot say" }
+""",
+)
+
 CLIP_RATING = Kind(
     declaration=ClipRating,
     answer=RatingAnswer,
@@ -47,5 +84,6 @@ CLIP_RATING = Kind(
     plan=plan,
     shares_clips=True,
     example=EXAMPLE,
+    further_examples=FURTHER_EXAMPLES,
     check_response=check_response,
 )

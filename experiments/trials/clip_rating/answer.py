@@ -6,10 +6,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StrictFloat, StrictInt, field_validator, model_validator
 
 from experiments.base import Declaration, Name
-from experiments.trials.clip_rating.declaration import SCALE_NAME
+from experiments.trials.clip_rating.declaration import MAX_SCALES
+from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.kind import Answer
-
-MAX_SCALES = 8
 
 
 class ScaleAnswer(Declaration):

@@ -4,37 +4,15 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.base import Declaration, Translated
 from experiments.errors import InputError
+from experiments.trials.clip_rating.scales import SCALE_NAME, AnyScale, Points, Slider
 from experiments.trials.kind import TrialDeclaration
 from experiments.trials.scales import RatedScale
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
 
-SCALE_NAME = "rating"
-"""Name of the scale of a [trial.scale], which declares none."""
-
-
-class Scale(Declaration):
-    """The rating scale: whole numbers from `minimum` to `maximum` with labelled ends."""
-
-    minimum: int = 1
-    """Lowest point of the scale, a whole number."""
-    maximum: int = 7
-    """Highest point; with the lowest it makes 2 to 11 points."""
-    question: Translated
-    """What is asked, in every language."""
-    low: Translated
-    """Label of the lowest point."""
-    high: Translated
-    """Label of the highest point."""
-
-    @model_validator(mode="after")
-    def _ascending(self) -> Self:
-        if not 1 <= self.maximum - self.minimum <= 10:
-            raise ValueError(f"expected 2 to 11 scale points, got {self.minimum} to {self.maximum}")
-        return self
+MAX_SCALES = 8
 
 
 class ClipRating(TrialDeclaration):
@@ -45,8 +23,12 @@ class ClipRating(TrialDeclaration):
 
     kind: Literal["clip_rating"] = "clip_rating"
     """Names this kind of trial."""
-    scale: Scale
-    """The question and its scale."""
+    scale: AnyScale | None = None
+    """The question and its scale, where there is one: [trial.scale]."""
+    scales: Annotated[tuple[AnyScale, ...], Field(max_length=MAX_SCALES)] = ()
+    """One to eight scales, each with a name, instead of the one: [[trial.scales]]."""
+    arrangement: Literal["one_screen", "one_after_the_other"] = "one_screen"
+    """Several scales below one another on one screen, or a screen each in their order."""
     views: Annotated[int, Field(ge=1, le=10)] = 1
     """How often the clip is shown before it is rated."""
     start: Literal["key", "fixation"] = "key"
@@ -60,32 +42,49 @@ class ClipRating(TrialDeclaration):
     comment: bool = False
     """Adds a line of free text beside the rating; it stands in the column `comment`."""
 
+    @model_validator(mode="after")
+    def _scales_fit(self) -> Self:
+        if (self.scale is None) == (not self.scales):
+            got = "neither" if self.scale is None else "both"
+            raise ValueError(f"expected [trial.scale], or [[trial.scales]] for several scales; got {got}")
+        if self.scale is not None and self.scale.name != SCALE_NAME:
+            raise ValueError(
+                f"scale.name: a [trial.scale] has no name, got '{self.scale.name}'; use [[trial.scales]]"
+            )
+        names = [scale.name for scale in self.asked_scales]
+        again = next((name for name in names if names.count(name) > 1), None)
+        if again is not None:
+            raise ValueError(f"scales: expected a name of its own for each scale, got '{again}' twice")
+        missing = next(filter(None, (scale.missing_text() for scale in self.asked_scales)), None)
+        if missing:
+            raise ValueError(missing)
+        return self
+
+    @property
+    def asked_scales(self) -> tuple[Points | Slider, ...]:
+        """The scales in order, one or several."""
+        return (self.scale,) if self.scale is not None else self.scales
+
+    @property
+    def check_scale(self) -> Points:
+        """The scale on which attention checks ask for a point: the first with points, else one of seven."""
+        first = self.asked_scales[0]
+        points = (scale for scale in self.asked_scales if isinstance(scale, Points))
+        low, high = first.ends
+        return next(points, Points(name=first.name, question=first.question, low=low, high=high))
+
     def asked(self, language: str) -> str:
-        """The scale's ends and the question."""
-        scale = self.scale
-        return (
-            f"Scale: {scale.minimum} ({scale.low.get(language, '')}) to {scale.maximum} "
-            f"({scale.high.get(language, '')}). Question: {scale.question.get(language, '')}"
-        )
+        """Each scale, its ends and its question."""
+        if self.asked_scales[0].name == SCALE_NAME and len(self.asked_scales) == 1:
+            return self.asked_scales[0].said(language)
+        said = (f"- `{scale.name}`: {scale.said(language)}" for scale in self.asked_scales)
+        return "\n".join(("Scales, one row each in a trial:", "", *said))
 
     def rated_scales(self) -> tuple[RatedScale, ...]:
-        """The one scale."""
-        scale = self.scale
-        return (
-            RatedScale(
-                name=SCALE_NAME,
-                type="points",
-                minimum=scale.minimum,
-                maximum=scale.maximum,
-                step=1,
-                reverse=False,
-                not_applicable=False,
-                question=scale.question,
-                low=scale.low,
-                high=scale.high,
-                member="response",
-            ),
-        )
+        """The scales in order; the answer to the one of a [trial.scale] is the payload's `response`."""
+        if [scale.name for scale in self.asked_scales] == [SCALE_NAME]:
+            return (self.asked_scales[0].rated("response"),)
+        return tuple(scale.rated(f"answers.{scale.name}.response") for scale in self.asked_scales)
 
 
 def clip_rating_of(experiment: "Experiment") -> ClipRating:

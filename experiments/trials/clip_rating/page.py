@@ -6,7 +6,8 @@ A model of its own, so that a key added to the declaration reaches participants 
 from typing import TYPE_CHECKING, Literal
 
 from experiments.base import Declaration
-from experiments.trials.clip_rating.declaration import Scale, clip_rating_of
+from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.clip_rating.scales import AnyScale, Points
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -16,7 +17,9 @@ class ShownClipRating(Declaration):
     """The declared single-clip rating as the page gets it."""
 
     kind: Literal["clip_rating"]
-    scale: Scale
+    scales: tuple[AnyScale, ...]
+    arrangement: Literal["one_screen", "one_after_the_other"]
+    check_scale: Points
     views: int
     start: Literal["key", "fixation"]
     fixation_ms: int
@@ -31,7 +34,9 @@ def shown(experiment: "Experiment") -> ShownClipRating:
     trial = clip_rating_of(experiment)
     return ShownClipRating(
         kind=trial.kind,
-        scale=trial.scale,
+        scales=trial.asked_scales,
+        arrangement=trial.arrangement,
+        check_scale=trial.check_scale,
         views=trial.views,
         start=trial.start,
         fixation_ms=trial.fixation_ms,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
     """The trials of one participant in order, see `single_clips`; a check asks for any point of the scale."""
-    scale = clip_rating_of(experiment).scale
+    scale = clip_rating_of(experiment).check_scale
 
     def asked(rng: random.Random) -> int:
         return rng.randint(scale.minimum, scale.maximum)

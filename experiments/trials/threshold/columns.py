@@ -112,7 +112,6 @@ THRESHOLDS = View(
         *base.SAVED,
         *base.ORIGIN,
         *base.CLOCK,
-        *base.VIEWS,
     ),
     rows=rows_of("threshold", {}, _TABLES),
 )

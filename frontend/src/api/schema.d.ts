@@ -1050,9 +1050,9 @@ export interface paths {
          * Get Results
          * @description What the answers so far look like, by kind of trial, with response times and playback.
          *
-         *     They are of one origin and one data series, that of the active version where none is given. With the ETag
-         *     of an earlier answer as `If-None-Match` it is 304 where nothing has changed. Where counting takes long
-         *     `counted_at` may lie some time back.
+         *     They are of one origin, one data series (that of the active version where none is given) and, where
+         *     clips are rated, one scale (the first). With the ETag of an earlier answer as `If-None-Match` it is 304
+         *     where nothing has changed. Where counting takes long `counted_at` may lie some time back.
          */
         get: operations["get_results"];
         put?: never;
@@ -1911,8 +1911,24 @@ export interface components {
              * @default 6
              */
             expected_seconds: number;
-            /** @description The question and its scale. */
-            scale: components["schemas"]["Scale"];
+            /**
+             * Scale
+             * @description The question and its scale, where there is one: [trial.scale].
+             */
+            scale: (components["schemas"]["Points"] | components["schemas"]["Slider"]) | null;
+            /**
+             * Scales
+             * @description One to eight scales, each with a name, instead of the one: [[trial.scales]].
+             * @default []
+             */
+            scales: (components["schemas"]["Points"] | components["schemas"]["Slider"])[];
+            /**
+             * Arrangement
+             * @description Several scales below one another on one screen, or a screen each in their order.
+             * @default one_screen
+             * @enum {string}
+             */
+            arrangement: "one_screen" | "one_after_the_other";
             /**
              * Views
              * @description How often the clip is shown before it is rated.
@@ -1970,7 +1986,7 @@ export interface components {
             mean: number | null;
             /**
              * Counts
-             * @description Answers per scale point, from the lowest.
+             * @description Answers a bin, from the lowest.
              */
             counts: number[];
         };
@@ -2151,62 +2167,6 @@ export interface components {
              * @default true
              */
             allow_touch: boolean;
-        };
-        /**
-         * Disturbances
-         * @description What each disturbance of a view does to its play: `ignore`, `flag`, or `repeat` (it is failed).
-         *
-         *     Every one is recorded with the view whatever it does. A view that was broken off, by a reload or a crash,
-         *     always fails its play.
-         */
-        Disturbances: {
-            /**
-             * Full Screen Left
-             * @description Full screen was left during the clip.
-             * @default flag
-             * @enum {string}
-             */
-            full_screen_left: "ignore" | "flag" | "repeat";
-            /**
-             * Window Too Small
-             * @description The window became smaller than the clip.
-             * @default flag
-             * @enum {string}
-             */
-            window_too_small: "ignore" | "flag" | "repeat";
-            /**
-             * Clip Cut Off
-             * @description Less than the whole clip was inside the window.
-             * @default flag
-             * @enum {string}
-             */
-            clip_cut_off: "ignore" | "flag" | "repeat";
-            /**
-             * Zoomed
-             * @description The page was zoomed, so that the clip was not shown at its size.
-             * @default flag
-             * @enum {string}
-             */
-            zoomed: "ignore" | "flag" | "repeat";
-            /**
-             * Refresh Dropped
-             * @description The screen refreshed much less often than it did before, as a power saver makes it.
-             * @default flag
-             * @enum {string}
-             */
-            refresh_dropped: "ignore" | "flag" | "repeat";
-            /**
-             * Scale Reloaded
-             * @description The page was left after the clip and the answer given on a later page, without a second view.
-             * @default flag
-             * @enum {string}
-             */
-            scale_reloaded: "ignore" | "flag" | "repeat";
-            /**
-             * Focus Lost
-             * @description The page was hidden or lost focus during the clip; where not given, `fail_on_focus_lost` decides.
-             */
-            focus_lost: ("ignore" | "flag" | "repeat") | null;
         };
         /**
          * DropFailedPlays
@@ -2582,14 +2542,6 @@ export interface components {
              *       "uncertain_unevenness_ms": 3,
              *       "fail_on_focus_lost": true,
              *       "flag_video_fallback": true,
-             *       "disturbances": {
-             *         "clip_cut_off": "flag",
-             *         "full_screen_left": "flag",
-             *         "refresh_dropped": "flag",
-             *         "scale_reloaded": "flag",
-             *         "window_too_small": "flag",
-             *         "zoomed": "flag"
-             *       },
              *       "max_repeats": 1
              *     }
              */
@@ -3886,13 +3838,6 @@ export interface components {
              * @description How often focus was lost.
              */
             focus_lost?: number | null;
-            /**
-             * Disturbances
-             * @description How often each of [playback.disturbances] disturbed the views.
-             */
-            disturbances?: {
-                [key: string]: number;
-            } | null;
             /** Refresh Rate Hz */
             refresh_rate_hz?: number | null;
             /** Device Pixel Ratio */
@@ -3965,23 +3910,84 @@ export interface components {
              */
             flag_video_fallback: boolean;
             /**
-             * @description What disturbances of a view do to its play.
-             * @default {
-             *       "full_screen_left": "flag",
-             *       "window_too_small": "flag",
-             *       "clip_cut_off": "flag",
-             *       "zoomed": "flag",
-             *       "refresh_dropped": "flag",
-             *       "scale_reloaded": "flag"
-             *     }
-             */
-            disturbances: components["schemas"]["Disturbances"];
-            /**
              * Max Repeats
              * @description How often a clip whose play failed is offered again, at the end of the block.
              * @default 1
              */
             max_repeats: number;
+        };
+        /**
+         * Points
+         * @description The points of a rating scale: whole numbers from `minimum` to `maximum`, 2 to 11 of them.
+         *
+         *     Either the two ends are labelled (`low`, `high`) or every point (`labels`).
+         */
+        Points: {
+            /**
+             * @description Names this type of scale; it is meant where none is named. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            type: "points";
+            /**
+             * Name
+             * @description Names the scale in the data (column `scale`); each of several needs its own.
+             * @default rating
+             */
+            name: string;
+            /**
+             * Question
+             * @description What is asked, in every language.
+             */
+            question: {
+                [key: string]: string;
+            };
+            /**
+             * Reverse
+             * @description Whether a high answer means little of what is measured; the data keep the answer as it was given.
+             * @default false
+             */
+            reverse: boolean;
+            /**
+             * Not Applicable
+             * @description Label of an answer beside the scale, such as `cannot say`; it is stored without a number.
+             */
+            not_applicable: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Minimum
+             * @description Lowest point of the scale, a whole number.
+             * @default 1
+             */
+            minimum: number;
+            /**
+             * Maximum
+             * @description Highest point; with the lowest it makes 2 to 11 points.
+             * @default 7
+             */
+            maximum: number;
+            /**
+             * Low
+             * @description Label of the lowest point.
+             */
+            low: {
+                [key: string]: string;
+            } | null;
+            /**
+             * High
+             * @description Label of the highest point.
+             */
+            high: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Labels
+             * @description Labels of all points from the lowest, instead of `low` and `high`.
+             * @default []
+             */
+            labels: {
+                [key: string]: string;
+            }[];
         };
         /**
          * Practice
@@ -4437,6 +4443,22 @@ export interface components {
             files: string[];
         };
         /**
+         * ResultScale
+         * @description A scale as declared; answers are shown as they were chosen, reverse-keyed or not.
+         */
+        ResultScale: {
+            /** Name */
+            name: string;
+            /** Type */
+            type: string;
+            /** Minimum */
+            minimum: number;
+            /** Maximum */
+            maximum: number;
+            /** Reverse */
+            reverse: boolean;
+        };
+        /**
          * Results
          * @description Ratings of single clips.
          */
@@ -4467,10 +4489,18 @@ export interface components {
              * @enum {string}
              */
             kind: "clip_rating";
-            /** Scale Minimum */
-            scale_minimum: number;
-            /** Scale Maximum */
-            scale_maximum: number;
+            /**
+             * Scales
+             * @description Every scale of the study, in order.
+             */
+            scales: components["schemas"]["ResultScale"][];
+            /** @description The one whose answers these are. */
+            scale: components["schemas"]["ResultScale"];
+            /**
+             * Bins
+             * @description Lowest answer of each count: the scale's points, or equal parts of a slider.
+             */
+            bins: number[];
             /** Margins */
             margins: components["schemas"]["Margin"][];
             /** Cells */
@@ -4730,45 +4760,6 @@ export interface components {
             status: "active" | "complete" | "screened_out" | "withdrawn";
             /** @description The run anew, where this answer decided its group and with it its trials. */
             run?: components["schemas"]["RunState"] | null;
-        };
-        /**
-         * Scale
-         * @description The rating scale: whole numbers from `minimum` to `maximum` with labelled ends.
-         */
-        Scale: {
-            /**
-             * Minimum
-             * @description Lowest point of the scale, a whole number.
-             * @default 1
-             */
-            minimum: number;
-            /**
-             * Maximum
-             * @description Highest point; with the lowest it makes 2 to 11 points.
-             * @default 7
-             */
-            maximum: number;
-            /**
-             * Question
-             * @description What is asked, in every language.
-             */
-            question: {
-                [key: string]: string;
-            };
-            /**
-             * Low
-             * @description Label of the lowest point.
-             */
-            low: {
-                [key: string]: string;
-            };
-            /**
-             * High
-             * @description Label of the highest point.
-             */
-            high: {
-                [key: string]: string;
-            };
         };
         /**
          * ScaleAnswer
@@ -5067,7 +5058,14 @@ export interface components {
              * @enum {string}
              */
             kind: "clip_rating";
-            scale: components["schemas"]["Scale"];
+            /** Scales */
+            scales: (components["schemas"]["Points"] | components["schemas"]["Slider"])[];
+            /**
+             * Arrangement
+             * @enum {string}
+             */
+            arrangement: "one_screen" | "one_after_the_other";
+            check_scale: components["schemas"]["Points"];
             /** Views */
             views: number;
             /**
@@ -5201,6 +5199,81 @@ export interface components {
             password: string;
             /** Code */
             code?: string | null;
+        };
+        /**
+         * Slider
+         * @description A slider from `minimum` to `maximum`. It has no handle, hence no answer, before it is first touched.
+         */
+        Slider: {
+            /**
+             * @description Names this type of scale. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            type: "slider";
+            /**
+             * Name
+             * @description Names the scale in the data (column `scale`); each of several needs its own.
+             * @default rating
+             */
+            name: string;
+            /**
+             * Question
+             * @description What is asked, in every language.
+             */
+            question: {
+                [key: string]: string;
+            };
+            /**
+             * Reverse
+             * @description Whether a high answer means little of what is measured; the data keep the answer as it was given.
+             * @default false
+             */
+            reverse: boolean;
+            /**
+             * Not Applicable
+             * @description Label of an answer beside the scale, such as `cannot say`; it is stored without a number.
+             */
+            not_applicable: {
+                [key: string]: string;
+            } | null;
+            /**
+             * Minimum
+             * @description The number at its left end (right, where a language is read so).
+             * @default 0
+             */
+            minimum: number;
+            /**
+             * Maximum
+             * @description The number at its other end.
+             * @default 100
+             */
+            maximum: number;
+            /**
+             * Step
+             * @description Difference of neighbouring answers; the range is a whole number of steps.
+             * @default 1
+             */
+            step: number;
+            /**
+             * Low
+             * @description Label of the low end.
+             */
+            low: {
+                [key: string]: string;
+            };
+            /**
+             * High
+             * @description Label of the high end.
+             */
+            high: {
+                [key: string]: string;
+            };
+            /**
+             * Show Value
+             * @description Whether the number is shown while the slider is moved.
+             * @default false
+             */
+            show_value: boolean;
         };
         /**
          * Stacked
@@ -5817,16 +5890,6 @@ export interface components {
             plays_wanted: number;
             /** Answered */
             answered: boolean;
-            /**
-             * Views Begun
-             * @description The highest number of a view of this trial; 0 where it has none.
-             */
-            views_begun: number;
-            /**
-             * Views
-             * @description Views that still wait for the answer of their play.
-             */
-            views: components["schemas"]["ViewState"][];
             /** @description Of trials that answers decide on. */
             series?: components["schemas"]["SeriesPlace"] | null;
         };
@@ -5965,11 +6028,6 @@ export interface components {
              */
             number: number;
             /**
-             * Play
-             * @description The play that it is part of; an older page has one view a play.
-             */
-            play?: number | null;
-            /**
              * Started At Client
              * Format: date-time
              */
@@ -5985,91 +6043,6 @@ export interface components {
              * @default []
              */
             clips?: components["schemas"]["SeenClip"][];
-            /**
-             * Outcome
-             * @description How it ended: shown to its end, or broken off by a reload or a crash.
-             */
-            outcome?: ("shown" | "interrupted") | null;
-            /** Showings */
-            showings?: components["schemas"]["ViewShowing"][] | null;
-            /**
-             * Disturbances
-             * @default {}
-             */
-            disturbances?: {
-                [key: string]: number;
-            };
-        };
-        /**
-         * ViewShowing
-         * @description What was measured of one clip of a view, or of several at once; its frames are with the clips.
-         *
-         *     With it another page, or another device, can ask for the answer without a second view.
-         */
-        ViewShowing: {
-            /** Roles */
-            roles: ("shown" | "left" | "right" | "first" | "second" | "reference")[];
-            /**
-             * Method
-             * @enum {string}
-             */
-            method: "webcodecs" | "video";
-            /** Frames */
-            frames: number;
-            /** Fps */
-            fps: number;
-            /**
-             * Ended Ms
-             * @description From the view's start key to the clip's end.
-             */
-            ended_ms: number;
-            /** Stalls */
-            stalls: number;
-            /** Clock Gap Ms */
-            clock_gap_ms: number | null;
-            /** Clock Late Ms */
-            clock_late_ms: number | null;
-            /** Focus Lost */
-            focus_lost: number;
-            /**
-             * Visible Share
-             * @description Smallest share of the clip inside the window.
-             */
-            visible_share?: number | null;
-            /**
-             * Refresh Ms
-             * @description Median time between refreshes during the clip.
-             */
-            refresh_ms?: number | null;
-        };
-        /**
-         * ViewState
-         * @description A view of a trial that still waits for its answer, as the page gets it back.
-         */
-        ViewState: {
-            /** Id */
-            id: string;
-            /** Number */
-            number: number;
-            /** Play */
-            play: number;
-            /**
-             * Started At Client
-             * Format: date-time
-             */
-            started_at_client: string;
-            /** Ended */
-            ended: boolean;
-            /** Outcome */
-            outcome: ("shown" | "interrupted") | null;
-            /** Showings */
-            showings: components["schemas"]["ViewShowing"][] | null;
-            /** Clips */
-            clips: components["schemas"]["SeenClip"][];
-            /** Disturbances */
-            disturbances: {
-                [key: string]: number;
-            };
         };
         /**
          * ViewsIn
@@ -6185,7 +6158,6 @@ export type DeclaredPairs = components['schemas']['DeclaredPairs'];
 export type DefinitionText = components['schemas']['DefinitionText'];
 export type DesignOut = components['schemas']['DesignOut'];
 export type Display = components['schemas']['Display'];
-export type Disturbances = components['schemas']['Disturbances'];
 export type DropFailedPlays = components['schemas']['DropFailedPlays'];
 export type DropSlowTrials = components['schemas']['DropSlowTrials'];
 export type EditDefinition = components['schemas']['EditDefinition'];
@@ -6256,6 +6228,7 @@ export type PairedComparison = components['schemas']['PairedComparison'];
 export type Playback = components['schemas']['Playback'];
 export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
+export type Points = components['schemas']['Points'];
 export type Practice = components['schemas']['Practice'];
 export type ProblemOut = components['schemas']['ProblemOut'];
 export type Range = components['schemas']['Range'];
@@ -6272,6 +6245,7 @@ export type Reference = components['schemas']['Reference'];
 export type RenderOverrides = components['schemas']['RenderOverrides'];
 export type RenderSettings = components['schemas']['RenderSettings'];
 export type ReportOut = components['schemas']['ReportOut'];
+export type ResultScale = components['schemas']['ResultScale'];
 export type Results = components['schemas']['Results'];
 export type RunIdentity = components['schemas']['RunIdentity'];
 export type RunPage = components['schemas']['RunPage'];
@@ -6280,7 +6254,6 @@ export type RunStarted = components['schemas']['RunStarted'];
 export type RunState = components['schemas']['RunState'];
 export type RunSummary = components['schemas']['RunSummary'];
 export type Saved = components['schemas']['Saved'];
-export type Scale = components['schemas']['Scale'];
 export type ScaleAnswer = components['schemas']['ScaleAnswer'];
 export type ScreenAttention = components['schemas']['ScreenAttention'];
 export type ScreenDevice = components['schemas']['ScreenDevice'];
@@ -6303,6 +6276,7 @@ export type ShownReference = components['schemas']['ShownReference'];
 export type ShownThreshold = components['schemas']['ShownThreshold'];
 export type SideBySide = components['schemas']['SideBySide'];
 export type SignIn = components['schemas']['SignIn'];
+export type Slider = components['schemas']['Slider'];
 export type Stacked = components['schemas']['Stacked'];
 export type StageChange = components['schemas']['StageChange'];
 export type Stimulus = components['schemas']['Stimulus'];
@@ -6332,8 +6306,6 @@ export type UploadOut = components['schemas']['UploadOut'];
 export type UploadedFile = components['schemas']['UploadedFile'];
 export type VersionOut = components['schemas']['VersionOut'];
 export type ViewIn = components['schemas']['ViewIn'];
-export type ViewShowing = components['schemas']['ViewShowing'];
-export type ViewState = components['schemas']['ViewState'];
 export type ViewsIn = components['schemas']['ViewsIn'];
 export type ViewsSaved = components['schemas']['ViewsSaved'];
 export type WithinFactor = components['schemas']['WithinFactor'];
@@ -8799,6 +8771,7 @@ export interface operations {
             query?: {
                 origin?: "participant" | "preview" | "pilot" | "simulated";
                 series?: number | null;
+                scale?: string | null;
             };
             header?: {
                 "if-none-match"?: string | null;

@@ -25,8 +25,6 @@ import { emptied, showNotice } from "./screens/notice";
 import { openStopDialog } from "./screens/stop-dialog";
 import type { Session } from "./session";
 import { loadKind } from "./trials";
-import { saveInterrupted } from "./trials/save-rating";
-import { settleInterrupted } from "./views/ledger";
 
 /** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
@@ -211,7 +209,6 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
   root.addEventListener("stop", () => openStopDialog(session));
   watch(session);
   void describeDevice(session, durable);
-  await settleInterrupted(session, (trial, play) => saveInterrupted(session, trial, play));
   root.replaceChildren();
   if (run.awaits_group) {
     await runTimeline(root, timeline(session, started.run_token), simulation(run));

@@ -30,8 +30,6 @@ const trial = (trial_index: number): TrialInfo => ({
   plays_done: 0,
   plays_wanted: 1,
   answered: false,
-  views_begun: 0,
-  views: [],
 });
 
 function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
@@ -51,7 +49,7 @@ function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
 const rating = (trial_index: number, play = 1) => ({
   kind: "write" as const,
   path: "/api/run/ratings/x",
-  body: { trial_index, play, time_elapsed: 900, playback: {} },
+  body: { trial_index, play, time_elapsed: 900 },
 });
 
 function kept(storage = new FakeStorage(), begun: Kept | null = visit()): [KeptVisit, FakeStorage] {

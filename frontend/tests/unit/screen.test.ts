@@ -6,7 +6,7 @@ import { owed, Replays } from "../../src/participant/flow/replays";
 import { refreshRate } from "../../src/participant/screen/refresh-rate";
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
 import { distanceFrom } from "../../src/participant/screens/distance";
-import { keyFor, valueOf } from "../../src/participant/trials/clip_rating/scale-keys";
+import { keyFor, valueOf } from "../../src/participant/trials/shared/scale-keys";
 
 const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
   trial_index: 0,
@@ -26,8 +26,6 @@ const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
   plays_done: 0,
   plays_wanted: 1,
   answered: false,
-  views_begun: 0,
-  views: [],
   ...rest,
 });
 

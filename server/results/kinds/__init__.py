@@ -9,10 +9,11 @@ from importlib import import_module
 from sqlalchemy.orm import Session
 
 from server.models import Study, StudyVersion
+from server.results.repository import Pool
 from server.results.schemas import AnyResults
 
-Summarise = Callable[[Session, Study, StudyVersion, str], AnyResults]
-"""The results of the answers of one origin, in the data series of a version."""
+Summarise = Callable[[Session, Study, StudyVersion, Pool], AnyResults]
+"""The results of a pool of answers, which is of the data series of this version."""
 
 
 def summary_of(kind: str) -> Summarise:

@@ -4,9 +4,10 @@ from sqlalchemy.orm import Session
 
 from server.models import Study, StudyVersion
 from server.results import service
+from server.results.repository import Pool
 from server.results.schemas import Results
 
 
-def summarise(session: Session, study: Study, version: StudyVersion, origin: str) -> Results:
-    """Results on the declared scale."""
-    return service.results(session, study, version, origin)
+def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> Results:
+    """Results on the pool's scale."""
+    return service.results(session, study, version, of)

@@ -37,9 +37,9 @@ class Choices:
         return self.n - self.first - self.second
 
 
-def summarise(session: Session, study: Study, version: StudyVersion, origin: str) -> PairResults:
-    """Choices of one origin and of the data series of `version`."""
-    definition, of = definition_of(version), Pool(study.id, origin, version.series)
+def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> PairResults:
+    """Choices of one pool, which is of the data series of `version`."""
+    definition = definition_of(version)
     tally = pooled(session, of.runs(), "", ())
     outcomes = outcomes_of(tally, _cells(session, of))
     sides = Counter[int]()
@@ -47,7 +47,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, origin: str
         sides[code] += times
     return PairResults(
         study=study.name,
-        origin=origin,
+        origin=of.origin,
         series=version.series,
         counted_at=now(),
         participants=len(tally.means),

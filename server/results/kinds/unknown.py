@@ -11,13 +11,13 @@ from server.studies.lookup import definition_of
 from server.tallies.pools import pooled
 
 
-def summarise(session: Session, study: Study, version: StudyVersion, origin: str) -> OtherResults:
+def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> OtherResults:
     """Counts alone."""
-    kind, of = definition_of(version).trial.kind, Pool(study.id, origin, version.series)
+    kind = definition_of(version).trial.kind
     tally = pooled(session, of.runs(), "", ())
     return OtherResults(
         study=study.name,
-        origin=origin,
+        origin=of.origin,
         series=version.series,
         counted_at=now(),
         participants=len(tally.means),

@@ -1,4 +1,4 @@
-"""The single-clip rating: a whole number on the scale, and one play of one clip."""
+"""The single-clip rating: an answer on each scale, and one play of one clip."""
 
 import random
 from collections.abc import Mapping
@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
 from experiments.trials.clip_rating.answer import RatingAnswer, ScaleAnswer
-from experiments.trials.clip_rating.declaration import SCALE_NAME, clip_rating_of
+from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.clip_rating.page import ShownClipRating
+from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.scales import RatedScale, scales_of
 from server.errors import Invalid
 from server.tallies.tally import Counted, Place
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 TRIAL_SD = 1.0
 """Spread of single answers of simulated people, in points of a seven-point scale."""
+NOT_APPLICABLE_SHARE = 0.05
+"""Share of answers of simulated people that a scale does not apply, where it has that answer."""
 
 
 class RatingOutOfScale(Invalid):
@@ -44,7 +48,7 @@ class NoSuchScale(Invalid):
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
     """Refuse other scales than those declared, a rating that is off its scale, and some but not all."""
     answer = answer_of(rating, RatingAnswer)
-    asked = {scale.name: scale for scale in scales_of(experiment)}
+    asked = {scale.name: scale for scale in _asked(experiment, part)}
     for name in answer.answers:
         if name not in asked:
             raise NoSuchScale(f"Expected answers on the scales {', '.join(asked)}; got one on {name}.")
@@ -56,6 +60,12 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
         )
     for name, given in answer.answers.items():
         _check(asked[name], given)
+
+
+def _asked(experiment: Experiment, part: Part) -> tuple[RatedScale, ...]:
+    if part == "attention":
+        return (clip_rating_of(experiment).check_scale.rated("response"),)
+    return scales_of(experiment)
 
 
 def _check(scale: RatedScale, given: ScaleAnswer) -> None:
@@ -94,24 +104,32 @@ def playback_of(log: PlaybackLog) -> Playback:
         refresh_rate_hz=log.refresh_rate_hz,
         clock_gap_ms=log.clock_gap_ms,
         clock_late_ms=log.clock_late_ms,
-        disturbances=log.disturbances or {},
     )
 
 
 def simulated(
     preference: Preference, trial: Mapping[str, Any], declared: Mapping[str, Any], rng: random.Random
 ) -> dict[str, Any]:
-    """The rating of a simulated person: the liking around the middle of the scale, rounded into it."""
-    minimum, maximum = declared["scale"]["minimum"], declared["scale"]["maximum"]
+    """The answers of a simulated person: on each scale the liking around its middle, now and then that it
+    does not apply where it may.
+    """
+    told = ShownClipRating.model_validate(declared)
     if not trial["clips"]:
-        return _one_answer(asked_in(trial["prompt"]))
-    middle, unit = (minimum + maximum) / 2, (maximum - minimum) / 6
-    value = middle + unit * (preference(trial["clips"][0]["clip_sha256"]) + rng.gauss(0, TRIAL_SD))
-    return _one_answer(min(maximum, max(minimum, round(value))))
+        return _answers({told.check_scale.name: {"response": asked_in(trial["prompt"])}})
+    liking = preference(trial["clips"][0]["clip_sha256"])
+    return _answers({scale.name: _answered(scale.rated(""), liking, rng) for scale in told.scales})
 
 
-def _one_answer(response: int) -> dict[str, Any]:
-    return {"kind": "clip_rating", "answers": {SCALE_NAME: {"response": response}}}
+def _answered(scale: RatedScale, liking: float, rng: random.Random) -> dict[str, Any]:
+    middle, unit = (scale.minimum + scale.maximum) / 2, (scale.maximum - scale.minimum) / 6
+    value = scale.nearest(middle + (-1 if scale.reverse else 1) * unit * (liking + rng.gauss(0, TRIAL_SD)))
+    if scale.not_applicable and rng.random() < NOT_APPLICABLE_SHARE:
+        return {"response": None, "not_applicable": True}
+    return {"response": value}
+
+
+def _answers(answers: dict[str, Any]) -> dict[str, Any]:
+    return {"kind": "clip_rating", "answers": answers}
 
 
 def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:

@@ -51,7 +51,7 @@ def test_answers_before_and_after_another_scale_are_apart(
     latest = experimenter.get("/studies/short/results").json()
     first = experimenter.get("/studies/short/results?series=1").json()
     assert [
-        (shown["series"], shown["scale_maximum"], shown["participants"]) for shown in (latest, first)
+        (shown["series"], shown["scale"]["maximum"], shown["participants"]) for shown in (latest, first)
     ] == [
         (2, 5, 1),
         (1, 7, 1),

@@ -28,7 +28,7 @@ const COLUMNS: Column<Trial>[] = [
   {
     title: "Answer",
     number: true,
-    cell: (trial) => `${trial.response ?? "–"}${trial.expected_response === null ? "" : ` (asked for ${trial.expected_response})`}`,
+    cell: (trial) => `${given(trial)}${trial.expected_response === null ? "" : ` (asked for ${trial.expected_response})`}`,
   },
   { title: "After", number: true, wide: true, cell: (trial) => (trial.rt === null ? "–" : `${fixed(trial.rt, 0)} ms`) },
   {
@@ -47,6 +47,15 @@ const COLUMNS: Column<Trial>[] = [
   },
   { title: "Each frame drawn", wide: true, cell: (trial) => (trial.drawn === null ? "–" : <Ticks drawn={trial.drawn} />) },
 ];
+
+/** The one number, or what was answered on each scale. */
+function given({ response, answer }: Trial): string {
+  const answers = answer["answers"];
+  if (typeof answers !== "object" || answers === null) return String(response ?? "–");
+  return Object.entries(answers as Record<string, { response: number | null; not_applicable?: boolean }>)
+    .map(([scale, one]) => `${scale} ${one.response ?? (one.not_applicable ? "not applicable" : "–")}`)
+    .join(", ");
+}
 
 export function TrialTable({ trials }: { trials: Trial[] }) {
   return (

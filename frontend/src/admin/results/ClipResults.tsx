@@ -30,7 +30,7 @@ export function ClipResults({ study, data }: { study: string; data: Schemas["Res
                 <Table.Th>Ratings</Table.Th>
                 <Table.Th>Mean</Table.Th>
                 <Table.Th className="only-wide">
-                  Answers from {data.scale_minimum} to {data.scale_maximum}
+                  Answers from {data.scale.minimum} to {data.scale.maximum}
                 </Table.Th>
               </Table.Tr>
             </Table.Thead>
@@ -45,7 +45,7 @@ export function ClipResults({ study, data }: { study: string; data: Schemas["Res
                   <Table.Td className="number">{clip.ratings}</Table.Td>
                   <Table.Td className="number">{fixed(clip.mean)}</Table.Td>
                   <Table.Td className="only-wide">
-                    <Bars counts={clip.counts} lowest={data.scale_minimum} />
+                    <Bars counts={clip.counts} bins={data.bins} />
                   </Table.Td>
                 </Table.Tr>
               ))}
@@ -65,9 +65,9 @@ export function ClipResults({ study, data }: { study: string; data: Schemas["Res
 }
 
 /** How often each answer was given: small bars, with the counts for those who hear the page. */
-function Bars({ counts, lowest }: { counts: number[]; lowest: number }) {
+function Bars({ counts, bins }: { counts: number[]; bins: number[] }) {
   const most = Math.max(1, ...counts);
-  const label = counts.map((count, place) => `${place + lowest}: ${count}`).join(", ");
+  const label = counts.map((count, place) => `${bins[place] ?? ""}: ${count}`).join(", ");
   return (
     <svg width={14 * counts.length} height={22} role="img" aria-label={label}>
       <title>{label}</title>

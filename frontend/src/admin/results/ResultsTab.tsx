@@ -19,10 +19,11 @@ export function ResultsTab() {
   const detail = useQuery(studyQuery(study)).data;
   const [chosen, setOrigin] = useState<DataOrigin | null>(null);
   const [series, setSeries] = useState<number | null>(null);
+  const [scale, setScale] = useState<string | null>(null);
   const origin = chosen ?? (detail?.summary.status === "pilot" ? "pilot" : "participant");
   const results = useQuery({
-    queryKey: ["results", study, origin, series],
-    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { origin, series } } })),
+    queryKey: ["results", study, origin, series, scale],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/results", { params: { path: { study }, query: { origin, series, scale } } })),
     refetchInterval: 15_000,
   });
   return (
@@ -36,9 +37,15 @@ export function ResultsTab() {
             clearable
             placeholder="series of the active version"
             value={series === null ? null : String(series)}
-            onChange={(word) => setSeries(word === null ? null : Number(word))}
+            onChange={(word) => {
+              setSeries(word === null ? null : Number(word));
+              setScale(null);
+            }}
             data={detail.series.map((one) => ({ value: String(one.number), label: one.name }))}
           />
+        )}
+        {results.data?.kind === "clip_rating" && (
+          <ScaleChooser scales={results.data.scales} chosen={results.data.scale.name} choose={setScale} />
         )}
       </Group>
       <Answer of={results}>
@@ -53,6 +60,19 @@ export function ResultsTab() {
       <Reports study={study} origin={origin} series={series} />
     </Stack>
   );
+}
+
+interface ChooserProps {
+  scales: Schemas["ResultScale"][];
+  chosen: string;
+  choose: (name: string | null) => void;
+}
+
+/** The scales of a study that has several; one that is reverse-keyed says so, its answers are as they were given. */
+function ScaleChooser({ scales, chosen, choose }: ChooserProps) {
+  if (scales.length < 2) return null;
+  const data = scales.map(({ name, reverse }) => ({ value: name, label: reverse ? `${name} (reverse-keyed)` : name }));
+  return <Select aria-label="Scale" w={240} allowDeselect={false} value={chosen} onChange={choose} data={data} />;
 }
 
 interface ShownProps<Results> {

@@ -15,7 +15,7 @@ export function labelsOf(factors: Factors, name: string): { title: string; of: (
 }
 
 /** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
-export function marginPlot(margin: Schemas["Margin"], { scale_minimum, scale_maximum }: Results, factors: Factors): Plot.PlotOptions {
+export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
   const [across, beside] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
   const rows = margin.means.map((mean) => ({
@@ -31,7 +31,7 @@ export function marginPlot(margin: Schemas["Margin"], { scale_minimum, scale_max
     height: 250,
     marginBottom: 52,
     x: { type: "point", padding: 0.6, label: null, domain: across.all.length > 0 ? across.all : rows.map((row) => row.x) },
-    y: { domain: [scale_minimum, scale_maximum], grid: true, label: "mean rating" },
+    y: { domain: [scale.minimum, scale.maximum], grid: true, label: `mean ${scale.name}` },
     color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: beside.all } : {}) },
     marks: [
       // Long labels break into lines.
@@ -46,11 +46,11 @@ export function marginPlot(margin: Schemas["Margin"], { scale_minimum, scale_max
 const SHARE_COLOUR = "#3c8697";
 
 /** One row a cell, one column an answer: the share of answers as depth of colour, and as a number. */
-export function cellPlot({ cells, scale_minimum }: Results): Plot.PlotOptions {
+export function cellPlot({ cells, bins }: Results): Plot.PlotOptions {
   const rows = cells.flatMap((cell) =>
     cell.counts.map((count, place) => ({
       cell: cell.cell,
-      response: place + scale_minimum,
+      response: bins[place] ?? 0,
       share: cell.ratings === 0 ? 0 : count / cell.ratings,
     })),
   );

@@ -1,9 +1,7 @@
 import type { Messages } from "./en";
 
 export const messages: Messages = {
-  loading: "Einen Augenblick …",
   continue: "Weiter",
-  back: "Zurück",
   try_again: "Noch einmal versuchen",
   start_study: "Beginnen",
   preview_note: "Vorschau: Diese Antworten werden später gelöscht.",
@@ -102,13 +100,10 @@ export const messages: Messages = {
   decoding: "Der Film wird vorbereitet …",
   trial_of: "{number} von {total}",
   clip_name: "Der Film",
-  already_seen: "Diesen Clip haben Sie schon gesehen. Bitte antworten Sie jetzt.",
   clip_playing: "Der Film läuft.",
-  clip_over: "Der Film ist zu Ende. Bitte bewerten Sie ihn.",
   clip_broken_title: "Dieser Film lässt sich nicht zeigen",
   clip_broken: "Das liegt nicht an Ihnen, und wir haben es vermerkt. Bitte machen Sie mit dem nächsten weiter.",
   rating_key: "{value} von {maximum}",
-  rating_keys_hint: "Tasten {minimum} bis {maximum}",
   pair_ready: "Leertaste startet beide Filme",
   pair_ready_touch: "Tippen startet beide Filme",
   pair_replay: "Diese Filme liefen vorhin nicht flüssig. Hier sind sie noch einmal.",
@@ -119,8 +114,8 @@ export const messages: Messages = {
   pair_lower: "Unten",
   pair_first: "Der erste",
   pair_second: "Der zweite",
+  slider_untouched: "noch keine Antwort",
   confirm: "Bestätigen",
-  confirm_hint: "Die Eingabetaste bestätigt",
   comment: "Bemerkung (wenn Sie möchten)",
   attention_title: "Eine Frage zwischendurch",
 
@@ -131,7 +126,6 @@ export const messages: Messages = {
   break_go_on: "Weiter",
   welcome_back_title: "Willkommen zurück",
   welcome_back: "Sie machen dort weiter, wo Sie aufgehört haben: {done} von {total} Filmen sind erledigt.",
-  instructions_again: "Die Anleitung noch einmal lesen",
 
   finishing_title: "Ihre letzten Antworten werden gespeichert",
   finishing_wait: "Noch {count} zu senden. Bitte lassen Sie diese Seite offen.",

@@ -1,8 +1,6 @@
 /** The page's own sentences. Every other language file has the same keys, or does not compile. */
 export const messages = {
-  loading: "One moment …",
   continue: "Continue",
-  back: "Back",
   try_again: "Try again",
   start_study: "Start",
   preview_note: "Preview: these answers are deleted later.",
@@ -99,13 +97,10 @@ export const messages = {
   decoding: "Preparing the clip …",
   trial_of: "{number} of {total}",
   clip_name: "The clip",
-  already_seen: "You have already seen this clip. Please answer now.",
   clip_playing: "The clip is running.",
-  clip_over: "The clip is over. Please rate it.",
   clip_broken_title: "This clip cannot be shown",
   clip_broken: "It is not your fault, and we have taken note of it. Please go on with the next one.",
   rating_key: "{value} of {maximum}",
-  rating_keys_hint: "Keys {minimum} to {maximum}",
   pair_ready: "Press Space to start both clips",
   pair_ready_touch: "Tap to start both clips",
   pair_replay: "These clips did not run smoothly before. Here they are once more.",
@@ -116,8 +111,8 @@ export const messages = {
   pair_lower: "Lower",
   pair_first: "First",
   pair_second: "Second",
+  slider_untouched: "no answer yet",
   confirm: "Confirm",
-  confirm_hint: "Enter confirms",
   comment: "Comment (if you like)",
   attention_title: "One question in between",
 
@@ -128,7 +123,6 @@ export const messages = {
   break_go_on: "Go on",
   welcome_back_title: "Welcome back",
   welcome_back: "You go on where you stopped: {done} of {total} clips are done.",
-  instructions_again: "Read the instructions again",
 
   finishing_title: "Saving your last answers",
   finishing_wait: "{count} still to be sent. Please keep this page open.",

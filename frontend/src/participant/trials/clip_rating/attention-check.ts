@@ -9,7 +9,8 @@ import { absoluteNow } from "../../playback/protocol";
 import { screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
 import { declaredRating } from "./declared";
-import { askScale, type Rated } from "./scale";
+import { onlyResponse } from "./answer";
+import { askScales, type Rated } from "./scale";
 import { saveRating } from "../save-rating";
 
 interface Parameters {
@@ -26,8 +27,9 @@ export function attentionCheck(session: Session): PluginClass<Parameters> {
     data: { response: { type: INT, description: "the answer given" } },
     show: (display, { trial }) => check(session, display, trial),
     async simulate({ trial }) {
-      const response = Number(/\*\*(\d+)\*\*/.exec(trial.prompt ?? "")?.[1] ?? declaredRating(session).scale.minimum);
-      await store(session, trial, absoluteNow(), { response, answered_at_ms: absoluteNow(), changes: 0, comment: null });
+      const response = Number(/\*\*(\d+)\*\*/.exec(trial.prompt ?? "")?.[1] ?? declaredRating(session).check_scale.minimum);
+      const answers = { [declaredRating(session).check_scale.name]: { response } };
+      await store(session, trial, absoluteNow(), { answers, at_ms: {}, answered_at_ms: absoluteNow(), changes: 0, comment: null });
       return { response };
     },
     act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
@@ -46,20 +48,22 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
     ...markdown(trial.prompt ?? ""),
   );
   const shown_at_ms = absoluteNow();
-  const rating = { ...declaredRating(session), comment: false };
-  const answer = askScale(below, { trial: rating, language: session.language, t: session.t, signal, question });
+  const { check_scale, pointer_delay_ms, confirm } = declaredRating(session);
+  const scales = [{ ...check_scale, not_applicable: null }];
+  const { language, t } = session;
+  const answer = askScales(below, { scales, pointer_delay_ms, confirm, comment: false, language, t, signal, question });
   focusHeading(section);
   const rated = await answer;
   done();
   await store(session, trial, shown_at_ms, rated);
-  return { response: rated.response };
+  return { response: onlyResponse(rated.answers) ?? check_scale.minimum };
 }
 
 function store(session: Session, trial: TrialInfo, shown_at_ms: number, rated: Rated): Promise<void> {
   return saveRating(session, trial, {
     trial_index: trial.trial_index,
     play: 1,
-    answer: { kind: "clip_rating", answers: { rating: { response: rated.response } } },
+    answer: { kind: "clip_rating", answers: rated.answers },
     rt: Math.round((rated.answered_at_ms - shown_at_ms) * 100) / 100,
     rt_from_first_frame: null,
     time_elapsed: session.clock.elapsed(),

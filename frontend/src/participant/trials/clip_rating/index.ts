@@ -3,7 +3,7 @@ import { trial } from "../../jspsych";
 import type { TrialKind } from "../kind";
 import { attentionCheck } from "./attention-check";
 import { placeIn } from "../shared/place";
-import { clipRating, unrated } from "./screen";
+import { clipRating } from "./screen";
 
 export const kind: TrialKind = {
   node: (session, what) =>
@@ -15,5 +15,4 @@ export const kind: TrialKind = {
       total: () => placeIn(session, what().trial).total,
     }),
   attention: (session, what) => trial(attentionCheck(session), { trial: () => what().trial }),
-  unrated,
 };

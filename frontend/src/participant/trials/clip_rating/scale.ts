@@ -1,39 +1,84 @@
-/** The rating scale: keys, mouse and touch; optional confirmation and comment. */
-import type { ShownClipRating } from "../../../api/schema";
+/** The scales of a clip, one or several on a screen: keys, mouse and touch; confirmation and comment where asked. */
+import type { RatingAnswer, ShownClipRating } from "../../../api/schema";
 import { pick, type Translate } from "../../../i18n";
 import { h, uniqueId } from "../../../ui/element";
 import { listenKeys } from "../../../ui/keys";
 import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
-import { keyFor, valueOf } from "./scale-keys";
+import { type Scale, makeWidget, type Widget } from "./widget";
 
+type Answers = RatingAnswer["answers"];
 export interface Rated {
-  response: number;
+  answers: Answers;
+  /** The latest press that chose an answer, in absolute ms; and that of each scale. */
   answered_at_ms: number;
+  at_ms: Record<string, number>;
   changes: number;
   comment: string | null;
 }
 export interface ScaleOptions {
-  trial: ShownClipRating;
+  scales: readonly Scale[];
+  pointer_delay_ms: number;
+  confirm: boolean;
+  comment: boolean;
   language: string;
   t: Translate;
   signal: AbortSignal;
-  question: HTMLElement;
+  /** Stands above the scale in the place of its own question. */
+  question?: HTMLElement;
 }
 
 const SEEN_MS = 140;
+/** An answer that is moved on after so long at rest was changed, not still on its way. */
+const REST_MS = 500;
 
-/** Show the scale in `place`; resolves with the answer. Its time is that of the press that chose it. */
-export function askScale(place: HTMLElement, options: ScaleOptions): Promise<Rated> {
-  return new Promise((resolve) => new ScaleView(place, options, resolve));
+type Shared = Pick<ScaleOptions, "language" | "t" | "signal">;
+
+/** The declared scales on one screen, or a screen each in their order, with the comment on the last. */
+export async function askInOrder(place: HTMLElement, trial: ShownClipRating, shared: Shared): Promise<Rated> {
+  const { scales, arrangement, comment } = trial;
+  if (arrangement === "one_screen" || scales.length < 2) return askScales(place, { ...trial, ...shared });
+  const all: Rated = { answers: {}, at_ms: {}, answered_at_ms: 0, changes: 0, comment: null };
+  for (const [number, scale] of scales.entries()) {
+    const screen = { ...trial, ...shared, scales: [scale], comment: comment && number === scales.length - 1 };
+    const rated = await withOwnKeys(shared.signal, (signal) => askScales(place, { ...screen, signal }));
+    Object.assign(all.answers, rated.answers);
+    Object.assign(all.at_ms, rated.at_ms);
+    Object.assign(all, { answered_at_ms: rated.answered_at_ms, changes: all.changes + rated.changes, comment: rated.comment });
+  }
+  return all;
 }
 
-class ScaleView {
-  private readonly keys: HTMLButtonElement[];
+/** The keys of a screen end with it. */
+async function withOwnKeys<T>(signal: AbortSignal, ask: (signal: AbortSignal) => Promise<T>): Promise<T> {
+  const own = new AbortController();
+  signal.addEventListener("abort", () => own.abort(), { signal: own.signal });
+  try {
+    return await ask(own.signal);
+  } finally {
+    own.abort();
+  }
+}
+
+/** Show the scales in `place`; resolves with the answers. Their times are those of the presses that chose them. */
+export function askScales(place: HTMLElement, options: ScaleOptions): Promise<Rated> {
+  return new Promise((resolve) => new ScalesView(place, options, resolve));
+}
+
+interface Block {
+  scale: Scale;
+  element: HTMLElement;
+  group: HTMLElement;
+  widget: Widget;
+  not_applicable: HTMLButtonElement | null;
+  chosen: { value: number | null; at_ms: number } | null;
+}
+
+class ScalesView {
+  private readonly blocks: Block[];
   private readonly comment: HTMLTextAreaElement | null;
   private readonly confirm: HTMLButtonElement | null;
   private readonly meant: MeantPress;
-  private chosen: { value: number; at_ms: number } | null = null;
   private changes = 0;
   private over = false;
 
@@ -42,97 +87,96 @@ class ScaleView {
     private readonly options: ScaleOptions,
     private readonly resolve: (rated: Rated) => void,
   ) {
-    const { trial, t, signal } = options;
-    this.meant = new MeantPress(trial.pointer_delay_ms, signal);
-    this.keys = this.makeKeys();
-    this.comment = trial.comment ? h("textarea", { rows: 2, maxlength: 2000, id: uniqueId("comment") }) : null;
-    this.confirm = trial.confirm || trial.comment ? button(t("confirm"), () => this.finish()) : null;
+    const { scales, comment, confirm, t, signal, pointer_delay_ms } = options;
+    this.meant = new MeantPress(pointer_delay_ms, signal);
+    this.blocks = scales.map((scale, number) => this.block(scale, number));
+    this.comment = comment ? h("textarea", { rows: 2, maxlength: 2000, id: uniqueId("comment") }) : null;
+    const asks = confirm || comment || scales.length > 1 || this.blocks.some(({ widget }) => !widget.settles);
+    this.confirm = asks ? button(t("confirm"), () => this.finish()) : null;
     if (this.confirm) this.confirm.disabled = true;
     place.replaceChildren(...this.layout());
     listenKeys((event) => this.pressed(event), signal);
     // The scale has the focus, so that Tab and screen readers go on from here, yet no key looks chosen.
-    place.querySelector<HTMLElement>(".scale")?.focus({ preventScroll: true });
+    this.blocks[0]?.group.focus({ preventScroll: true });
   }
 
-  private makeKeys(): HTMLButtonElement[] {
-    const { scale } = this.options.trial;
-    const { t, language } = this.options;
-    return Array.from({ length: scale.maximum - scale.minimum + 1 }, (_, place) => {
-      const value = scale.minimum + place;
-      const end = value === scale.minimum ? pick(scale.low, language) : value === scale.maximum ? pick(scale.high, language) : "";
-      const label = t("rating_key", { value, maximum: scale.maximum }) + (end ? `, ${end}` : "");
-      const onclick = (event: Event): void => {
-        if (this.meant.allows(event)) this.choose(value, event.timeStamp);
-      };
-      return h(
-        "button",
-        { type: "button", class: "key", "aria-label": label, "aria-pressed": "false", "data-value": value, onclick },
-        value,
-      );
-    });
-  }
-
-  private layout(): HTMLElement[] {
-    const {
-      trial: { scale },
-      language,
-      question,
-      t,
-    } = this.options;
+  private block(scale: Scale, number: number): Block {
+    const { language, t, question: given } = this.options;
+    const question = given ?? h(number === 0 ? "h1" : "h2", { class: "question" }, pick(scale.question, language));
     question.id = uniqueId("question");
-    const ends = h(
-      "div",
-      { class: "ends", "aria-hidden": "true" },
-      h("span", {}, pick(scale.low, language)),
-      h("span", {}, pick(scale.high, language)),
-    );
+    const choose = (value: number | null, time_stamp: number): void => this.choose(block, value, time_stamp);
+    const widget = makeWidget({ scale, question: question.id, language, t, meant: this.meant, choose, enter: () => this.finish() });
+    const onclick = (event: Event): void => {
+      if (this.meant.allows(event)) choose(null, event.timeStamp);
+    };
+    const label = scale.not_applicable && pick(scale.not_applicable, language);
+    const not_applicable = label ? h("button", { type: "button", class: "button beside", "aria-pressed": "false", onclick }, label) : null;
     const group = h(
       "div",
       { class: "scale", role: "group", "aria-labelledby": question.id, tabindex: -1 },
-      h("div", { class: "keys" }, ...this.keys),
-      ends,
+      ...widget.parts,
+      not_applicable,
     );
-    group.style.setProperty("--points", String(this.keys.length));
-    const more = this.comment && h("div", { class: "field comment" }, h("label", { for: this.comment.id }, t("comment")), this.comment);
-    const confirm = this.confirm && h("div", { class: "actions" }, this.confirm);
-    return [question, group, more, confirm].filter((node): node is HTMLElement => node instanceof HTMLElement);
+    group.style.setProperty("--points", String(scale.type === "points" ? scale.maximum - scale.minimum + 1 : 8));
+    const element = h("div", { class: "scale-block" }, question, group);
+    const block: Block = { scale, element, group, widget, not_applicable, chosen: null };
+    return block;
+  }
+
+  private layout(): HTMLElement[] {
+    const { comment, confirm, blocks } = this;
+    const more = comment && h("div", { class: "field comment" }, h("label", { for: comment.id }, this.options.t("comment")), comment);
+    const several = h("div", { class: "scales" }, ...blocks.map(({ element }) => element));
+    const asked = blocks.length > 1 ? [several] : blocks.flatMap(({ element }) => [...element.children]);
+    return [...asked, more, confirm && h("div", { class: "actions" }, confirm)].filter((node) => node instanceof HTMLElement);
+  }
+
+  /** The scale that keys are meant for: that with the focus, else the first without an answer. */
+  private current(): Block | undefined {
+    const focused = this.blocks.find(({ group }) => group.contains(document.activeElement));
+    return focused ?? this.blocks.find(({ chosen }) => !chosen) ?? this.blocks[0];
   }
 
   private pressed(event: KeyboardEvent): void {
-    const { scale } = this.options.trial;
-    const value = valueOf(event.key, scale);
-    if (value !== null) this.choose(value, event.timeStamp);
-    else if (event.key === "Enter" && this.chosen) this.finish();
-    else this.move(keyFor(event.key, document.dir === "rtl"));
+    if (event.key === "Enter") return this.finish();
+    const block = this.current();
+    const value = block?.widget.pressed(event.key) ?? null;
+    if (!block || value === null) return;
+    this.choose(block, value, event.timeStamp);
+    const next = this.blocks.find(({ chosen }) => !chosen);
+    if (next && next !== block) this.goTo(next);
+    else if (!next && this.blocks.length > 1) this.confirm?.focus({ preventScroll: true });
   }
 
-  /** Arrow keys go along the scale; Enter or Space then presses. */
-  private move(step: -1 | 0 | 1): void {
-    if (step === 0) return;
-    const now = this.keys.findIndex((key) => key === document.activeElement);
-    const next = now < 0 ? (step > 0 ? 0 : this.keys.length - 1) : Math.min(this.keys.length - 1, Math.max(0, now + step));
-    this.keys[next]?.focus();
+  private goTo({ widget, group, element }: Block): void {
+    if (widget.focus) widget.focus();
+    else group.focus({ preventScroll: true });
+    element.scrollIntoView({ block: "nearest" });
   }
 
-  private choose(value: number, time_stamp: number): void {
+  private choose(block: Block, value: number | null, time_stamp: number): void {
     if (this.over) return;
-    if (this.chosen && this.chosen.value !== value) this.changes += 1;
-    if (this.chosen?.value !== value) this.chosen = { value, at_ms: performance.timeOrigin + time_stamp };
-    this.keys.forEach((key) => key.setAttribute("aria-pressed", String(Number(key.dataset["value"]) === value)));
+    const at_ms = performance.timeOrigin + time_stamp;
+    const { chosen, widget, not_applicable } = block;
+    if (chosen && chosen.value !== value) this.changes += Number(widget.settles || value === null || at_ms - chosen.at_ms > REST_MS);
+    if (!chosen || chosen.value !== value) block.chosen = { value, at_ms };
+    widget.show(value);
+    not_applicable?.setAttribute("aria-pressed", String(value === null));
     if (!this.confirm) return this.finish();
-    this.confirm.disabled = false;
+    this.confirm.disabled = this.blocks.some((one) => !one.chosen);
   }
 
   private finish(): void {
-    const chosen = this.chosen;
-    if (!chosen || this.over) return;
+    const answers: Answers = {};
+    const at_ms: Record<string, number> = {};
+    for (const { scale, chosen } of this.blocks) {
+      if (!chosen || this.over) return;
+      answers[scale.name] = { response: chosen.value, not_applicable: chosen.value === null };
+      at_ms[scale.name] = chosen.at_ms;
+    }
     this.over = true;
-    const rated = {
-      response: chosen.value,
-      answered_at_ms: chosen.at_ms,
-      changes: this.changes,
-      comment: this.comment?.value.trim() || null,
-    };
+    const comment = this.comment?.value.trim() || null;
+    const rated = { answers, at_ms, answered_at_ms: Math.max(...Object.values(at_ms)), changes: this.changes, comment };
     // Long enough to see the key go down; the time of the answer is already taken.
     setTimeout(() => this.resolve(rated), SEEN_MS);
   }

@@ -1,8 +1,6 @@
 /** The single-clip rating: ready, the clip at actual size, then the scale. The rating is kept before it ends. */
 import type { TrialInfo } from "../../../api/schema";
 import type { RatingBody } from "../rating";
-import { pick } from "../../../i18n";
-import { h } from "../../../ui/element";
 import { BOOL, FLOAT, INT, OBJECT, plugin, type PluginClass } from "../../jspsych";
 import { ClipBroken } from "../../playback/player";
 import { playbackRecord } from "../../playback/record";
@@ -12,11 +10,10 @@ import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
 import { showBroken } from "../shared/broken";
 import { procedureFeedback } from "../shared/feedback";
-import { beginView, isFromBefore, viewsBefore } from "../../views/ledger";
 import { declaredRating } from "./declared";
 import { prepareClip } from "./prepare";
-import { askScale, type Rated } from "./scale";
-import { sayAlreadySeen } from "../shared/already-seen";
+import { answerOf, noAnswer, onlyResponse } from "./answer";
+import { askInOrder, type Rated } from "./scale";
 import { showOnce, type Shown, waitForStart } from "../shared/showing";
 import { simulatedRating } from "./simulate";
 import { stage, type Stage } from "../shared/stage";
@@ -66,12 +63,12 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Clip
     if (!(error instanceof ClipBroken)) throw error;
     session.events.add("clip_unavailable", { clip_sha256: trial.clip_sha256, reason: error.message });
     await showBroken(session, display);
-    return unrated(session, trial, parameters.play);
+    return emptyBody(session, parameters);
   });
   await saveRating(session, trial, body);
   if (trial.clip_sha256 && trial.clip_sha256 !== parameters.next?.clip_sha256) session.player.release(trial.clip_sha256);
   const { frames_missing, key_to_first_frame_ms } = body.playback;
-  const response = body.answer.kind === "clip_rating" ? (body.answer.answers["rating"]?.response ?? null) : null;
+  const response = body.answer.kind === "clip_rating" ? onlyResponse(body.answer.answers) : null;
   return { response, rt: body.rt, frames_missing, key_to_first_frame_ms, again: parameters.play > 1 };
 }
 
@@ -85,10 +82,9 @@ function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Sta
 }
 
 async function watchAndRate(session: Session, place: Stage, parameters: ClipRatingParameters): Promise<RatingBody> {
-  const { trial, next, play } = parameters;
-  const before = viewsBefore(trial, play).flatMap((view) => view.map(({ showing }) => showing));
-  const showings = before.length < declaredRating(session).views ? await watch(session, place, parameters, before) : before;
-  if (showings === before) sayAlreadySeen(session, place);
+  const { trial, next } = parameters;
+  const sha256 = await prepareClip(session, trial, place);
+  const showings = await watch(session, place, parameters, sha256);
   const rating = rate(session, place);
   if (next) void prepareClip(session, next, null).catch(() => {});
   const rated = await rating;
@@ -101,25 +97,19 @@ async function watch(
   session: Session,
   place: Stage,
   { number, total, play, trial }: ClipRatingParameters,
-  before: Shown[],
+  sha256: string,
 ): Promise<Shown[]> {
   const { t } = session;
   const { views, start, fixation_ms, pointer_delay_ms } = declaredRating(session);
-  const sha256 = await prepareClip(session, trial, place);
-  const showings = [...before];
+  const showings: Shown[] = [];
   const key = trial.kind === "practice" ? "practice_note" : "trial_of";
-  for (let view = before.length + 1; view <= views; view += 1) {
+  for (let view = 1; view <= views; view += 1) {
     const touch = matchMedia("(pointer: coarse)").matches;
     const first = t(touch ? "ready_touch" : "ready");
     const prompt = view > 1 ? t(touch ? "ready_again_touch" : "ready_again", { view, views }) : first;
     const note = play > 1 ? t("ready_replay") : t(key, { number, total });
     const key_at_ms = await waitForStart(session, place, prompt, note, pointer_delay_ms);
-    const ledger = beginView(session, trial, play);
-    const shown = showOnce(session, place, sha256, key_at_ms, start === "fixation" ? fixation_ms : 0, ledger.kept);
-    const showing = await ledger.unlessBroken(shown);
-    showings.push(showing);
-    // The scale does not wait for it: what the page does next is not on the disk's time.
-    void ledger.end([{ roles: ["shown"], showing }]);
+    showings.push(await showOnce(session, place, sha256, key_at_ms, start === "fixation" ? fixation_ms : 0));
     if (showings.some((shown) => shown.focus_lost > 0)) session.events.add("focus_lost", { trial_index: trial.trial_index });
   }
   return showings;
@@ -128,23 +118,21 @@ async function watch(
 async function rate(session: Session, place: Stage): Promise<Rated> {
   const { signal, done } = screenSignal(session);
   const { language, t } = session;
-  const trial = declaredRating(session);
-  const question = h("h1", { class: "question" }, pick(trial.scale.question, language));
-  const rated = await askScale(place.below, { trial, language, t, signal, question });
+  const rated = await askInOrder(place.below, declaredRating(session), { language, t, signal });
   done();
   return rated;
 }
 
 function ratingBody(session: Session, { trial, play }: ClipRatingParameters, showings: Shown[], rated: Rated): RatingBody {
   const last = showings.at(-1);
-  // From another page's clip to this page's key there is no response time.
+  const ended_at_ms = last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms;
   const since = (start: number | undefined): number | null =>
-    start === undefined || isFromBefore(showings) ? null : Math.round((rated.answered_at_ms - start) * 100) / 100;
+    start === undefined ? null : Math.round((rated.answered_at_ms - start) * 100) / 100;
   return {
     trial_index: trial.trial_index,
     play,
-    answer: { kind: "clip_rating", answers: { rating: { response: rated.response } } },
-    rt: since(last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms),
+    answer: answerOf(rated, ended_at_ms),
+    rt: since(ended_at_ms),
     rt_from_first_frame: since(last?.drawn[0]?.[1]),
     time_elapsed: session.clock.elapsed(),
     changes: rated.changes,
@@ -154,12 +142,11 @@ function ratingBody(session: Session, { trial, play }: ClipRatingParameters, sho
   };
 }
 
-/** What is stored of a play without an answer. */
-export function unrated(session: Session, trial: TrialInfo, play: number): RatingBody {
+function emptyBody(session: Session, { trial, play }: ClipRatingParameters): RatingBody {
   return {
     trial_index: trial.trial_index,
     play,
-    answer: { kind: "clip_rating", answers: { rating: { response: null } } },
+    answer: noAnswer(declaredRating(session)),
     rt: null,
     rt_from_first_frame: null,
     time_elapsed: session.clock.elapsed(),
@@ -175,8 +162,11 @@ function actTrial(display: HTMLElement): void {
   const own = display.firstElementChild;
   const timer = setInterval(() => {
     if (!own?.isConnected) return clearInterval(timer);
-    const keys = [...display.querySelectorAll<HTMLButtonElement>(".key")];
-    const press = keys[Math.floor(keys.length / 2)] ?? display.querySelector<HTMLButtonElement>(".primary");
-    press?.click();
+    for (const row of display.querySelectorAll(".keys")) {
+      const keys = [...row.querySelectorAll<HTMLButtonElement>(".key")];
+      keys[Math.floor(keys.length / 2)]?.click();
+    }
+    for (const slider of display.querySelectorAll<HTMLInputElement>(".slider")) slider.click();
+    display.querySelector<HTMLButtonElement>(".primary")?.click();
   }, 250);
 }

@@ -1,7 +1,7 @@
 /** Which keys mean what on the scale. */
-import type { Scale } from "../../../api/schema";
+import type { Points } from "../../../api/schema";
 
-type Range = Pick<Scale, "minimum" | "maximum">;
+type Range = Pick<Points, "minimum" | "maximum">;
 
 /** The value a key stands for, or null. 0 means ten on a scale that ends there and does not begin at zero. */
 export function valueOf(key: string, { minimum, maximum }: Range): number | null {

@@ -1,0 +1,48 @@
+/** Points side by side: a press, a digit or the arrow keys; the two ends labelled, or every point. */
+import { pick } from "../../../i18n";
+import { h } from "../../../ui/element";
+import { keyFor, valueOf } from "../shared/scale-keys";
+import type { Ask, Widget } from "../clip_rating/widget";
+import "./points.css";
+
+export function widget({ scale, language, t, meant, choose }: Ask): Widget {
+  if (scale.type !== "points") throw new Error(`expected points, got ${scale.type}`);
+  const { minimum, maximum, labels, low, high } = scale;
+  const textOf = (place: number): string => {
+    const end = place === 0 ? low : place === maximum - minimum ? high : null;
+    const text = labels[place] ?? end;
+    return text ? pick(text, language) : "";
+  };
+  const keys = Array.from({ length: maximum - minimum + 1 }, (_, place) => {
+    const value = minimum + place;
+    const text = textOf(place);
+    const onclick = (event: Event): void => {
+      if (meant.allows(event)) choose(value, event.timeStamp);
+    };
+    const name = t("rating_key", { value, maximum }) + (text ? `, ${text}` : "");
+    const attributes = { type: "button", class: "key", "aria-label": name, "aria-pressed": "false", "data-value": value, onclick };
+    return h("button", attributes, value, labels.length ? h("span", { class: "key-label" }, text) : null);
+  });
+  const row = h("div", { class: labels.length ? "keys keys-labelled" : "keys" }, ...keys);
+  const ends = h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, textOf(0)), h("span", {}, textOf(maximum - minimum)));
+  row.style.setProperty("--points", String(keys.length));
+
+  /** Arrow keys go along the scale; Enter or Space then presses. */
+  function move(step: -1 | 0 | 1): void {
+    if (step === 0) return;
+    const now = keys.findIndex((key) => key === document.activeElement);
+    const next = now < 0 ? (step > 0 ? 0 : keys.length - 1) : Math.min(keys.length - 1, Math.max(0, now + step));
+    keys[next]?.focus();
+  }
+
+  return {
+    parts: labels.length ? [row] : [row, ends],
+    settles: true,
+    show: (value) => keys.forEach((key) => key.setAttribute("aria-pressed", String(Number(key.dataset["value"]) === value))),
+    pressed(key) {
+      const value = valueOf(key, scale);
+      if (value === null) move(keyFor(key, document.dir === "rtl"));
+      return value;
+    },
+  };
+}

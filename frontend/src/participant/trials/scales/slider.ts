@@ -1,0 +1,46 @@
+/** A line between two labels: the browser's own slider, whose handle appears when it is first touched. */
+import { pick } from "../../../i18n";
+import { h } from "../../../ui/element";
+import type { Ask, Widget } from "../clip_rating/widget";
+import "./slider.css";
+
+export function widget({ scale, question, language, t, meant, choose, enter }: Ask): Widget {
+  if (scale.type !== "slider") throw new Error(`expected a slider, got ${scale.type}`);
+  const { minimum, maximum, step, low, high, show_value } = scale;
+  const input = h("input", { type: "range", class: "slider", min: minimum, max: maximum, step, "aria-labelledby": question });
+  const ends = [pick(low, language), pick(high, language)];
+  const number = h("output", { class: "slider-value", "aria-hidden": "true" });
+
+  function show(value: number | null): void {
+    input.classList.toggle("untouched", value === null);
+    if (value !== null) input.valueAsNumber = value;
+    else input.value = String((minimum + maximum) / 2);
+    const shown = value === null ? t("slider_untouched") : String(value);
+    input.setAttribute("aria-valuetext", `${shown} (${minimum} ${ends[0]}, ${maximum} ${ends[1]})`);
+    number.textContent = value === null ? "" : String(value);
+  }
+  const moved = (event: Event): void => choose(input.valueAsNumber, event.timeStamp);
+  input.addEventListener("input", moved);
+  // A press exactly where the hidden handle lies moves nothing, yet is an answer.
+  input.addEventListener("click", (event) => {
+    if (meant.allows(event)) moved(event);
+  });
+  // Without the press the browser does not move the handle.
+  input.addEventListener("pointerdown", (event) => {
+    if (!meant.allows(event)) event.preventDefault();
+  });
+  input.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") enter();
+  });
+  show(null);
+  return {
+    parts: [
+      h("div", { class: "slider-line" }, input, show_value ? number : null),
+      h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, ends[0]), h("span", {}, ends[1])),
+    ],
+    settles: false,
+    show,
+    pressed: () => null,
+    focus: () => input.focus({ preventScroll: true }),
+  };
+}
