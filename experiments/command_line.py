@@ -3,28 +3,61 @@
 import errno
 import sys
 from collections.abc import Callable
+from typing import Any, NoReturn, Protocol, cast
 
 from experiments.errors import InputError
 
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 """What a disk says that is full or may not be written to."""
+STOPPED = 130
+"""Exit code after Ctrl-C, which Typer may have turned into it."""
 
 
-def run_command_line(app: Callable[[], object]) -> None:
-    """Call `app`; print an InputError, or that a disk is full, as one line on stderr and exit with code 2."""
+class WrongCall(Protocol):
+    """What Typer raises for a command or an option that is not there, or a value that is none."""
+
+    exit_code: int
+    ctx: Any
+
+    def format_message(self) -> str:
+        """What is wrong, without the usage."""
+
+
+def run_command_line(app: Callable[..., object]) -> None:
+    """Call a Typer app, and exit with its code.
+
+    Bad input, a wrong call and a full disk are one line on stderr, with exit code 2.
+    """
     try:
-        app()
+        code = app(standalone_mode=False)
     except InputError as error:
         sys.stderr.write(f"error: {error}\n")
         sys.exit(2)
     except KeyboardInterrupt:
-        sys.stderr.write("stopped\n")
-        sys.exit(130)
+        code = STOPPED
     except BrokenPipeError:
         sys.exit(0)
-    except OSError as error:
-        if error.errno not in NO_ROOM:
-            raise
-        where = f"{error.filename}: " if error.filename else ""
-        sys.stderr.write(f"error: {where}{error.strerror}; make room and run the same command again\n")
+    except Exception as error:
+        if not hasattr(error, "format_message"):
+            _say_disk(error)
+        sys.stderr.write(_wrong_call(cast(WrongCall, error)))
         sys.exit(2)
+    if code == STOPPED:
+        sys.stderr.write("stopped\n")
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _wrong_call(error: WrongCall) -> str:
+    message = error.format_message()
+    if not message or "\n" in message:  # a command without its subcommand: the help itself
+        return message and message + "\n"
+    path = error.ctx.command_path if getattr(error, "ctx", None) is not None else ""
+    return f"error: {message.rstrip('.')}{f'; see {path} --help' if path else ''}\n"
+
+
+def _say_disk(error: Exception) -> NoReturn:
+    if not isinstance(error, OSError) or error.errno not in NO_ROOM:
+        raise error
+    where = f"{error.filename}: " if error.filename else ""
+    sys.stderr.write(f"error: {where}{error.strerror}; make room and run the same command again\n")
+    sys.exit(2)

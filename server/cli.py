@@ -36,9 +36,9 @@ def _gather() -> None:
 _gather()
 
 
-def _call() -> None:
+def _call(*, standalone_mode: bool) -> object:
     try:
-        app()
+        return app(standalone_mode=standalone_mode)
     except ApiError as error:
         raise InputError(error.message) from error
     except ValidationError as error:

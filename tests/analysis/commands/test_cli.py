@@ -93,7 +93,7 @@ def test_wrong_calls_end_in_one_line_and_exit_2(arguments, message, capsys) -> N
     result = call(*arguments)
     assert isinstance(result.exception, InputError)
 
-    def again() -> None:
+    def again(**_: object) -> None:
         raise result.exception
 
     with pytest.raises(SystemExit) as caught:

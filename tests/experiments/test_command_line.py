@@ -1,0 +1,30 @@
+"""Every way a command line can be called wrongly ends in one line that says what to do."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BIN = Path(sys.executable).parent
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (("analysis", "anova", "--nope"), "No such option: --nope"),
+        (("analysis", "anvoa"), "anvoa"),
+        (("stimuli", "build"), "Missing argument 'experiment'; see stimuli build --help"),
+        (("stimuli", "clip", "--fps", "fast", "--out", "x.mp4"), "Invalid value for '--fps'"),
+        (("server", "run", "--port", "abc"), "Invalid value for '--port'"),
+    ],
+)
+def test_a_wrong_call_is_one_line(call: tuple[str, ...], line: str, tmp_path: Path) -> None:
+    ran = subprocess.run(
+        [BIN / call[0], *call[1:]], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert ran.returncode == 2
+    assert ran.stderr.startswith("error: ")
+    assert ran.stderr.count("\n") == 1
+    assert line in ran.stderr
+    assert not ran.stdout
