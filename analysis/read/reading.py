@@ -11,7 +11,7 @@ RUN_TEXTS = names_of(_OF_A_RUN, "text", "integer")
 RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
 """Columns that are the same for all rows of a run."""
 
-TRIAL_TEXTS = ("run", "kind", "verdict")
+TRIAL_TEXTS = ("run", "kind", "verdict", "scale")
 TRIAL_NUMBERS = ("expected_response", "rt")
 TRIAL_PLACES = ("trial_index", "play")
 """These only find repeated rows, which the database's unique index rules out: a CSV alone has to be asked."""

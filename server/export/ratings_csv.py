@@ -11,7 +11,7 @@ from experiments.columns import View, names_of
 from experiments.trials import KINDS
 from server.export.origins import ExportOrigin, of_origin
 from server.models import Rating, Study, StudyRun, StudyVersion
-from server.studies.lookup import active_definition
+from server.studies.lookup import active_definition, all_definitions
 
 RUNS_AT_ONCE = 200
 
@@ -41,14 +41,20 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 
 def rating_count(session: Session, study: Study, origin: ExportOrigin) -> int:
     """Rows that `rating_rows` gives."""
-    trial = active_definition(session, study).trial
-    kind, view = trial.kind, KINDS[trial.kind].view
-    if len(trial.rated_scales()) > 1:  # a rating is a row a scale
-        rows = text(f"SELECT count(*) FROM {view.name} WHERE study = :study")  # noqa: S608
-        return session.scalar(rows, {"study": study.name}) or 0
+    kind = active_definition(session, study).trial.kind
+    if any(len(one.trial.rated_scales()) > 1 for one in all_definitions(session, study)):
+        return _rows_in_view(session, study, origin)  # a rating is a row a scale
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
     query = query.where(of_origin(study, origin), Rating.kind == kind)
     return session.scalar(query) or 0
+
+
+def _rows_in_view(session: Session, study: Study, origin: ExportOrigin) -> int:
+    view = view_of(session, study)
+    among = "" if origin == "all" else " AND run_origin = :origin"
+    rows = text(f"SELECT count(*) FROM {view.name} WHERE study = :study{among}")  # noqa: S608
+    values = {"study": study.name} if origin == "all" else {"study": study.name, "origin": origin}
+    return session.scalar(rows, values) or 0
 
 
 def rating_rows(session: Session, study: Study, origin: ExportOrigin) -> Iterator[Sequence[Any]]:
