@@ -6,6 +6,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from server.db import open_database
+from server.migrate import migrating
 from server.models import Base, UtcDateTime
 from server.settings import Settings
 
@@ -32,7 +33,6 @@ if given is not None:
     migrate(given)
 else:
     database = open_database(Settings())
-    with database.engine.connect() as connection:
+    with migrating(database) as connection:
         migrate(connection)
-        connection.commit()
     database.close()

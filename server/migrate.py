@@ -1,5 +1,7 @@
 """Bring a database to the newest revision, or tell which one it has."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from alembic import command
@@ -23,12 +25,22 @@ def alembic_config(connection: Connection | None = None) -> Config:
     return config
 
 
-def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str | None]:
-    """Run the missing migrations in one transaction; return the revision before and after."""
+@contextmanager
+def migrating(database: Database) -> Iterator[Connection]:
+    """A connection whose one transaction holds all migrations: killed half-way, the database is as it was.
+
+    Alembic takes SQLite for a database that commits with each change of a table; begun like this it does not.
+    """
     with database.engine.execution_options(immediate=True).begin() as connection:
         if not database.is_sqlite:
             # Workers that start together must not migrate together.
             connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+        yield connection
+
+
+def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str | None]:
+    """Run the missing migrations in one transaction; return the revision before and after."""
+    with migrating(database) as connection:
         before = MigrationContext.configure(connection).get_current_revision()
         command.upgrade(alembic_config(connection), revision)
         after = MigrationContext.configure(connection).get_current_revision()
@@ -37,7 +49,7 @@ def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str
 
 def downgrade(database: Database, revision: str = "-1") -> None:
     """Undo migrations down to `revision`."""
-    with database.engine.execution_options(immediate=True).begin() as connection:
+    with migrating(database) as connection:
         command.downgrade(alembic_config(connection), revision)
 
 
