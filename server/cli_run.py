@@ -18,8 +18,8 @@ from server.accounts import service as accounts
 from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
+from server.logs import logging_configuration
 from server.models import Account, Study
-from server.operations.logs import logging_configuration
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.operations.modes import close_to_others
 from server.protocol import BoundedHttp

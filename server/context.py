@@ -8,8 +8,6 @@ from fastapi import Depends, Request
 
 from server.accounts.passwords import PasswordWork
 from server.accounts.throttle import SignInThrottle
-from server.clips.s3 import open_s3
-from server.clips.store import ClipStore, FolderStore
 from server.clock import now
 from server.db import Database, open_database
 from server.evidence.clip_bytes import ClipBytes
@@ -19,6 +17,8 @@ from server.rate_limit import RateLimit
 from server.results.cache import ResultsCache
 from server.settings import Settings
 from server.stopping import Stopping
+from server.storage.clips import ClipStore, FolderStore
+from server.storage.s3 import open_s3
 from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"

@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 
 from experiments.errors import InputError
 from server.db import is_away
-from server.operations.logs import described
+from server.logs import described
 
 log = logging.getLogger("palpebra")
 

@@ -6,14 +6,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Path, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
-from server.clips.store import CHUNK_BYTES
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, ApiError, NotFound
+from server.storage.clips import CHUNK_BYTES
 
 router = APIRouter(tags=["clips"], responses=ERROR_RESPONSES)
 IMMUTABLE = "public, max-age=31536000, immutable"
 REDIRECT_KEPT_S = 1800
-"""Half of what a signed address of `server.clips.s3` is good for."""
+"""Half of what a signed address of `server.storage.s3` is good for."""
 _RANGE = re.compile(r"^bytes=(\d*)-(\d*)$")
 _CLIP_ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"content": {"video/mp4": {"schema": {"type": "string", "format": "binary"}}}},

@@ -6,7 +6,7 @@ from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 
-from server.clips.store import ClipStore, FolderStore
+from server.storage.clips import ClipStore, FolderStore
 
 MAX_KEPT_BYTES = 64 << 20
 MAX_CLIP_BYTES = 32 << 20

@@ -13,11 +13,12 @@ from server.models import Study, StudyRun
 from server.participants import repository
 from server.participants.links import recruiter_of
 from server.participants.lookup import find_run
-from server.participants.refusals import FormsMissing, RatingsMissing, RunClosed
+from server.participants.refusals import FormsMissing, RatingsMissing
 from server.participants.schemas import Completion
-from server.participants.screening import failed_checks
 from server.participants.trial_list import trial_list
 from server.text import visible
+from server.trials.attention import failed_checks
+from server.trials.refusals import RunClosed
 from server.versions import LoadedVersion
 
 

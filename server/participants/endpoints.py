@@ -11,7 +11,6 @@ from server.context import DatabaseDep, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.participants import completion, form_answers, links, runs
 from server.participants.next_trials import follow
-from server.participants.refusals import RunUnknown
 from server.participants.schemas import (
     CalibrationResult,
     Completion,
@@ -31,6 +30,7 @@ from server.participants.schemas import (
     Unsupported,
 )
 from server.tokens import hash_token
+from server.trials.refusals import RunUnknown
 
 RUN_START_WEIGHT = 8
 """A run start takes about as long as so many ratings."""

@@ -5,7 +5,7 @@ from sqlalchemy.orm import Session
 from server.clock import now
 from server.models import StudyRun
 from server.participants import repository
-from server.participants.refusals import RunClosed, RunUnknown
+from server.trials.refusals import RunClosed, RunUnknown
 
 
 def find_run(session: Session, token: str, *, lock: bool = False) -> StudyRun:

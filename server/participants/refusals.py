@@ -1,6 +1,6 @@
 """Why a participant's request is refused."""
 
-from server.errors import ApiError, Conflict, Invalid, NotFound
+from server.errors import Conflict, Invalid, NotFound
 
 
 class LinkUnknown(NotFound):
@@ -73,25 +73,6 @@ class TakenPartAlready(Conflict):
     """A visit under this recruiter's id is over."""
 
     code = "taken_part_already"
-
-
-class RunUnknown(ApiError):
-    """No run has this token."""
-
-    status = 401
-    code = "run_unknown"
-
-
-class RunClosed(Conflict):
-    """The run is over."""
-
-    code = "run_closed"
-
-
-class ConsentMissing(Conflict):
-    """Nothing is stored before the participant has agreed."""
-
-    code = "consent_missing"
 
 
 class RatingsMissing(Conflict):

@@ -20,7 +20,6 @@ from server.participants.completion import completion_code
 from server.participants.links import find_link
 from server.participants.lookup import find_run, open_run
 from server.participants.refusals import (
-    ConsentMissing,
     LanguageUnknown,
     ScreeningUndeclared,
 )
@@ -38,6 +37,7 @@ from server.participants.schemas import (
 )
 from server.participants.trial_list import trial_list
 from server.tokens import new_public_id
+from server.trials.refusals import ConsentMissing
 
 BEFORE_CONSENT = ("consent",)
 

@@ -12,7 +12,7 @@ from experiments.rules import PlaybackRules
 from experiments.trials.union import AnyPage
 from server.evidence.schemas import Tickets
 from server.models import STAGES
-from server.trials.schemas import TrialInfo
+from server.trials.schemas import RunStatus, TrialInfo
 
 Stage = Literal[
     "consent",
@@ -29,7 +29,6 @@ if Stage.__args__ != STAGES:  # type: ignore[attr-defined]
     raise RuntimeError("the stages of the API and of the database differ")
 
 Origin = Literal["participant", "preview", "pilot", "simulated"]
-RunStatus = Literal["active", "complete", "screened_out", "withdrawn"]
 Text = Annotated[str, StringConstraints(max_length=500)]
 Key = Annotated[str, StringConstraints(max_length=100)]
 LanguageTag = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}(-[A-Z]{2})?$")]

@@ -3,37 +3,31 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple, assert_never
 
-from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.rules import ScreenAttention, ScreenDevice, ScreenFormAnswer
-from experiments.trials import KINDS
-from server.clock import now
 from server.models import RunEvent, StudyRun
 from server.participants.bounds import checked_data
 from server.tokens import new_public_id
-from server.trials import repository as trials
-
-EVENT = "screened_out"
+from server.trials.attention import EVENT
 
 
 class _Declared(NamedTuple):
     """The rules of an experiment by the moment at which they are looked at."""
 
     answers: list[ScreenFormAnswer]
-    attention: list[ScreenAttention]
     devices: list[ScreenDevice]
 
 
 def _declared(experiment: Experiment) -> _Declared:
-    declared = _Declared([], [], [])
+    declared = _Declared([], [])
     for rule in experiment.screening:
         match rule:
             case ScreenFormAnswer():
                 declared.answers.append(rule)
             case ScreenAttention():
-                declared.attention.append(rule)
+                pass  # looked at with each check that is answered, by server.trials.attention
             case ScreenDevice():
                 declared.devices.append(rule)
             case _:
@@ -69,21 +63,3 @@ def by_full_group(session: Session, run: StudyRun, group: str) -> None:
 def _end(session: Session, run: StudyRun, data: dict[str, Any]) -> None:
     run.status = "screened_out"
     session.add(RunEvent(event_id=new_public_id(), study_run_id=run.id, type=EVENT, data=data))
-
-
-def failed_checks(connection: Connection, run_id: int, experiment: Experiment) -> int:
-    """Attention checks of a run answered otherwise than asked."""
-    given = KINDS[experiment.trial.kind].check_response
-    return sum(given(payload) != expected for payload, expected in trials.checks(connection, run_id))
-
-
-def by_attention(connection: Connection, run_id: int, experiment: Experiment) -> bool:
-    """End the run where too many attention checks have failed; True where it did."""
-    limits = [rule.more_than for rule in _declared(experiment).attention]
-    failed = failed_checks(connection, run_id, experiment) if limits else 0
-    if not limits or failed <= min(limits):
-        return False
-    trials.end_run(connection, run_id, "screened_out")
-    data = {"rule": "attention_checks_failed", "failed": failed}
-    trials.add_event(connection, run_id, new_public_id(), EVENT, data, now())
-    return True

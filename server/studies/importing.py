@@ -12,9 +12,9 @@ from experiments.schema.canonical import definition_sha256
 from experiments.schema.upgrades import FORMAT
 from server.accounts.audit import record
 from server.accounts.identity import Identity
-from server.clips.store import ClipStore
 from server.errors import Conflict
 from server.models import Clip, Study, StudyVersion, VersionClip
+from server.storage.clips import ClipStore
 from server.studies.series import series_for
 
 

@@ -16,6 +16,7 @@ FrameTime = tuple[
 ]
 
 
+RunStatus = Literal["active", "complete", "screened_out", "withdrawn"]
 Role = Literal["shown", "left", "right", "first", "second", "reference"]
 
 
@@ -162,9 +163,7 @@ class Receipt(BaseModel):
     rule: str = Field(description="The rule that gave the verdict, empty where good.")
     again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
     remaining: int = Field(description="Trials of the run that still need an answer.")
-    status: Literal["active", "complete", "screened_out", "withdrawn"] = Field(
-        description="Of the run: screened_out where this answer ended it."
-    )
+    status: RunStatus = Field(description="Of the run: screened_out where this answer ended it.")
 
 
 class NextTrials(BaseModel):

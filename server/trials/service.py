@@ -9,14 +9,13 @@ from experiments.definition import Experiment
 from experiments.trials import KINDS
 from server.errors import Conflict, Invalid, NotFound
 from server.evidence.intake import Answer, Intake
-from server.participants.refusals import ConsentMissing, RunClosed, RunUnknown
-from server.participants.schemas import RunStatus
-from server.participants.screening import by_attention
 from server.tallies.tally import Play, Tally
 from server.tokens import hash_token
 from server.trials import repository
+from server.trials.attention import by_attention
 from server.trials.kinds import Part, served
-from server.trials.schemas import RatingIn, Receipt
+from server.trials.refusals import ConsentMissing, RunClosed, RunUnknown
+from server.trials.schemas import RatingIn, Receipt, RunStatus
 from server.trials.series import service as series
 from server.trials.verdict import Ruling, is_settled
 from server.versions import LoadedVersion, Versions

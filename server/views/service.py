@@ -6,7 +6,7 @@ from server.clock import now
 from server.errors import Conflict
 from server.models import StudyRun, View, ViewClip
 from server.participants.lookup import find_run
-from server.participants.refusals import ConsentMissing
+from server.trials.refusals import ConsentMissing
 from server.trials.service import TrialNotInRun
 from server.views import repository
 from server.views.frame_log import packed

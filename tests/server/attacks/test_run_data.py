@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from server.clips import s3
-from server.clips.store import ClipsAway
 from server.context import Services
 from server.models import StudyRun
 from server.operations.modes import open_to_others
 from server.participants import bounds
 from server.settings import Settings
+from server.storage import s3
+from server.storage.clips import ClipsAway
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant
 

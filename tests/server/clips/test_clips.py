@@ -7,8 +7,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.errors import InputError
-from server.clips.store import FolderStore
 from server.context import Services
+from server.storage.clips import FolderStore
 
 CONTENT = bytes(range(256)) * 40
 SHA256 = hashlib.sha256(CONTENT).hexdigest()

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from server.context import Services
-from server.operations.logs import JsonLines, Once, PlainLines, described, logging_configuration
+from server.logs import JsonLines, Once, PlainLines, described, logging_configuration
 from server.operations.observer import Observer
 from server.settings import Settings
 

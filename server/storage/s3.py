@@ -11,8 +11,8 @@ from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
 from experiments.errors import InputError
-from server.clips.store import CHUNK_BYTES, ClipsAway
 from server.settings import Settings
+from server.storage.clips import CHUNK_BYTES, ClipsAway
 
 log = logging.getLogger("palpebra")
 PRESIGNED_S = 3600
