@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
+from typing import IO, TextIO
 
 from experiments.command_line import NO_ROOM
 from experiments.errors import InputError
@@ -65,3 +65,15 @@ def whole_text(path: Path) -> Iterator[TextIO]:
     """Open `path` for text (UTF-8, newlines as written) so that it appears whole or not at all."""
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         yield stream
+
+
+@contextmanager
+def whole_private_file(path: Path) -> Iterator[IO[bytes]]:
+    """As `whole_file`, open for bytes: for its owner alone, and on the disk before it stands there."""
+    with whole_file(path) as temporary:
+        remove_quietly(temporary)  # of a process that was killed and had this one's number
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())

@@ -15,6 +15,7 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 from analysis.errors import NoRatingsError
 from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, Reading
 from analysis.read.text_table import categorical
+from experiments.database_url import with_driver
 from experiments.errors import InputError
 
 PORTION = 20_000
@@ -38,7 +39,7 @@ class AnswersQuery:
         self.name = _describe(url)
         self._values = {"experiment": experiment, **({"study": study} if study else {})}
         self._where = "experiment = :experiment" + (" AND study = :study" if study else "")
-        self._engine = create_engine(_with_driver(url))
+        self._engine = create_engine(with_driver(url))
         self._connection = self._open()
 
     def _open(self) -> Connection:
@@ -165,17 +166,10 @@ def _factor_columns(levels: "pd.Categorical[str]", factors: Sequence[str]) -> di
     return columns
 
 
-def _with_driver(url: str) -> str:
-    for prefix in ("postgres://", "postgresql://"):
-        if url.startswith(prefix):
-            return "postgresql+psycopg://" + url.removeprefix(prefix)
-    return url
-
-
 def _describe(url: str) -> str:
     """The database in words, without a password."""
     try:
-        parsed = make_url(_with_driver(url))
+        parsed = make_url(with_driver(url))
         parsed.get_dialect()
     except (ArgumentError, NoSuchModuleError) as error:
         raise InputError(

@@ -7,17 +7,16 @@ from rich.console import Console
 
 from experiments.errors import InputError
 from server.accounts import service
-from server.accounts.identity import Role
 from server.accounts.passwords import hash_password
 from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
 from server.db import open_database
 from server.errors import ApiError
+from server.models import ROLES, Role
 from server.settings import Settings
 
 app = typer.Typer(help="Accounts of experimenters.", no_args_is_help=True)
 account_app = typer.Typer(help="Let somebody in again who lost a password or a phone.", no_args_is_help=True)
-_ROLES: dict[str, Role] = {"owner": "owner", "experimenter": "experimenter", "viewer": "viewer"}
 
 
 def register(parent: typer.Typer) -> None:
@@ -27,9 +26,10 @@ def register(parent: typer.Typer) -> None:
 
 
 def _known(role: str) -> Role:
-    if role not in _ROLES:
+    known = next((one for one in ROLES if one == role), None)
+    if known is None:
         raise InputError(f"expected the role owner, experimenter or viewer, got '{role}'")
-    return _ROLES[role]
+    return known
 
 
 @app.command("create")

@@ -13,13 +13,11 @@ from sqlalchemy.orm import Session
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ApiError
-from server.models import Account, AdminSession, ApiToken
+from server.models import ROLES, Account, AdminSession, ApiToken, Role
 from server.tokens import hash_token
 
-Role = Literal["viewer", "experimenter", "owner"]
 Scope = Literal["read", "personal", "write", "export"]
 COOKIE = "palpebra_session"
-_RANK: dict[str, int] = {"viewer": 0, "experimenter": 1, "owner": 2}
 _SEEN_EVERY = timedelta(minutes=1)
 _cookie_scheme = APIKeyCookie(name=COOKIE, auto_error=False, description="A signed-in browser.")
 _bearer_scheme = HTTPBearer(auto_error=False, description="An API token with scopes.")
@@ -126,7 +124,7 @@ class _Access:
         _bearer: Annotated[object, Depends(_bearer_scheme)],
     ) -> Identity:
         identity = identify(request, services)
-        if _RANK[identity.role] < _RANK[self.role]:
+        if ROLES.index(identity.role) < ROLES.index(self.role):
             raise NotAllowed(f"This needs the role {self.role}; your account is a {identity.role}.")
         if identity.scopes is not None:
             if self.scope is None:

@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from server.accounts.identity import Role, Scope
+from server.accounts.identity import Scope
+from server.models import Role
 from server.text import VisibleObject
 
 AccountName = Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^[\w.@+ -]{2,100}$")]

@@ -10,13 +10,13 @@ from sqlalchemy.orm import Session
 from experiments.errors import did_you_mean
 from server.accounts import second_factor
 from server.accounts.audit import NOBODY, record
-from server.accounts.identity import Identity, Role, account_of
+from server.accounts.identity import Identity, account_of
 from server.accounts.passwords import hash_password, password_fits
 from server.clock import now
 from server.context import Services
 from server.db import Database
 from server.errors import ApiError, Conflict, NotFound
-from server.models import Account, AdminSession, ApiToken, Invitation
+from server.models import ROLES, Account, AdminSession, ApiToken, Invitation, Role
 from server.tokens import hash_token, new_token
 
 INVITATION_DAYS = 7
@@ -200,8 +200,7 @@ def accept_invitation(services: Services, token: str, name: str, password_hash: 
 
 def known_role(word: str) -> Role:
     """The role a database row names."""
-    roles: dict[str, Role] = {"viewer": "viewer", "experimenter": "experimenter", "owner": "owner"}
-    return roles[word]
+    return ROLES[ROLES.index(word)]
 
 
 def change_password(services: Services, who: Identity, fresh: str) -> None:

@@ -8,6 +8,7 @@ from server.models.accounts import (
     AuditEntry,
     Invitation,
     Job,
+    Role,
 )
 from server.models.base import Base, UtcDateTime
 from server.models.evidence import AnswerEvidence
@@ -50,6 +51,7 @@ __all__ = [
     "Link",
     "Rating",
     "RecruiterIdentity",
+    "Role",
     "RunEvent",
     "RunTally",
     "SeriesAnswer",

@@ -1,7 +1,7 @@
 """Experimenters: accounts, sessions, API tokens, the audit log; and long jobs."""
 
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal, get_args
 
 from sqlalchemy import ForeignKey, Index, String, Text
 from sqlalchemy.orm import Mapped, mapped_column, relationship
@@ -9,7 +9,9 @@ from sqlalchemy.orm import Mapped, mapped_column, relationship
 from server.clock import now
 from server.models.base import Base, one_of
 
-ROLES = ("owner", "experimenter", "viewer")
+Role = Literal["viewer", "experimenter", "owner"]
+ROLES: tuple[Role, ...] = get_args(Role)
+"""Each may what those before it may, and more."""
 
 
 class Account(Base):

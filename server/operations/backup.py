@@ -7,12 +7,10 @@ form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips
 import gzip
 import io
 import json
-import os
-import secrets
 import tarfile
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO
@@ -22,6 +20,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy import Connection, Table
 
 from experiments.errors import InputError
+from experiments.files import whole_private_file
 from server.clock import iso, now
 from server.context import Services
 from server.operations.rows import Content, Digest, read_rows, snapshot, tables_of
@@ -118,18 +117,10 @@ def _plain(entry: tarfile.TarInfo) -> tarfile.TarInfo:
 
 @contextmanager
 def _written(path: Path) -> Iterator[IO[bytes]]:
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    # It holds the secret key and everybody's answers: for the owner of the file alone.
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # It holds the secret key and everybody's answers: for the owner of the file alone.
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(descriptor, "wb") as stream:
+        with whole_private_file(path) as stream:
             yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink()

@@ -1,6 +1,5 @@
 """Uploads of own clips: streamed to a folder of their own, unpacked with limits, probed."""
 
-import os
 import re
 import secrets
 import shutil
@@ -10,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 from typing import IO
 
+from experiments.files import whole_file
 from experiments.manifest import MANIFEST_NAME, file_sha256
 from server.errors import ApiError, Invalid, NotFound
 from server.studies.probe import NotAFilm, probe
@@ -124,17 +124,12 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
 
 def _copy(source: IO[bytes], target: Path, limit: int) -> None:
     written = 0
-    temporary = target.with_name(f".{target.name}.part")
-    try:
-        with temporary.open("wb") as stream:
-            while piece := source.read(CHUNK_BYTES):
-                written += len(piece)
-                if written > limit:
-                    raise UploadTooLarge(f"'{target.name}' is larger than the {limit >> 20} MiB accepted.")
-                stream.write(piece)
-        os.replace(temporary, target)  # noqa: PTH105 - the atomic form
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole_file(target) as temporary, temporary.open("wb") as stream:
+        while piece := source.read(CHUNK_BYTES):
+            written += len(piece)
+            if written > limit:
+                raise UploadTooLarge(f"'{target.name}' is larger than the {limit >> 20} MiB accepted.")
+            stream.write(piece)
 
 
 def describe(identifier: str, place: Path) -> UploadOut:

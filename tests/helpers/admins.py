@@ -8,8 +8,8 @@ from fastapi.testclient import TestClient
 from starlette.testclient import TestClient as StarletteClient
 
 from server.accounts import service
-from server.accounts.identity import Role
 from server.context import Services
+from server.models import Role
 from server.settings import Settings
 
 PASSWORD = "correct horse battery"
