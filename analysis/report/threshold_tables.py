@@ -35,7 +35,7 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
         )
         for mean in result.means
     ]
-    header = ("Condition", "Threshold", "95% CI", "Spread", "x at .75", "Lapse", "p of fit", "Trials")
+    header = ("Condition", "Threshold", "95% CI", "Spread", "x .75", "Lapse", "fit p", "Trials")
     notes = (
         ("All trials pooled, so that differences between people flatten the slope.",) if result.means else ()
     )

@@ -57,12 +57,18 @@ def function(shape: Shape, x: Array, location: float, log_spread: float) -> Arra
 
 
 class Likelihood:
-    """The likelihood of one data set; parameters are location, log spread and, if fitted, lapse."""
+    """The likelihood of one data set; parameters are location, log spread and, if fitted, lapse.
 
-    def __init__(self, trials: Trials, shape: Shape, guess: float, lapse: float | None) -> None:
+    Where it is not said whether the function is `falling`, the answers tell, without a guess rate alone.
+    """
+
+    def __init__(
+        self, trials: Trials, shape: Shape, guess: float, lapse: float | None, falling: bool | None = None
+    ) -> None:
         self.trials, self.shape, self.guess, self.lapse = trials, shape, guess, lapse
         centred = trials.x - np.average(trials.x, weights=trials.n)
-        self.falling = guess == 0.0 and float(np.sum(centred * trials.k)) < 0
+        seen = guess == 0.0 and float(np.sum(centred * trials.k)) < 0
+        self.falling = seen if falling is None else falling
         self.width = float(trials.x.max() - trials.x.min())
 
     def probabilities(self, values: Array) -> Array:

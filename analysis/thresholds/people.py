@@ -129,8 +129,12 @@ def counted(x: Array, response: Array) -> Trials:
     return Trials(levels, n, k)
 
 
-def fit_thresholds(answers: Answers, shape: Shape, guess: float, lapse: float | None) -> ThresholdsResult:
+def fit_thresholds(
+    answers: Answers, shape: Shape, guess: float, lapse: float | None, falling: bool | None = None
+) -> ThresholdsResult:
     """Fit every condition over all trials and, where people are named, every person in it.
+
+    `falling` is as in `fit_threshold`.
 
     Raises
     ------
@@ -144,26 +148,33 @@ def fit_thresholds(answers: Answers, shape: Shape, guess: float, lapse: float | 
         rows = labels == condition
         try:
             pooled[condition] = fit_threshold(
-                counted(answers.x[rows], answers.response[rows]), shape, guess, lapse
+                counted(answers.x[rows], answers.response[rows]), shape, guess, lapse, falling=falling
             )
         except InputError as error:
             where = "" if condition == "all" else f" ({condition})"
             raise InputError(f"{answers.source}{where}: {error}") from error
         if answers.participant is not None:
-            people += _people(answers, rows, condition, shape, guess, lapse)
+            people += _people(answers, rows, condition, shape, guess, lapse, falling)
     means = [mean for condition in pooled if (mean := mean_threshold(people, condition)) is not None]
     return ThresholdsResult(pooled, tuple(people), tuple(means), answers.x.size, answers.decisions)
 
 
 def _people(
-    answers: Answers, rows: NDArray[np.bool_], condition: str, shape: Shape, guess: float, lapse: float | None
+    answers: Answers,
+    rows: NDArray[np.bool_],
+    condition: str,
+    shape: Shape,
+    guess: float,
+    lapse: float | None,
+    falling: bool | None,
 ) -> list[PersonThreshold]:
     fits = []
     names = answers.participant
     for name in sorted({str(one) for one in names[rows]}) if names is not None else []:
         own = rows & (names == name)
         try:
-            fit = fit_threshold(counted(answers.x[own], answers.response[own]), shape, guess, lapse)
+            trials = counted(answers.x[own], answers.response[own])
+            fit = fit_threshold(trials, shape, guess, lapse, falling=falling)
             fits.append(PersonThreshold(name, condition, fit, ""))
         except InputError as error:
             fits.append(PersonThreshold(name, condition, None, str(error)))

@@ -53,6 +53,7 @@ def fit_threshold(
     lapse: float | None = 0.0,
     *,
     intervals: bool = True,
+    falling: bool | None = None,
 ) -> Threshold:
     r"""Fit P(x) = guess + (1 - guess - lapse) F(x) by maximum likelihood.
 
@@ -67,13 +68,17 @@ def fit_threshold(
     intervals : bool
         Whether to profile the likelihood for intervals: every other parameter is fitted anew at each value.
 
+    falling : bool, optional
+        Whether positive answers become rarer with x; where not given the answers tell, if there is no guess
+        rate.
+
     Raises
     ------
     InputError
         Too few levels, answers all alike, an answer that does not change with x, a threshold far outside.
     """
     refuse_unfit(trials, shape)
-    model = Likelihood(trials, shape, guess, lapse)
+    model = Likelihood(trials, shape, guess, lapse, falling)
     best, value = model.maximum({})
     location, log_spread = best[0], best[1]
     lapsed = best[2] if lapse is None else lapse

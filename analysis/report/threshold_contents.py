@@ -1,0 +1,227 @@
+"""The report of a study of thresholds: tables, sentences and the psychometric functions."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.plans.prepare import Prepared
+from analysis.report.captions import caption
+from analysis.report.contents import Contents, Part, Picture
+from analysis.report.formats import Table
+from analysis.report.json_output import exclusions_data
+from analysis.report.left_out import left_out
+from analysis.report.numbers import apa_p, fixed, interval, p_value
+from analysis.report.threshold_tables import people_table, threshold_table
+from analysis.thresholds.likelihood import function
+from analysis.thresholds.people import ThresholdsResult
+from analysis.thresholds.psychometric import Threshold
+from experiments.trials.threshold.declaration import threshold_of
+
+if TYPE_CHECKING:
+    from analysis.plans.threshold import Difference, SeriesFit
+
+METHODS = (
+    "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and lapse "
+    "rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% profiles "
+    "of the likelihood. The first table pools all trials of a series, which flattens the slope where people "
+    "differ; its last rows average thresholds over people (random effects by REML, Hartung-Knapp interval). "
+    "Series are compared within people by paired t tests, corrected by Holm. Stimuli were chosen by the "
+    "answers before them; the likelihood is the same as if they had been fixed. {weibull}"
+)
+SIGNIFICANCE = 0.05
+WEIBULL = "The declaration's Weibull has its threshold where F is 1 - 1/e; here it is where F is one half. "
+
+
+def contents_of(
+    prepared: Prepared, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]"
+) -> Contents:
+    """What the report says."""
+    experiment, trial = prepared.experiment, threshold_of(prepared.experiment)
+    name, synthetic = experiment.name, prepared.synthetic
+    people = prepared.rows["participant"].astype(str).nunique()
+    merged, number = merge(fits), len(prepared.rows)
+    return Contents(
+        name=name,
+        title=experiment.title,
+        lead=f"{people} participants, {number} trials of {len(fits)} series along {trial.stimulus.factor}",
+        source=prepared.source,
+        synthetic=synthetic,
+        n_participants=people,
+        left_out=left_out(prepared.exclusions),
+        decisions=prepared.decisions,
+        parts=(
+            Part(
+                _tables(fits, merged, differences, name, synthetic),
+                sentences(fits, merged, differences),
+                draw=lambda: (draw(fits, experiment.factor(trial.stimulus.factor).label, synthetic, people),),
+            ),
+        ),
+        methods=METHODS.format(
+            function=trial.function,
+            guess=trial.task.guess,
+            lapse=trial.lapse,
+            weibull=WEIBULL if trial.function == "weibull" else "",
+        ),
+        numbers=numbers(prepared, fits, merged, differences, people),
+    )
+
+
+def merge(fits: "Sequence[SeriesFit]") -> ThresholdsResult:
+    """The fits of all series as one result, a condition a series."""
+    done = [(fit.label, fit.result) for fit in fits if fit.result is not None]
+    return ThresholdsResult(
+        {label: result.pooled["all"] for label, result in done},
+        tuple(replace(one, condition=label) for label, result in done for one in result.people),
+        tuple(replace(mean, condition=label) for label, result in done for mean in result.means),
+        sum(result.n_trials for _, result in done),
+        (),
+    )
+
+
+def _tables(
+    fits: "Sequence[SeriesFit]",
+    merged: ThresholdsResult,
+    differences: "Sequence[Difference]",
+    name: str,
+    synthetic: bool,
+) -> tuple[Table, ...]:
+    made = [threshold_table(merged, name, synthetic)] if merged.pooled else []
+    if differences:
+        made.append(differences_table(differences, name, synthetic))
+    if merged.people:
+        made.append(people_table(merged, name, synthetic))
+    return (*made, shares_table(fits, name, synthetic))
+
+
+def differences_table(differences: "Sequence[Difference]", name: str, synthetic: bool) -> Table:
+    """Series compared within people."""
+    rows = tuple(
+        (
+            f"{d.first} - {d.second}",
+            str(d.people),
+            fixed(d.difference, 3),
+            interval((d.ci_low, d.ci_high), 3),
+            f"{fixed(d.t)} ({d.df})",
+            p_value(d.p_holm),
+        )
+        for d in differences
+    )
+    header = ("Series", "People", "Difference", "95% CI", "t (df)", "p (Holm)")
+    title = caption("Differences of thresholds", name, synthetic)
+    return Table("threshold-differences", title, header, rows, 1)
+
+
+def shares_table(fits: "Sequence[SeriesFit]", name: str, synthetic: bool) -> Table:
+    """Trials and answers at each stimulus."""
+    rows = tuple(
+        (fit.label, f"{x:g}", f"{n:.0f}", f"{k:.0f}", fixed(k / n))
+        for fit in fits
+        for x, n, k in zip(fit.trials.x, fit.trials.n, fit.trials.k, strict=True)
+    )
+    header = ("Series", "Stimulus", "Trials", "Yes or right", "Share")
+    title = caption("Answers at each stimulus", name, synthetic)
+    return Table("threshold-shares", title, header, rows, 1, (), folded=len(rows) > 24)
+
+
+def sentences(
+    fits: "Sequence[SeriesFit]", merged: ThresholdsResult, differences: "Sequence[Difference]"
+) -> tuple[str, ...]:
+    """The threshold of each series, over people where there are several, and the differences."""
+    said = [f"{fit.label}: no function was fitted, {fit.reason}." for fit in fits if fit.reason]
+    means = {mean.condition: mean for mean in merged.means}
+    for label, fit in merged.pooled.items():
+        if label in means:
+            mean = means[label]
+            low, high = fixed(mean.ci_low, 3), fixed(mean.ci_high, 3)
+            said.append(
+                f"{label}: the threshold of {mean.people} people was {fixed(mean.mean, 3)} on average, "
+                f"95% CI [{low}, {high}]."
+            )
+        else:
+            said.append(f"{label}: the threshold over all trials was {fixed(fit.threshold, 3)}.")
+        said += [f"{label}: {note}." for note in fit.notes]
+    return (*said, *(_difference(one) for one in differences))
+
+
+def _difference(d: "Difference") -> str:
+    verdict = "differed" if d.p_holm < SIGNIFICANCE else "did not differ significantly"
+    corrected = apa_p(d.p_holm).removeprefix("p ")
+    return (
+        f"Thresholds {verdict} between {d.first} and {d.second}, t({d.df}) = {fixed(d.t)}, {apa_p(d.p)} "
+        f"(after Holm {corrected})."
+    )
+
+
+def numbers(
+    prepared: Prepared,
+    fits: "Sequence[SeriesFit]",
+    merged: ThresholdsResult,
+    differences: "Sequence[Difference]",
+    people: int,
+) -> dict[str, Any]:
+    """The JSON document; conditions are the series' names."""
+    experiment = prepared.experiment
+    names = {fit.label: fit.name for fit in fits}
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "kind": experiment.trial.kind,
+        "source": prepared.source,
+        "synthetic": prepared.synthetic,
+        "n_participants": people,
+        "n_trials": len(prepared.rows),
+        "labels": {fit.name: fit.label for fit in fits},
+        "pooled": {names[label]: asdict(fit) for label, fit in merged.pooled.items()},
+        "reasons": {fit.name: fit.reason for fit in fits if fit.reason},
+        "people": [asdict(one) | {"condition": names[one.condition]} for one in merged.people],
+        "means": [asdict(mean) | {"condition": names[mean.condition]} for mean in merged.means],
+        "differences": [
+            asdict(d) | {"first": names[d.first], "second": names[d.second]} for d in differences
+        ],
+        "decisions": list(prepared.decisions),
+        "exclusions": exclusions_data(prepared.exclusions),
+    }
+
+
+def curve(fit: Threshold, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of positive answers at each x by the fitted function."""
+    rise = function(fit.shape, x, fit.threshold, float(np.log(fit.spread)))
+    share: NDArray[np.float64] = fit.guess + (1 - fit.guess - fit.lapse) * (1 - rise if fit.falling else rise)
+    return share
+
+
+def draw(fits: "Sequence[SeriesFit]", along: str, synthetic: bool, people: int) -> Picture:
+    """Share of answers by stimulus, its size their number, and the fitted functions over all people."""
+    # matplotlib takes a second to import, which commands that draw nothing need not pay
+    import matplotlib as mpl
+
+    from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, as_bytes, new_figure, write_note
+
+    with mpl.rc_context(STYLE):
+        figure = new_figure()
+        axes = figure.add_subplot()
+        for place, fit in enumerate(fits):
+            colour, trials = COLOURS[place % len(COLOURS)], fit.trials
+            sizes = 8 + 60 * np.sqrt(trials.n / max(1.0, float(trials.n.max())))
+            marker = MARKERS[place % len(MARKERS)]
+            shares = trials.k / trials.n
+            axes.scatter(trials.x, shares, s=sizes, color=colour, marker=marker, alpha=0.6, label=fit.label)
+            if fit.result is not None:
+                of_all = fit.result.pooled["all"]
+                x = np.linspace(float(trials.x.min()), float(trials.x.max()), 200)
+                axes.plot(x, curve(of_all, x), color=colour, linewidth=1.3)
+                axes.axvline(of_all.threshold, color=colour, linewidth=0.8, linestyle=":")
+        axes.set_ylim(-0.03, 1.03)
+        axes.set_xlabel(along)
+        axes.set_ylabel("Share of yes, or right")
+        axes.grid(linewidth=0.4, alpha=0.5)
+        axes.set_axisbelow(True)
+        axes.legend(frameon=False, fontsize=8, **BESIDE)
+        note = f"N = {people}. Size: trials. Dotted: threshold over all trials."
+        write_note(figure, note, synthetic, "answers")
+        alt = f"Psychometric functions of {len(fits)} series along {along}"
+        made = as_bytes(figure, "svg"), as_bytes(figure, "png")
+        return Picture("figure-thresholds", "Psychometric functions", alt, *made)
