@@ -260,8 +260,8 @@ def test_simulated_observers_answer_to_the_end_and_the_csv_has_their_series(
         assert all((row["response"] == row["interval"]) == bool(row["correct"]) for row in rows)
     with services.database.read() as session:
         found = session.query(Study).filter_by(name=study.name).one()
-        lines = b"".join(FORMATS["csv"](session, found)).decode().splitlines()
-        codebook = b"".join(FORMATS["codebook"](session, found)).decode()
+        lines = b"".join(FORMATS["csv"](session, found, "all")).decode().splitlines()
+        codebook = b"".join(FORMATS["codebook"](session, found, "all")).decode()
     header = lines[0].split(",")
     assert {"series", "duration", "value", "response", "correct", "ahead", "threshold"} <= set(header)
     assert "| ahead | integer |" in codebook
