@@ -1,0 +1,36 @@
+"""The toy in the server."""
+
+import random
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from experiments.definition import Experiment
+from server.tallies.tally import Counted, Place
+from server.trials.kinds import Part, Preference, Served, answer_of
+from server.trials.schemas import RatingIn
+from server.trials.verdict import Ruling
+from tests.experiments.trials.toy import SameAnswer
+
+if TYPE_CHECKING:
+    from server.versions import LoadedVersion
+
+
+def validate(_experiment: Experiment, _part: Part, rating: RatingIn) -> None:
+    answer_of(rating, SameAnswer)
+
+
+def judge(_loaded: "LoadedVersion", _clips: Mapping[str, int], _rating: RatingIn) -> Ruling:
+    return "good", ""
+
+
+def simulated(
+    _preference: Preference, _trial: Mapping[str, Any], _declared: Mapping[str, Any], rng: random.Random
+) -> dict[str, Any]:
+    return {"kind": "same_or_not", "same": rng.random() < 0.5}
+
+
+def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+    return [Counted("", places["first"].clip, places["second"].clip, float(payload["same"]))]
+
+
+SERVED = Served(validate, judge, simulated, counted)

@@ -1,0 +1,111 @@
+"""Declare, plan, simulate over HTTP, store, export, analyse, read again: the toy in a process of its own.
+
+What follows the imports below is all that joins it: the line that a new kind has in the registry, and the
+places where files are found by a kind's name.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from experiments import trials
+from tests.experiments.trials.toy import TOY
+
+trials.KINDS[TOY.name] = TOY
+
+import analysis.plans  # noqa: E402
+import server.trials.kinds  # noqa: E402
+
+HERE = Path(__file__).parent
+server.trials.kinds.__path__.append(str(HERE / "served"))
+analysis.plans.__path__.append(str(HERE / "plans"))
+
+from fastapi.testclient import TestClient  # noqa: E402
+from sqlalchemy import text  # noqa: E402
+
+from analysis.plans.plan import plan_of  # noqa: E402
+from analysis.plans.prepare import study_contents  # noqa: E402
+from analysis.read.study_answers import load_csv, load_database  # noqa: E402
+from analysis.report.write import write_report  # noqa: E402
+from experiments.schema.stored import load_stored  # noqa: E402
+from experiments.schema.upgrades import FORMAT  # noqa: E402
+from server.app import create_app  # noqa: E402
+from server.context import open_services  # noqa: E402
+from server.export.formats import FORMATS  # noqa: E402
+from server.migrate import upgrade  # noqa: E402
+from server.results.kinds import summary_of  # noqa: E402
+from server.results.repository import Pool  # noqa: E402
+from server.settings import Settings  # noqa: E402
+from server.simulation.person import Person, Rater  # noqa: E402
+from server.studies.lookup import active_definition, active_version, find_study  # noqa: E402
+from tests.helpers.studies import SHORT, add_study  # noqa: E402
+
+TEXT = SHORT[: SHORT.index("[trial]")] + TOY.example + SHORT[SHORT.index("[[exclusions]]") :]
+PEOPLE = 3
+
+
+class Api:
+    """The client that a simulated person speaks through."""
+
+    token = ""
+
+    def __init__(self, client: TestClient) -> None:
+        self._client = client
+
+    def get(self, path: str) -> Any:
+        return self._send("GET", path)
+
+    def put(self, path: str, body: Any = None) -> Any:
+        return self._send("PUT", path, body)
+
+    def post(self, path: str, body: Any = None) -> Any:
+        return self._send("POST", path, body)
+
+    def _send(self, method: str, path: str, body: Any = None) -> Any:
+        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
+        answer = self._client.request(method, path, json=body, headers=headers)
+        assert answer.status_code < 300, answer.text
+        return answer.json()
+
+
+def main(folder: Path) -> dict[str, Any]:
+    """What each step gave."""
+    url = f"sqlite:///{folder / 'toy.sqlite'}"
+    settings = Settings(data_folder=folder, database_url=url, secret_key="a key of the tests, long enough")
+    services = open_services(settings)
+    upgrade(services.database)
+    with services.database.write() as session:
+        session.execute(text(TOY.view.create("sqlite")))
+    study = add_study(services, folder / "clips", TEXT)
+    link = study.link(synthetic=True)
+    with TestClient(create_app(settings)) as client:
+        for seed in range(PEOPLE):
+            assert Person(Api(client), Rater(seed, 1, {})).take_part(link)  # type: ignore[arg-type]
+    found: dict[str, Any] = {"plan": list(TOY.plan(study.experiment))}
+    with services.database.read() as session:
+        stored = find_study(session, "short")
+        table = b"".join(FORMATS["csv"](session, stored, "simulated"))
+        found["codebook"] = b"".join(FORMATS["codebook"](session, stored, "all")).decode()
+        found["psych_ds"] = sum(map(len, FORMATS["psych-ds"](session, stored, "simulated")))
+        version, definition = active_version(session, stored), active_definition(session, stored)
+        found["read_again"] = load_stored(version.definition, FORMAT) == definition
+        pool = Pool(stored.id, "simulated", version.series, "")
+        results = summary_of(TOY.name)(session, stored, version, pool)
+        found["results"] = {"kind": results.kind, "answers": results.ratings}
+    (folder / "sameness.csv").write_bytes(table)
+    reading = plan_of(TOY.name).reading
+    for source, answers in (
+        ("csv", load_csv(folder / "sameness.csv", study.experiment, reading)),
+        ("database", load_database(url, study.experiment, reading)),
+    ):
+        contents = study_contents(study.experiment, answers)
+        found[source] = contents.numbers
+    found["report"] = [path.name for path in write_report(contents, folder / "report")]
+    found["rows"] = len(table.decode().splitlines()) - 1
+    services.database.close()
+    return found
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(main(Path(sys.argv[1]))))
