@@ -17,6 +17,7 @@ from server.errors import install_error_handlers
 from server.export import endpoints as export
 from server.library import endpoints as library
 from server.library import strips
+from server.methods import endpoints as methods
 from server.middleware import SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.operations import endpoints as operations
@@ -50,6 +51,7 @@ def _routers() -> tuple[APIRouter, ...]:
         runs.router,
         export.router,
         reports.router,
+        methods.router,
         library.router,
         strips.router,
         pages.router,

@@ -73,10 +73,11 @@ class Intake:
             batch, given = self._batch(answer, answer.evidence)
             late = _in_time(connection, answer, batch)
             right = self._digest(answer, given)
-        except ApiError:
+        except ApiError as refusal:
             if enforced:
                 # Each run has a share of its own: who sends false answers hinders nobody else.
                 self._false_answers.hit(answer.run_id)
+                repository.note_refusal(connection, answer.run, refusal.code, answer.received_at)
                 raise
             return
         repository.add(connection, _row(answer, batch, given, late=late, digest_right=right))

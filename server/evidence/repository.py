@@ -6,7 +6,11 @@ from typing import Any, NamedTuple, cast
 from sqlalchemy import Connection, Table, bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
-from server.models import AnswerEvidence, AssignedTrial, Rating, StudyRun, TrialClip
+from server.db import insert_once
+from server.models import AnswerEvidence, AssignedTrial, Rating, RunEvent, StudyRun, TrialClip
+
+REFUSED = "answer_refused"
+"""The event of a run that had an answer refused."""
 
 _evidence = cast(Table, AnswerEvidence.__table__)
 _INSERT = insert(_evidence).inline()
@@ -30,6 +34,19 @@ def spent(connection: Connection, run: int, issued_at: datetime) -> Any:
 def add(connection: Connection, values: dict[str, Any]) -> None:
     """Store the evidence of one answer."""
     connection.execute(_INSERT, values)
+
+
+def note_refusal(connection: Connection, run: int, code: str, moment: datetime) -> None:
+    """Note that an answer was refused for this reason: once a run and reason, however many come."""
+    event_id = f"{REFUSED} {code}"[:40]
+    values = {"event_id": event_id, "study_run_id": run, "type": REFUSED, "received_at": moment}
+    insert_once(Session(connection), RunEvent, [values | {"data": {"code": code}}])
+
+
+def has_refusals(session: Session, run: StudyRun) -> bool:
+    """Whether answers of a run were refused for their evidence."""
+    query = select(RunEvent.id).where(RunEvent.study_run_id == run.id, RunEvent.type == REFUSED)
+    return session.scalar(query.limit(1)) is not None
 
 
 def has_older_runs(session: Session, since: datetime) -> bool:

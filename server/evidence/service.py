@@ -17,7 +17,8 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
     """The judgement on a run as it is stored; runs whose page was not asked for evidence are not judged."""
     if run.evidence != "asked" or run.erased_at is not None:
         return NOT_JUDGED
-    return judge([_answer(row) for row in repository.answers(session, run)])
+    answers = [_answer(row) for row in repository.answers(session, run)]
+    return judge(answers, refused=repository.has_refusals(session, run))
 
 
 def _answer(row: repository.StoredAnswer) -> JudgedAnswer:

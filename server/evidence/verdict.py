@@ -43,6 +43,8 @@ BANDS: dict[str, tuple[Band, ...]] = {
     "checks": (Band(0, 0.5, -2), Band(1, INFINITE, 1)),
 }
 """Points of each signal; a value in none of its bands adds nothing. `late` is shown and adds nothing."""
+REFUSED_POINTS = -4.0
+"""Points where answers of the run were refused for their evidence."""
 WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -1}
 """Points where a signal cannot be had that every page reports."""
 
@@ -66,11 +68,15 @@ def points_of(name: str, value: float | None) -> float:
     return next((band.points for band in BANDS.get(name, ()) if band.low <= value < band.high), 0.0)
 
 
-def judge(answers: Sequence[JudgedAnswer]) -> Judgement:
-    """The verdict on a run whose page was asked for evidence."""
+def judge(answers: Sequence[JudgedAnswer], *, refused: bool = False) -> Judgement:
+    """The verdict on a run whose page was asked for evidence.
+
+    refused: answers of the run were refused for their evidence, which happens to no page of this program.
+    """
     signals = signals_of(answers)
-    points = sum(points_of(name, getattr(signals, name)) for name in BANDS)
+    points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
     if len(answers) < MIN_ANSWERS:
-        return Judgement("unclear", points, signals)
+        few: Verdict = "unlikely" if refused else "unclear" if answers else "not_judged"
+        return Judgement(few, points, signals)
     verdict: Verdict = "likely" if points >= LIKELY else "unlikely" if points <= UNLIKELY else "unclear"
     return Judgement(verdict, points, signals)

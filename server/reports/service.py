@@ -17,6 +17,7 @@ from server.clock import now
 from server.context import Services
 from server.errors import Conflict, NotFound
 from server.export.pieces import csv_pieces, rating_table
+from server.methods.service import methods_of, read_results, write
 from server.models import Job, Study
 from server.reports.schemas import NewReport, ReportOut
 from server.studies.lookup import find_study
@@ -115,6 +116,8 @@ def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> 
             series = _export(services, name, inputs, wanted)
             _note(services, public_id, progress=0.2, message="analysing")
             message = _analyse(inputs, folder, wanted, series)
+            if not message:
+                _add_methods(services, name, folder, wanted, series)
         status = "failed" if message else "done"
         _note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
     except (OSError, subprocess.SubprocessError, NotFound) as error:
@@ -148,6 +151,13 @@ def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
     lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
     shutil.rmtree(folder, ignore_errors=True)
     return (lines[-1] if lines else f"the analysis ended with code {done.returncode}")[:500]
+
+
+def _add_methods(services: Services, name: str, folder: Path, wanted: NewReport, series: int) -> None:
+    with services.database.read() as session:
+        study = find_study(session, name)
+        found = methods_of(session, study, wanted.origin, series, read_results(folder))
+    write(folder, found)
 
 
 def _note(services: Services, public_id: str, **values: Any) -> None:

@@ -1331,6 +1331,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/methods": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Methods
+         * @description Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts.
+         */
+        get: operations["get_methods"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/methods/methods.txt": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Methods Text
+         * @description The paragraph as plain text, with the query of each number below it.
+         */
+        get: operations["get_methods_text"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/blinks/library": {
         parameters: {
             query?: never;
@@ -3150,6 +3190,40 @@ export interface components {
             se_within: number | null;
             /** Participants */
             participants: number;
+        };
+        /**
+         * MethodsNumber
+         * @description A number of the paragraph and where it comes from.
+         */
+        MethodsNumber: {
+            /** Name */
+            name: string;
+            /** Value */
+            value: number;
+            /**
+             * Source
+             * @description The query of the database that gives it.
+             */
+            source: string;
+        };
+        /**
+         * MethodsOut
+         * @description The paragraph and its numbers.
+         */
+        MethodsOut: {
+            /**
+             * Origin
+             * @enum {string}
+             */
+            origin: "participant" | "pilot" | "simulated";
+            /** Series */
+            series: number;
+            /** Paragraph */
+            paragraph: string;
+            /** Latex */
+            latex: string;
+            /** Numbers */
+            numbers: components["schemas"]["MethodsNumber"][];
         };
         /**
          * MonitorSnapshot
@@ -6204,6 +6278,8 @@ export type LinkedStudy = components['schemas']['LinkedStudy'];
 export type Margin = components['schemas']['Margin'];
 export type Me = components['schemas']['Me'];
 export type Mean = components['schemas']['Mean'];
+export type MethodsNumber = components['schemas']['MethodsNumber'];
+export type MethodsOut = components['schemas']['MethodsOut'];
 export type MonitorSnapshot = components['schemas']['MonitorSnapshot'];
 export type MonitoredRun = components['schemas']['MonitoredRun'];
 export type MultipleChoiceField = components['schemas']['MultipleChoiceField'];
@@ -9402,6 +9478,90 @@ export interface operations {
                 study: string;
                 report: string;
                 file: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_methods: {
+        parameters: {
+            query?: {
+                origin?: "participant" | "pilot" | "simulated";
+                series?: number | null;
+            };
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MethodsOut"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_methods_text: {
+        parameters: {
+            query?: {
+                origin?: "participant" | "pilot" | "simulated";
+                series?: number | null;
+            };
+            header?: never;
+            path: {
+                study: string;
             };
             cookie?: never;
         };

@@ -10,7 +10,8 @@ from sqlalchemy import select, text
 from server.clock import now
 from server.context import Services
 from server.evidence.intake import FALSE_ANSWERS_PER_MINUTE
-from server.models import AnswerEvidence
+from server.evidence.service import judge_run
+from server.models import AnswerEvidence, RunEvent, StudyRun
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import Participant, StudyInDatabase
 from tests.server.evidence.conftest import CLIP_S
@@ -49,6 +50,26 @@ def test_the_plain_http_program_is_refused(client: TestClient, study: StudyInDat
     bot.request("PUT", "/consent", {"agreed": True})
     trials = bot.state()["trials"]
     assert {code(bot.rate(trial)) for trial in trials} == {"422 ticket_missing"}
+
+
+def test_ten_thousand_false_answers_are_noted_once_and_hinder_nobody(
+    client: TestClient, study: StudyInDatabase, services: Services
+) -> None:
+    bot, honest = Watcher(client, study.link_token), Watcher(client, study.link_token).begin()
+    bot.moment = now()
+    bot.start()
+    bot.request("PUT", "/consent", {"agreed": True})
+    trial = bot.state()["trials"][0]
+    sent = {code(bot.rate(trial)) for _ in range(FALSE_ANSWERS_PER_MINUTE + 30)}
+    assert sent == {"422 ticket_missing", "429 too_many_requests"}
+    first = honest.state()["trials"][0]
+    honest.wait(SHOWN_S)
+    assert honest.answer(first).status_code == 201
+    with services.database.read() as session:
+        noted = session.execute(select(RunEvent).where(RunEvent.type == "answer_refused")).scalars().all()
+        assert [event.data for event in noted] == [{"code": "ticket_missing"}]
+        run = session.scalars(select(StudyRun).where(StudyRun.public_id == bot.run_id)).one()
+        assert judge_run(session, run).verdict == "unlikely"
 
 
 def test_clips_cannot_outlast_the_time_since_their_tickets(watcher: Watcher) -> None:

@@ -192,3 +192,8 @@ def test_the_export_has_a_column_a_signal() -> None:
         f"evidence_{name}" for name in SIGNAL_NAMES
     )
     assert {*BANDS, *WITHOUT} <= set(SIGNAL_NAMES)
+
+
+def test_a_run_of_refused_answers_is_unlikely_and_one_without_answers_is_not_judged() -> None:
+    assert judge([], refused=True).verdict == "unlikely"
+    assert judge([]).verdict == "not_judged"

@@ -11,6 +11,7 @@ import { ClipResults } from "./ClipResults";
 import { HowShown } from "./HowShown";
 import { PairResults } from "./PairResults";
 import { type DataOrigin, ORIGINS, originOf } from "./origins";
+import { MethodsCard } from "./MethodsCard";
 import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from "./plots";
 import { Reports } from "./Reports";
 
@@ -58,6 +59,7 @@ export function ResultsTab() {
         }
       </Answer>
       <Reports study={study} origin={origin} series={series} />
+      <MethodsCard study={study} origin={origin} series={series} />
     </Stack>
   );
 }

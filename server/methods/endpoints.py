@@ -1,0 +1,64 @@
+"""The Methods paragraph of a study, for the admin site."""
+
+from typing import Literal
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, Field
+
+from server.accounts.identity import Viewer
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES
+from server.methods import service
+from server.studies.lookup import find_study
+
+router = APIRouter(prefix="/api/admin/studies/{study}/methods", tags=["reports"], responses=ERROR_RESPONSES)
+MethodsOrigin = Literal["participant", "pilot", "simulated"]
+
+
+class MethodsNumber(BaseModel):
+    """A number of the paragraph and where it comes from."""
+
+    name: str
+    value: int
+    source: str = Field(description="The query of the database that gives it.")
+
+
+class MethodsOut(BaseModel):
+    """The paragraph and its numbers."""
+
+    origin: MethodsOrigin
+    series: int
+    paragraph: str
+    latex: str
+    numbers: list[MethodsNumber]
+
+
+@router.get("")
+def get_methods(
+    services: ServicesDep,
+    _who: Viewer,
+    study: str,
+    origin: MethodsOrigin = "participant",
+    series: int | None = None,
+) -> MethodsOut:
+    """Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts."""
+    with services.database.read() as session:
+        found = service.methods_of(session, find_study(session, study), origin, series)
+    listed = [MethodsNumber.model_validate(vars(number)) for number in found.numbers.values()]
+    return MethodsOut(
+        origin=origin, series=found.series, paragraph=found.plain(), latex=found.latex(), numbers=listed
+    )
+
+
+@router.get("/methods.txt", response_class=Response)
+def get_methods_text(
+    services: ServicesDep,
+    _who: Viewer,
+    study: str,
+    origin: MethodsOrigin = "participant",
+    series: int | None = None,
+) -> Response:
+    """The paragraph as plain text, with the query of each number below it."""
+    with services.database.read() as session:
+        found = service.methods_of(session, find_study(session, study), origin, series)
+    return Response(found.text(), media_type="text/plain; charset=utf-8")

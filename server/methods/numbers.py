@@ -1,0 +1,75 @@
+"""The numbers of the Methods paragraph, each with the query that gave it."""
+
+from dataclasses import dataclass
+
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+RUNS = (
+    "SELECT count(*) FROM study_runs r JOIN study_versions v ON v.id = r.version_id "
+    "WHERE r.study_id = :study AND r.origin = :origin AND v.series = :series"
+)
+PLAYS = (
+    "SELECT count(*) FROM trial_ratings t "
+    "JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index "
+    "JOIN study_runs r ON r.id = t.study_run_id JOIN study_versions v ON v.id = r.version_id "
+    "WHERE r.study_id = :study AND r.origin = :origin AND v.series = :series AND r.status = 'complete'"
+)
+COMPLETE = "r.status = 'complete'"
+OF_RUNS: dict[str, str] = {
+    "begun": "TRUE",
+    "by_personal_link": "EXISTS (SELECT 1 FROM links l WHERE l.id = r.link_id AND l.kind = 'personal')",
+    "by_recruiter": "EXISTS (SELECT 1 FROM recruiter_identities i "
+    "WHERE i.study_run_id = r.id AND i.identifier <> '')",
+    "agreed": "r.consented_at IS NOT NULL",
+    "screened_out": "r.status = 'screened_out'",
+    "withdrew": "r.status = 'withdrawn'",
+    "unfinished": "r.status = 'active'",
+    "complete": COMPLETE,
+    "excluded_by_hand": "r.excluded",
+    "calibrated": f"{COMPLETE} AND r.px_per_mm IS NOT NULL",
+    "likely": f"{COMPLETE} AND r.evidence_verdict = 'likely'",
+    "unclear": f"{COMPLETE} AND r.evidence_verdict = 'unclear'",
+    "unlikely": f"{COMPLETE} AND r.evidence_verdict = 'unlikely'",
+    "not_judged": f"{COMPLETE} AND coalesce(r.evidence_verdict, 'not_judged') = 'not_judged'",
+    "refused": "EXISTS (SELECT 1 FROM run_events e "
+    "WHERE e.study_run_id = r.id AND e.type = 'answer_refused')",
+}
+OF_PLAYS: dict[str, str] = {
+    "checks": "a.kind = 'attention'",
+    "plays": "a.kind = 'main'",
+    "plays_good": "a.kind = 'main' AND t.verdict = 'good'",
+    "plays_uncertain": "a.kind = 'main' AND t.verdict = 'uncertain'",
+    "plays_flagged": "a.kind = 'main' AND t.verdict = 'flagged'",
+    "plays_failed": "a.kind = 'main' AND t.verdict = 'failed'",
+}
+QUERIES: dict[str, str] = {
+    name: " AND ".join((counted, condition))
+    for counted, conditions in ((RUNS, OF_RUNS), (PLAYS, OF_PLAYS))
+    for name, condition in conditions.items()
+}
+"""Runs and plays of one study, origin and data series."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number and where it comes from: a query of the database, or the key of a report."""
+
+    name: str
+    value: int
+    source: str
+
+
+def numbers(session: Session, study: int, origin: str, series: int) -> dict[str, Number]:
+    """Every number of `QUERIES`."""
+    of: dict[str, int | str] = {"study": study, "origin": origin, "series": series}
+    return {
+        name: Number(name, int(session.scalar(text(query), of) or 0), _filled(query, of))
+        for name, query in QUERIES.items()
+    }
+
+
+def _filled(query: str, values: dict[str, int | str]) -> str:
+    for name, value in values.items():
+        query = query.replace(f":{name}", str(value) if isinstance(value, int) else f"'{value}'")
+    return query

@@ -1,0 +1,160 @@
+"""The Methods paragraph: sentences whose every number names its source; plain text and LaTeX.
+
+A sentence is a template with {name} for a number, {name:s} for the ending of its plural, and words for
+what was declared.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+from experiments.definition import Experiment
+from server.methods.numbers import Number
+
+_HOLE = re.compile(r"\{(\w+)\}")
+LATEX_SIGNS = {
+    "\\": r"\textbackslash{}",
+    **{sign: "\\" + sign for sign in "&%$#_{}"},
+    "~": r"\textasciitilde{}",
+}
+
+
+@dataclass(frozen=True)
+class Methods:
+    """Sentences with holes, and the numbers that fill them."""
+
+    study: str
+    origin: str
+    series: int
+    sentences: tuple[str, ...]
+    numbers: Mapping[str, Number]
+
+    def text(self) -> str:
+        """The paragraph; below it every number with its source, marked as in the paragraph."""
+        order = self._order()
+        paragraph = " ".join(self._filled(sentence, order, "{value} [{mark}]") for sentence in self.sentences)
+        sources = [f"[{mark}] {name}: {self.numbers[name].source}" for name, mark in order.items()]
+        return "\n".join([paragraph, "", *sources]) + "\n"
+
+    def plain(self) -> str:
+        """The paragraph alone."""
+        return " ".join(self._filled(sentence, {}, "{value}") for sentence in self.sentences)
+
+    def latex(self) -> str:
+        """The paragraph as LaTeX, each sentence followed by comments that name the sources."""
+        lines = [f"% Methods of {self.study}: origin {self.origin}, data series {self.series}"]
+        for sentence in self.sentences:
+            lines.append(_escaped(self._filled(sentence, {}, "{value}")))
+            for name in dict.fromkeys(_HOLE.findall(sentence)):
+                number = self.numbers[name]
+                lines.append(f"% {name} = {number.value}: {number.source}")
+        return "\n".join(lines) + "\n"
+
+    def json(self) -> str:
+        """Paragraph and numbers for programs."""
+        content = {
+            "study": self.study,
+            "origin": self.origin,
+            "series": self.series,
+            "paragraph": self.plain(),
+        }
+        listed = [asdict(number) for number in self.numbers.values()]
+        return json.dumps(content | {"numbers": listed}, indent=1, ensure_ascii=False) + "\n"
+
+    def _order(self) -> dict[str, int]:
+        names = dict.fromkeys(name for sentence in self.sentences for name in _HOLE.findall(sentence))
+        return {name: mark for mark, name in enumerate(names, start=1)}
+
+    def _filled(self, sentence: str, order: Mapping[str, int], form: str) -> str:
+        def number(hole: re.Match[str]) -> str:
+            name = hole[1]
+            return form.format(value=self.numbers[name].value, mark=order.get(name, 0))
+
+        return _HOLE.sub(number, sentence)
+
+
+def _escaped(text: str) -> str:
+    return "".join(LATEX_SIGNS.get(sign, sign) for sign in text)
+
+
+def sentences(
+    experiment: Experiment, recruiter: str, found: Mapping[str, Number], rules: Sequence[tuple[str, str]]
+) -> tuple[str, ...]:
+    """The sentences that apply to a study.
+
+    rules: name of the number and words of each declared exclusion that a report has applied.
+    """
+    return (
+        *_recruitment(recruiter, found),
+        *_screening(experiment),
+        *_checks(experiment),
+        *_exclusions(experiment, rules),
+        *_display(experiment),
+        *_evidence(found),
+    )
+
+
+def _recruitment(recruiter: str, found: Mapping[str, Number]) -> list[str]:
+    through = "" if recruiter == "generic" else f", recruited through {RECRUITERS[recruiter]}"
+    lines = [f"Visits begun: {{begun}}{through}; consent was given in {{agreed}}."]
+    if found["by_personal_link"].value:
+        lines.append("By personal link came {by_personal_link}.")
+    if found["by_recruiter"].value:
+        lines.append("The recruiter named the person in {by_recruiter}; data bear pseudonyms of this study.")
+    lines.append(
+        "Of all visits {complete} were completed, {withdrew} ended at the person's wish, "
+        "{screened_out} by screening, and {unfinished} were left open."
+    )
+    return lines
+
+
+RECRUITERS = {"prolific": "Prolific", "sona": "SONA", "mturk": "Amazon Mechanical Turk"}
+
+
+def _screening(experiment: Experiment) -> list[str]:
+    names = ", ".join(rule.rule.replace("_", " ") for rule in experiment.screening)
+    return [f"Rules of screening, declared before the data: {names}."] if names else []
+
+
+def _checks(experiment: Experiment) -> list[str]:
+    each = experiment.attention.per_block
+    declared = f"{each} instructed answer{'s' * (each != 1)} a block"
+    return [f"Attention was checked by {declared}; completed visits hold {{checks}}."] if each else []
+
+
+def _exclusions(experiment: Experiment, rules: Sequence[tuple[str, str]]) -> list[str]:
+    by_hand = "By hand, with a reason on record, {excluded_by_hand} visits were excluded."
+    if not experiment.exclusions:
+        return ["No exclusion was declared before the data.", by_hand]
+    declared = ", ".join(rule.rule.replace("_", " ") for rule in experiment.exclusions)
+    applied = "; ".join(f"{words}: {{{name}}}" for name, words in rules)
+    counts = f" They left out: {applied}." if applied else ""
+    return [f"Exclusions declared before the data: {declared}.{counts}", by_hand]
+
+
+def _display(experiment: Experiment) -> list[str]:
+    lines = [
+        "Every clip was drawn frame by frame in the participant's browser and each frame's time recorded; of "
+        "{plays} plays in completed visits {plays_good} were shown as declared, {plays_uncertain} could not "
+        "be verified, {plays_flagged} had a frame lost or late, and {plays_failed} failed."
+    ]
+    if experiment.display.calibrate != "off":
+        lines.append("The size on the screen was calibrated in {calibrated} of {complete} completed visits.")
+    return lines
+
+
+def _evidence(found: Mapping[str, Number]) -> list[str]:
+    judged = sum(found[name].value for name in ("likely", "unclear", "unlikely"))
+    if not judged:
+        return [
+            "Whether answers were given by people was not judged ({not_judged} completed visits bring no "
+            "evidence)."
+        ]
+    lines = [
+        "Automated answers: tickets of the server, the server's time, digests of the clips and summaries of "
+        "key and pointer presses were gathered as evidence; by them {likely} completed visits were likely a "
+        "person's, {unclear} unclear, {unlikely} unlikely, and {not_judged} could not be judged.",
+        "This is evidence, not proof: it does not tell a person who lets a program choose the answers.",
+    ]
+    return [*lines, "Answers were refused in {refused} visits."] if found["refused"].value else lines

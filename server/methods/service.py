@@ -1,0 +1,74 @@
+"""The Methods of a study, from its declaration, its stored runs and, where there is one, its report."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from server.methods.numbers import Number, numbers
+from server.methods.paragraph import Methods, sentences
+from server.models import Study
+from server.participants.recruiter import Recruiter
+from server.studies.lookup import definition_of
+from server.studies.series import version_of_series
+
+RESULTS = "results.json"
+
+
+def methods_of(
+    session: Session, study: Study, origin: str, series: int | None, results: dict[str, Any] | None = None
+) -> Methods:
+    """The paragraph; `results` are those of a report, which says how many each declared rule left out."""
+    version = version_of_series(session, study, series)
+    experiment = definition_of(version)
+    found = numbers(session, study.id, origin, version.series)
+    excluded = _excluded(results)
+    declared = study.recruiter
+    recruiter = Recruiter.model_validate(declared).kind if declared else "generic"
+    rules = [(name, words) for name, (words, _) in excluded.items()]
+    found |= {name: number for name, (_, number) in excluded.items()}
+    lines = sentences(experiment, recruiter, found, rules)
+    return Methods(study.name, origin, version.series, lines, found)
+
+
+def read_results(folder: Path) -> dict[str, Any] | None:
+    """The numbers of the report in this folder; None where it has none."""
+    path = folder / RESULTS
+    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    return found if isinstance(found, dict) else None
+
+
+def write(folder: Path, methods: Methods) -> None:
+    """Put the paragraph beside a report: as text, as LaTeX, and with its numbers as JSON."""
+    for name, content in (("txt", methods.text()), ("tex", methods.latex()), ("json", methods.json())):
+        (folder / f"methods.{name}").write_text(content, encoding="utf-8")
+
+
+def _excluded(results: dict[str, Any] | None) -> dict[str, tuple[str, Number]]:
+    """Number of runs (or trials) by declared rule, as the report of the analysis counts them."""
+    left_out = (results or {}).get("exclusions") or {}
+    counts: dict[str, int] = {}
+    for run in left_out.get("runs", []):
+        for reason in run["reasons"]:
+            rule = str(reason).split(":", 1)[0]
+            counts[rule] = counts.get(rule, 0) + 1
+    found = {
+        f"visits_{_key(rule)}": (f"visits by {_words(rule)}", count, "exclusions.runs[].reasons")
+        for rule, count in counts.items()
+    }
+    for dropped in left_out.get("trials", []):
+        words = f"trials by {_words(dropped['rule'])}"
+        found[f"trials_{_key(dropped['rule'])}"] = (words, int(dropped["trials"]), "exclusions.trials[]")
+    return {
+        name: (words, Number(name, count, f"{RESULTS} of the report: {place} of this rule"))
+        for name, (words, count, place) in found.items()
+    }
+
+
+def _words(rule: str) -> str:
+    return rule.replace("_", " ")
+
+
+def _key(rule: str) -> str:
+    return "_".join(rule.lower().split())
