@@ -52,6 +52,16 @@ def test_the_plain_http_program_is_refused(client: TestClient, study: StudyInDat
     assert {code(bot.rate(trial)) for trial in trials} == {"422 ticket_missing"}
 
 
+def until_limited(bot: Watcher, trial: Any) -> int:
+    """How many false answers are heard; on a slow machine the share refills meanwhile."""
+    for sent in range(20 * FALSE_ANSWERS_PER_MINUTE):
+        said = code(bot.rate(trial))
+        if said == "429 too_many_requests":
+            return sent
+        assert said == "422 ticket_missing"
+    raise AssertionError("false answers were never limited")
+
+
 def test_ten_thousand_false_answers_are_noted_once_and_hinder_nobody(
     client: TestClient, study: StudyInDatabase, services: Services
 ) -> None:
@@ -60,8 +70,7 @@ def test_ten_thousand_false_answers_are_noted_once_and_hinder_nobody(
     bot.start()
     bot.request("PUT", "/consent", {"agreed": True})
     trial = bot.state()["trials"][0]
-    sent = {code(bot.rate(trial)) for _ in range(FALSE_ANSWERS_PER_MINUTE + 30)}
-    assert sent == {"422 ticket_missing", "429 too_many_requests"}
+    assert until_limited(bot, trial) >= FALSE_ANSWERS_PER_MINUTE
     first = honest.state()["trials"][0]
     honest.wait(SHOWN_S)
     assert honest.answer(first).status_code == 201
@@ -160,8 +169,7 @@ def test_false_answers_are_limited_without_touching_others(
     watcher: Watcher, client: TestClient, study: StudyInDatabase
 ) -> None:
     trial = with_clips(watcher.state())[0]
-    codes = {code(watcher.rate(trial)) for _ in range(FALSE_ANSWERS_PER_MINUTE + 5)}
-    assert codes == {"422 ticket_missing", "429 too_many_requests"}
+    assert until_limited(watcher, trial) >= FALSE_ANSWERS_PER_MINUTE
     other = Watcher(client, study.link_token).begin()
     trials = with_clips(other.state())
     other.wait(SHOWN_S)
