@@ -6,6 +6,7 @@ from server.cli_common import migrated_services, out
 from server.db import open_database
 from server.migrate import current_revision, newest_revision
 from server.operations.cli import copy
+from server.runs.erasure import replay
 from server.settings import Settings
 from server.tallies.recount import repair
 
@@ -50,3 +51,16 @@ def recount() -> None:
     with migrated_services() as services:
         mended, runs = repair(services.database, services.versions)
     out.print(f"{runs} runs counted, {mended} mended")
+
+
+@app.command("erase-again")
+def erase_again() -> None:
+    """Erase the runs that the ledger of erasures names (erasures.ndjson in the data folder).
+
+    `server restore` does so by itself; this is for a ledger that was put there afterwards, or for a database
+    that was brought back by other means.
+    Example: server database erase-again
+    """
+    with migrated_services() as services, services.database.write() as session:
+        erased = replay(session, services.settings)
+    out.print(f"{erased} runs erased")

@@ -16,7 +16,7 @@ from tools.load_connection import Connection
 
 RETRY_S = 0.2
 GIVE_UP_S = 120.0
-NEEDED = ("trial_index", "plays_done", "prompt", "clip_sha256", "frames", "fps")
+NEEDED = ("trial_index", "plays_done", "prompt", "clips", "clip_sha256", "frames", "fps")
 
 
 @dataclass

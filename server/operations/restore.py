@@ -16,7 +16,9 @@ from experiments.errors import InputError
 from server.context import Services
 from server.migrate import alembic_config, known_revision
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
+from server.operations.erasures import ledger
 from server.operations.rows import Row, refuse_unless_empty, tables_of, write_rows
+from server.runs.erasure import replay
 from server.settings import Settings
 
 FORMAT = 1
@@ -47,8 +49,22 @@ def restore(services: Services, path: Path, told: Callable[[str], None] = lambda
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     _keep_key(services.settings, key)
+    _erase_again(services, told)
     told(f"{len(described.clips)} clips, secret key")
     return described
+
+
+def _erase_again(services: Services, told: Callable[[str], None]) -> None:
+    path = ledger(services.settings)
+    if not path.is_file():
+        told(
+            f"no ledger of erasures at {path}: who was erased since this backup is back; if you have one, "
+            "put it there and run: server database erase-again"
+        )
+        return
+    with services.database.write() as session:
+        erased = replay(session, services.settings)
+    told(f"{erased} runs erased again, by {path}")
 
 
 def _description(tar: tarfile.TarFile, path: Path) -> Description:

@@ -9,7 +9,8 @@ from server.accounts.identity import Experimenter, Owner, PersonalReader
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.runs import service
-from server.runs.schemas import Erase, Exclude, RunIdentity, RunPage, Show, Timeline
+from server.runs.erasure import erase
+from server.runs.schemas import Erase, Erased, Exclude, RunIdentity, RunPage, Show, Timeline
 from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/runs", tags=["participants"], responses=ERROR_RESPONSES)
@@ -60,8 +61,9 @@ def include_run(services: ServicesDep, who: Experimenter, study: str, run: str) 
         service.include(session, find_study(session, study), run, who)
 
 
-@router.post("/{run}/erase", status_code=204)
-def erase_run(services: ServicesDep, who: Experimenter, study: str, run: str, body: Erase) -> None:
+@router.post("/{run}/erase")
+def erase_run(services: ServicesDep, who: Experimenter, study: str, run: str, body: Erase) -> Erased:
     """Delete one person's data for good (a request under data protection law)."""
     with services.database.write() as session:
-        service.erase(session, find_study(session, study), run, body.confirm, who)
+        found = find_study(session, study)
+        return erase(session, services.settings, found, run, body.confirm, who)

@@ -1,8 +1,9 @@
 """Runs and all that hangs on them."""
 
 from collections.abc import Sequence
+from datetime import datetime
 
-from sqlalchemy import ColumnElement, Select, delete, func, select
+from sqlalchemy import ColumnElement, Select, delete, false, func, select
 from sqlalchemy.orm import Session, joinedload
 
 from server.errors import NotFound
@@ -11,6 +12,7 @@ from server.models import (
     AssignedTrial,
     Calibration,
     FormAnswer,
+    Job,
     Rating,
     RecruiterIdentity,
     RunEvent,
@@ -118,6 +120,27 @@ def calibrations(session: Session, run: StudyRun) -> list[Calibration]:
 def identity(session: Session, run: StudyRun) -> RecruiterIdentity | None:
     """Who the run's person is to the recruiter; None where the address said nothing."""
     return session.get(RecruiterIdentity, run.id)
+
+
+def other_visits(session: Session, run: StudyRun) -> list[StudyRun]:
+    """Other visits to the study that are known to be the same person's, and not erased.
+
+    Known are those by the same personal link, and those under the same pseudonym of a recruiter's id.
+    """
+    same: ColumnElement[bool] = StudyRun.link_id == run.link_id if run.link.kind == "personal" else false()
+    known = identity(session, run)
+    if known is not None and known.identifier:
+        same |= StudyRun.id.in_(
+            select(RecruiterIdentity.study_run_id).where(RecruiterIdentity.identifier == known.identifier)
+        )
+    query = select(StudyRun).where(StudyRun.study_id == run.study_id, StudyRun.id != run.id, same)
+    return list(session.scalars(query.where(StudyRun.erased_at.is_(None)).order_by(StudyRun.id)))
+
+
+def reports(session: Session, study: Study) -> list[tuple[str, datetime | None]]:
+    """Reports of a study that are kept: public id and when they were finished."""
+    query = select(Job.public_id, Job.finished_at).where(Job.study_id == study.id, Job.status == "done")
+    return [(public_id, finished) for public_id, finished in session.execute(query.order_by(Job.id))]
 
 
 def delete_personal_rows(session: Session, run: StudyRun) -> int:

@@ -22,6 +22,23 @@ class Erase(BaseModel):
     confirm: Annotated[str, StringConstraints(max_length=40)]
 
 
+class HeldReport(BaseModel):
+    """A report that was made while the person's data were there."""
+
+    report: str
+    finished_at: datetime | None
+
+
+class Erased(BaseModel):
+    """What was erased, and what still holds the person until it is made again or removed."""
+
+    runs: list[str] = Field(description="The run asked for, and other visits of the same person.")
+    reports: list[HeldReport] = Field(description="Reports of the study; make them again.")
+    ledger: str = Field(
+        description="File from which a restore of an older backup erases these runs again; keep it."
+    )
+
+
 class RunIdentity(BaseModel):
     """Who a participant is to the recruiter."""
 

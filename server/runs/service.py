@@ -1,16 +1,14 @@
 """Timelines, exclusion with a reason, and erasure on request."""
 
-import secrets
 from datetime import timedelta
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
-from server.errors import Conflict, Invalid
-from server.models import AssignedTrial, AuditEntry, Link, Rating, Study, StudyRun, VersionClip
+from server.errors import Conflict
+from server.models import AssignedTrial, Link, Rating, Study, StudyRun, VersionClip
 from server.runs import repository
 from server.runs.schemas import (
     RunIdentity,
@@ -144,33 +142,3 @@ def include(session: Session, study: Study, public_id: str, who: Identity) -> No
         raise Conflict("This run is not excluded.")
     record(session, who, "exclusion undone", "run", public_id, study=study.name, reason=run.exclusion_reason)
     run.excluded, run.exclusion_reason, run.excluded_at, run.excluded_by = False, None, None, None
-
-
-def erase(session: Session, study: Study, public_id: str, confirm: str, who: Identity) -> None:
-    """Delete one person's data for good; a row without content stays, so that counts stay right."""
-    run = repository.find_run(session, study, public_id)
-    if confirm != public_id:
-        raise Invalid(f"To erase this run, confirm with its identifier {public_id}; got '{confirm}'.")
-    if run.erased_at is not None:
-        raise Conflict("This run's data were erased already.")
-    ratings = repository.delete_personal_rows(session, run)
-    run.participant, run.device = "erased", {}
-    run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
-    run.completion_code = ""
-    if run.link.kind == "personal":
-        run.link.label = "erased"
-    _forget_in_audit(session, public_id)
-    # Nobody can go on with an erased run: its tokens fit nothing any more.
-    run.token_hash, run.client_id = secrets.token_hex(32), secrets.token_hex(16)
-    run.status = "withdrawn" if run.status == "active" else run.status
-    run.erased_at = run.started_at = run.last_seen_at = now()
-    run.consented_at = run.completed_at = run.excluded_at = None
-    record(session, who, "run erased", "run", public_id, study=study.name, ratings=ratings)
-
-
-def _forget_in_audit(session: Session, public_id: str) -> None:
-    """Take from the audit log what was written about a person; that something was done stays."""
-    query = select(AuditEntry).where(AuditEntry.target_kind == "run", AuditEntry.target == public_id)
-    for entry in session.scalars(query):
-        if "reason" in entry.details:
-            entry.details = {**entry.details, "reason": "erased"}

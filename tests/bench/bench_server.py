@@ -108,17 +108,17 @@ def pages(folder: Path, rows: int) -> None:
     """The pages of a study with very many ratings, links and runs, each asked for by itself."""
     process = filled(folder, RATED_RUNS, max(1, rows // RATED_RUNS))
     try:
-        shown(process.start(), f"{RATED_RUNS:,} runs")
+        shown(process.start(), f"{RATED_RUNS:,} runs", "ada")
         process.stop()
         more_runs(process, MANY_RUNS)
-        shown(process.start(), f"{MANY_RUNS:,} runs")
+        shown(process.start(), f"{MANY_RUNS:,} runs", "grace")
     finally:
         process.stop()
 
 
-def shown(process: ServerProcess, what: str) -> None:
+def shown(process: ServerProcess, what: str, name: str) -> None:
     """Every page of a server that has just been started, first and later."""
-    owner = Owner(process, what)
+    owner = Owner(process, name)
     made = owner.time_of(f"{STUDY}/links", f'{{"kind": "personal", "count": {LINKS}}}'.encode())[0]
     print_line(f"{what}: making {LINKS} links", f"{1000 * made:.0f} ms")
     for name, path in (

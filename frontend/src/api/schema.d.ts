@@ -2278,6 +2278,27 @@ export interface components {
             confirm: string;
         };
         /**
+         * Erased
+         * @description What was erased, and what still holds the person until it is made again or removed.
+         */
+        Erased: {
+            /**
+             * Runs
+             * @description The run asked for, and other visits of the same person.
+             */
+            runs: string[];
+            /**
+             * Reports
+             * @description Reports of the study; make them again.
+             */
+            reports: components["schemas"]["HeldReport"][];
+            /**
+             * Ledger
+             * @description File from which a restore of an older backup erases these runs again; keep it.
+             */
+            ledger: string;
+        };
+        /**
          * ErrorBody
          * @description The shape of every answer with a status of 400 or above.
          */
@@ -2798,6 +2819,16 @@ export interface components {
         Health: {
             /** Status */
             status: string;
+        };
+        /**
+         * HeldReport
+         * @description A report that was made while the person's data were there.
+         */
+        HeldReport: {
+            /** Report */
+            report: string;
+            /** Finished At */
+            finished_at: string | null;
         };
         /**
          * InTurn
@@ -6237,6 +6268,7 @@ export type DropSlowTrials = components['schemas']['DropSlowTrials'];
 export type EditDefinition = components['schemas']['EditDefinition'];
 export type EditedDefinition = components['schemas']['EditedDefinition'];
 export type Erase = components['schemas']['Erase'];
+export type Erased = components['schemas']['Erased'];
 export type ErrorBody = components['schemas']['ErrorBody'];
 export type ErrorDetail = components['schemas']['ErrorDetail'];
 export type Event = components['schemas']['Event'];
@@ -6258,6 +6290,7 @@ export type Gates = components['schemas']['Gates'];
 export type GroupCount = components['schemas']['GroupCount'];
 export type Groups = components['schemas']['Groups'];
 export type Health = components['schemas']['Health'];
+export type HeldReport = components['schemas']['HeldReport'];
 export type InTurn = components['schemas']['InTurn'];
 export type IncompleteBlocks = components['schemas']['IncompleteBlocks'];
 export type Interaction = components['schemas']['Interaction'];
@@ -9122,11 +9155,13 @@ export interface operations {
         };
         responses: {
             /** @description Successful Response */
-            204: {
+            200: {
                 headers: {
                     [name: string]: unknown;
                 };
-                content?: never;
+                content: {
+                    "application/json": components["schemas"]["Erased"];
+                };
             };
             /** @description The request's content is not acceptable */
             422: {

@@ -25,7 +25,7 @@ def test_a_read_token_sees_no_person(
         answers = [browser.get(f"/api/admin/studies/short/{path}", headers=headers) for path in paths]
         seen[len(scopes)] = [answer.status_code for answer in answers]
         told = "".join(answer.text for answer in answers)
-        assert ("Mustermann" in told) == (len(scopes) == 2)
+        assert "Mustermann" not in told  # a label names a person: the identity is shown by itself, to owners
     assert seen == {1: [200, 200, 403, 403], 2: [200] * 4}
     assert [row["action"] for row in owner.get("/audit").json()].count("personal data read") == 1
 
@@ -40,7 +40,7 @@ def test_nothing_of_an_erased_person_is_left(
     assert owner.send("PUT", f"{run}/exclusion", {"reason": "she has strabismus"}).status_code == 204
     with services.database.read() as session:
         began = str(session.execute(text("SELECT consented_at FROM study_runs")).scalar())[:23]
-    assert owner.send("POST", f"{run}/erase", {"confirm": person.run_id}).status_code == 204
+    assert owner.send("POST", f"{run}/erase", {"confirm": person.run_id}).status_code == 200
     with services.database.read() as session:
         for table in ("study_runs", "links", "audit_entries", "run_events", "form_answers", "trial_ratings"):
             rows = [list(map(str, row)) for row in session.execute(text(f"SELECT * FROM {table}"))]

@@ -26,7 +26,10 @@ export function RunActions({ study, summary }: Props) {
   );
   const erase = useChange(
     (confirm: string) => unwrap(api.POST("/api/admin/studies/{study}/runs/{run}/erase", { ...path, body: { confirm } })),
-    { touches, done: "The person's data are erased." },
+    {
+      touches,
+      done: "The person's data are erased, in every visit known to be theirs. Reports made before still hold them: make those again.",
+    },
   );
   return (
     <Group>

@@ -1,0 +1,79 @@
+"""Erasure on request: of a person's visits to a study, written down so that no restore brings them back."""
+
+import secrets
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.accounts.audit import record
+from server.accounts.identity import Identity
+from server.clock import now
+from server.errors import Conflict, Invalid
+from server.models import AuditEntry, Study, StudyRun
+from server.operations import erasures
+from server.runs import repository
+from server.runs.schemas import Erased, HeldReport
+from server.settings import Settings
+
+
+def erase(
+    session: Session, settings: Settings, study: Study, public_id: str, confirm: str, who: Identity
+) -> Erased:
+    """Delete one person's data for good, in all visits to the study that are known to be hers.
+
+    Rows without content stay, so that counts stay right. The ledger is written before the database is
+    committed: what it names a restore erases, though the commit may have failed.
+    """
+    run = repository.find_run(session, study, public_id)
+    if confirm != public_id:
+        raise Invalid(f"To erase this run, confirm with its identifier {public_id}; got '{confirm}'.")
+    if run.erased_at is not None:
+        raise Conflict("This run's data were erased already.")
+    every = [run, *repository.other_visits(session, run)]
+    reports = [
+        HeldReport(report=public, finished_at=finished)
+        for public, finished in repository.reports(session, study)
+    ]
+    for visit in every:
+        ratings = forget(session, visit)
+        record(session, who, "run erased", "run", visit.public_id, study=study.name, ratings=ratings)
+    session.flush()
+    erased = [visit.public_id for visit in every]
+    erasures.note(settings, erased)
+    return Erased(runs=erased, reports=reports, ledger=str(erasures.ledger(settings)))
+
+
+def replay(session: Session, settings: Settings) -> int:
+    """Erase again what the ledger names and the database holds; return how many runs that were."""
+    erased = 0
+    for public_id in erasures.noted(settings):
+        run = session.scalar(select(StudyRun).where(StudyRun.public_id == public_id))
+        if run is not None and run.erased_at is None:
+            forget(session, run)
+            erased += 1
+    return erased
+
+
+def forget(session: Session, run: StudyRun) -> int:
+    """Delete what a run holds of its person; return how many ratings that were."""
+    ratings = repository.delete_personal_rows(session, run)
+    run.participant, run.device = "erased", {}
+    run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
+    run.completion_code = ""
+    if run.link.kind == "personal":
+        run.link.label = "erased"
+    _forget_in_audit(session, run.public_id)
+    # Nobody can go on with an erased run: its tokens fit nothing any more.
+    run.token_hash, run.client_id = secrets.token_hex(32), secrets.token_hex(16)
+    run.status = "withdrawn" if run.status == "active" else run.status
+    run.erased_at = run.started_at = run.last_seen_at = now()
+    run.consented_at = run.completed_at = run.excluded_at = None
+    return ratings
+
+
+def _forget_in_audit(session: Session, public_id: str) -> None:
+    """Take from the audit log what was written about a person; that something was done stays."""
+    query = select(AuditEntry).where(AuditEntry.target_kind == "run", AuditEntry.target == public_id)
+    for entry in session.scalars(query):
+        if "reason" in entry.details:
+            entry.details = {**entry.details, "reason": "erased"}
