@@ -21,7 +21,7 @@ def counts(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     real = service.results
 
     def noted(*asked: Any) -> Any:
-        done.append(asked[3])
+        done.append(asked[3].origin)
         return real(*asked)
 
     monkeypatch.setattr(service, "results", noted)
