@@ -19,9 +19,10 @@ export function widget({ scale, language, t, meant, choose }: Ask): Widget {
     const onclick = (event: Event): void => {
       if (meant.allows(event)) choose(value, event.timeStamp);
     };
-    const name = t("rating_key", { value, maximum }) + (text ? `, ${text}` : "");
+    // A key that shows its label is named by what it shows.
+    const name = labels.length ? null : t("rating_key", { value, maximum }) + (text ? `, ${text}` : "");
     const attributes = { type: "button", class: "key", "aria-label": name, "aria-pressed": "false", "data-value": value, onclick };
-    return h("button", attributes, value, labels.length ? h("span", { class: "key-label" }, text) : null);
+    return h("button", attributes, labels.length ? `${value} ` : value, labels.length ? h("span", { class: "key-label" }, text) : null);
   });
   const row = h("div", { class: labels.length ? "keys keys-labelled" : "keys" }, ...keys);
   const ends = h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, textOf(0)), h("span", {}, textOf(maximum - minimum)));

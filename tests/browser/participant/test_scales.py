@@ -1,0 +1,75 @@
+"""Several scales on one screen: points, a slider and an answer beside it, by touch on small screens."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.browser.server_process import ServerProcess
+from tests.browser.studies import PLAIN, without
+from tests.browser.visit import Visit, axe_violations
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+SCALES = """\
+[trial]
+pointer_delay_ms = 0
+
+[[trial.scales]]
+name = "natural"
+maximum = 3
+question = { en = "How natural was this blink?" }
+labels = [{ en = "not at all" }, { en = "moderately" }, { en = "very" }]
+
+[[trial.scales]]
+name = "eerie"
+type = "slider"
+question = { en = "How eerie was it?" }
+low = { en = "not at all" }
+high = { en = "extremely" }
+not_applicable = { en = "I cannot say" }
+
+"""
+STUDY = re.sub(
+    r"(?s)\[trial\].*?(?=\[\[forms)", lambda _: SCALES, without(PLAIN, ("trials = 1", "trials = 0"))
+)
+
+
+def at_the_scales(page: Page) -> None:
+    page.wait_for_selector(".ready")
+    page.tap(".below .primary")
+    page.wait_for_selector(".scales")
+
+
+def slider_at(page: Page, share: float) -> tuple[float, float]:
+    box = page.locator(".slider").bounding_box()
+    assert box is not None
+    return box["x"] + share * box["width"], box["y"] + box["height"] / 2
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (720, 450)], ids=["phone", "200% zoom"])
+def test_touch_on_a_small_screen(
+    server: ServerProcess, tmp_path: Path, chromium: Browser, width: int, height: int
+) -> None:
+    study = server.add_study(tmp_path / "clips", STUDY)
+    server.start()
+    context = chromium.new_context(
+        viewport={"width": width, "height": height}, has_touch=True, locale="en-GB"
+    )
+    page = context.new_page()
+    Visit(page, server.address).open(study.link_token).begin().instructions()
+    at_the_scales(page)
+    assert page.locator(".slider.untouched").count() == 1, "a slider has no handle before the first touch"
+    assert axe_violations(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page scrolls sideways"
+    page.locator(".key").nth(1).tap()
+    page.locator(".slider").scroll_into_view_if_needed()
+    page.touchscreen.tap(*slider_at(page, 0.25))
+    page.locator(".scales ~ .actions .primary").tap()
+    page.wait_for_selector(".ready")
+    (row,) = server.rows_soon("SELECT payload FROM trial_ratings", 1)
+    answers = json.loads(row["payload"])["answers"]
+    assert answers["natural"]["response"] == 2
+    assert 15 <= answers["eerie"]["response"] <= 35
+    context.close()
