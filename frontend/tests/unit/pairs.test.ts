@@ -4,7 +4,7 @@ import type { TrialInfo } from "../../src/api/schema";
 import { composition, drawFrame, framesOf } from "../../src/participant/playback/compose";
 import type { DecodedClip } from "../../src/participant/playback/decode";
 import { winnerOf } from "../../src/participant/trials/paired_comparison/answer-keys";
-import { clipsOf, seenClips } from "../../src/participant/trials/paired_comparison/body";
+import { clipsOf, seenClips } from "../../src/participant/trials/shared/roles";
 import { layoutOf, roomNeeded } from "../../src/participant/trials/paired_comparison/layout";
 
 const BESIDE = { arrangement: "side_by_side", gap_mm: 10, if_too_narrow: "stack" } as const;

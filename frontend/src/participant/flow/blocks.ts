@@ -73,7 +73,9 @@ function fetchAhead(session: Session, trials: TrialInfo[], next: number | null):
 function trialNodes(session: Session, trials: TrialInfo[]): Node[] {
   return trials.flatMap((one, place) => {
     const next = trials[place + 1] ?? null;
-    return [...checks(session), trialNode(session, one.kind, () => ({ trial: one, play: 1, next }))];
+    const node = trialNode(session, one.kind, () => ({ trial: one, play: 1, next }));
+    // An adaptive series may have ended before this trial has its turn.
+    return [{ timeline: [...checks(session), node], conditional_function: () => !one.answered }];
   });
 }
 

@@ -4,6 +4,7 @@
  */
 import type { CalibrationState, LinkState, Receipt, RunStarted, RunState, TrialInfo } from "../../api/schema";
 import type { RatingBody } from "../trials/rating";
+import { applyNext, nextOf } from "../trials/shared/next-trials";
 import type { OutboxItem } from "../outbox/store";
 
 export interface Kept {
@@ -74,6 +75,8 @@ export function applyWrite(run: RunState, { path, body }: Pick<Write, "path" | "
 }
 
 function applyRating(run: RunState, body: RatingBody, answer: unknown): void {
+  const next = nextOf(answer);
+  if (next) applyNext(run.trials, next);
   const trial = run.trials.find((one) => one.trial_index === body.trial_index);
   if (!trial) return;
   const again = (answer as { receipt?: Receipt } | null)?.receipt?.again === true;

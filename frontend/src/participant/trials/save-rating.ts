@@ -2,7 +2,10 @@
 import type { TrialInfo } from "../../api/schema";
 import { evidenceFor } from "../evidence/evidence";
 import type { RatingBody } from "./rating";
+import type { Outcome } from "../outbox/outbox";
+import { sourcesOf } from "../screens/preload";
 import { receiptOf, type Session } from "../session";
+import { applyNext, nextOf } from "./shared/next-trials";
 
 /** Resolves when the rating is on disk; where nothing is kept there, when the server has it. */
 export async function saveRating(session: Session, trial: TrialInfo, body: RatingBody): Promise<void> {
@@ -15,8 +18,16 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
   const shift_ms = session.clock.shift();
   if (shift_ms !== 0) session.events.add("clock_changed", { shift_ms });
   const handled = receipt.then((outcome) => {
+    takeNext(session, outcome);
     if (receiptOf(outcome)?.again) session.replays.add(trial, body.play + 1);
     if (!outcome.accepted && outcome.refused.code === "rating_differs") session.root.dispatchEvent(new CustomEvent("taken-over"));
   });
   if (!session.outbox.durable) await handled;
+}
+
+/** Where answers decide what is shown: the trials chosen anew, and their clips fetched before their turn. */
+function takeNext(session: Session, outcome: Outcome): void {
+  const next = outcome.accepted ? nextOf(outcome.body) : null;
+  if (!next) return;
+  void session.clips.load(sourcesOf(applyNext(session.run.trials, next)));
 }

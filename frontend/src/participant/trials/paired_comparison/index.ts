@@ -4,7 +4,7 @@ import { placeIn } from "../shared/place";
 import type { TrialKind } from "../kind";
 import { pairCheck } from "./attention-check";
 import { comparison } from "./screen";
-import "./style.css";
+import "../shared/answers.css";
 
 export const kind: TrialKind = {
   node: (session, what) =>

@@ -7,7 +7,7 @@ import { sourcesOf } from "../../screens/preload";
 import type { Session } from "../../session";
 import { showOnce } from "../shared/showing";
 import type { Stage } from "../shared/stage";
-import type { RolesShown } from "./body";
+import type { RolesShown } from "../shared/roles";
 import { declaredPairs } from "./declared";
 import type { Layout, Place } from "./layout";
 

@@ -14,13 +14,14 @@ import type { Stage } from "../shared/stage";
 import type { RatingBody } from "../rating";
 import { saveRating } from "../save-rating";
 import { askWinner, type Compared } from "./answers";
-import { clipsOf, comparisonBody, type RolesShown } from "./body";
+import { clipsOf, type RolesShown } from "../shared/roles";
+import { comparisonBody } from "./body";
 import { declaredPairs } from "./declared";
 import type { Arrangement } from "./layout";
 import { preparePair, releasePair, showAll } from "./pair-player";
 import { stageFor } from "./pair-stage";
 import { simulatedComparison } from "./simulate";
-import { beginView } from "./view-log";
+import { beginView } from "../shared/view-log";
 
 export interface ComparisonParameters {
   trial: TrialInfo;
@@ -140,7 +141,7 @@ function actTrial(display: HTMLElement): void {
   const timer = setInterval(() => {
     if (!own?.isConnected) return clearInterval(timer);
     const press =
-      display.querySelector<HTMLButtonElement>(".pair-answer[data-winner=right]") ?? display.querySelector<HTMLButtonElement>(".primary");
+      display.querySelector<HTMLButtonElement>(".pair-answer[data-answer=right]") ?? display.querySelector<HTMLButtonElement>(".primary");
     press?.click();
   }, 250);
 }

@@ -1,7 +1,7 @@
 /** Says that a view begins, so that it is known though the page dies, and again when it has ended. */
 import type { TrialInfo } from "../../../api/schema";
 import type { Session } from "../../session";
-import { seenClips, type RolesShown } from "./body";
+import { seenClips, type RolesShown } from "./roles";
 
 export async function beginView(session: Session, trial: TrialInfo, number: number): Promise<(shown: RolesShown[]) => Promise<void>> {
   const view = {

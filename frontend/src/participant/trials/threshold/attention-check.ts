@@ -1,0 +1,55 @@
+/** An instructed answer between trials: the same buttons without clips. */
+import type { TrialInfo } from "../../../api/schema";
+import { h } from "../../../ui/element";
+import { markdown } from "../../../ui/markdown";
+import { focusHeading } from "../../../ui/page";
+import { OBJECT, plugin, STRING, type PluginClass } from "../../jspsych";
+import { absoluteNow } from "../../playback/protocol";
+import { playbackRecord } from "../../playback/record";
+import type { Session } from "../../session";
+import { saveRating } from "../save-rating";
+import { askResponse, type Response } from "./answers";
+import { thresholdBody } from "./body";
+import { declaredThreshold } from "./declared";
+
+interface Parameters {
+  trial: TrialInfo;
+}
+interface Data {
+  chosen: string;
+}
+
+export function thresholdCheck(session: Session): PluginClass<Parameters> {
+  return plugin<Parameters, Data>({
+    name: "threshold-check",
+    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
+    data: { chosen: { type: STRING, description: "the answer given" } },
+    show: (display, { trial }) => check(session, display, trial),
+    async simulate({ trial }) {
+      const asked = Number(/\*\*(\d)\*\*/.exec(trial.prompt ?? "")?.[1] ?? "1");
+      const chosen = declaredThreshold(session).answers[asked === 2 ? 1 : 0].response;
+      await store(session, trial, chosen, 0);
+      return { chosen };
+    },
+    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
+  });
+}
+
+async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<Data> {
+  const below = h("div", { class: "below" });
+  const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
+  display.replaceChildren(section);
+  const title = h("h1", { class: "eyebrow" }, session.t("attention_title"));
+  const question = h("div", { class: "question" }, title, ...markdown(trial.prompt ?? ""));
+  const shown_at_ms = absoluteNow();
+  const answer = askResponse(session, below, question);
+  focusHeading(section);
+  const { name, answered_at_ms } = await answer;
+  await store(session, trial, name, Math.round((answered_at_ms - shown_at_ms) * 100) / 100);
+  return { chosen: name };
+}
+
+function store(session: Session, trial: TrialInfo, chosen: Response, rt: number): Promise<void> {
+  const given = { chosen, rt, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
+  return saveRating(session, trial, thresholdBody(trial, 1, given, playbackRecord(null, [], session.screen.record())));
+}
