@@ -3,7 +3,7 @@ import { h, uniqueId } from "../../../ui/element";
 import { listenKeys } from "../../../ui/keys";
 import { MeantPress } from "../../../ui/meant-press";
 
-export interface Choice<Name extends string> {
+interface Choice<Name extends string> {
   name: Name;
   number: number;
   label: string;
