@@ -34,7 +34,8 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "correct",
         "boolean",
-        "True where the clip named is that of the stimulus; empty with yes and no.",
+        "The answer as analyses take it: 1 where it was yes, or named the stimulus; empty where it does not "
+        "count.",
         source="w",
     ),
     Column("expected_response", "integer", "The answer asked for in an attention check: 1 or 2.", source="a"),

@@ -229,7 +229,7 @@ def take(
         "version_clip_id": clip,
         "value": _value(loaded, clip),
         "positive": right,
-        "correct": right if two else None,
+        "correct": right if counts else None,
         "counts": counts,
         "number": before + 1 if counts else None,
         "known": known,

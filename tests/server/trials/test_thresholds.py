@@ -80,7 +80,7 @@ def test_an_answer_chooses_the_next_trials_of_its_series(observer: Participant, 
     assert all(again[trial["trial_index"]] == trial for trial in mine)
     assert again[other["trial_index"]] == other
     (row,) = rows_of(services)
-    assert (row["response"], row["correct"], row["ahead"], row["known"]) == ("yes", None, 0, 0)
+    assert (row["response"], row["correct"], row["ahead"], row["known"]) == ("yes", 1, 0, 0)
     assert row["value"] == float(row["cell"].split("/")[0])
     assert row["threshold"] is not None
     assert row["threshold_sd"] > 0
