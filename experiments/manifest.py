@@ -12,7 +12,8 @@ from experiments.errors import InputError
 
 MANIFEST_NAME = "manifest.json"
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
-FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,150}$")]
+FileName = Annotated[str, StringConstraints(pattern=r"^\w[^/\\\x00-\x1f\x7f]{0,150}$")]
+"""A file's own name, in any script: a letter or digit first, no slash, at most 151 characters."""
 
 
 class Clip(Declaration):

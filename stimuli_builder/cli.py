@@ -61,6 +61,10 @@ COMMANDS = {
         "stimuli_builder.clips.cli",
         "Render one clip from a blink profile and a character.",
     ),
+    "manifest": (
+        "stimuli_builder.clips.cli",
+        "Write manifest.json for a folder of clips of your own, so that a server can take them.",
+    ),
     "strips": (
         "stimuli_builder.clips.cli",
         "Write the shipped characters at 33 closures as picture strips, for the dashboard's blinks page.",

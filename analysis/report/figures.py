@@ -3,7 +3,7 @@ every participant visible behind them. The same data give the same bytes."""
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -17,6 +17,9 @@ from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure
 from analysis.within.marginal_means import level_combinations, margin
 from experiments.error_bars import within_participant_errors
 from experiments.trials.scales import scale_called
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
 
 Floats = NDArray[np.float64]
 
@@ -155,10 +158,20 @@ def _jitter(n: int) -> Floats:
     return spread
 
 
+def _asked(experiment: "Experiment") -> str:
+    """What the axis of ratings is called: the ends of the scale as participants read them."""
+    scale, language = clip_rating_of(experiment).scale, experiment.languages[0]
+    ends = [
+        f"{n} {words.get(language, '')}".strip()
+        for n, words in ((scale.minimum, scale.low), (scale.maximum, scale.high))
+    ]
+    return f"Rating ({ends[0]} – {ends[1]})"
+
+
 def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_title(spec.title, fontsize=10, loc="left")
     axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
-    axes.set_ylabel("Naturalness rating" if analysis.experiment else analysis.rating)
+    axes.set_ylabel(_asked(analysis.experiment) if analysis.experiment else analysis.rating)
     if analysis.experiment is not None:
         scale = scale_called(analysis.experiment)
         margin = (scale.maximum - scale.minimum) / 30

@@ -1,120 +1,18 @@
-"""A study from somebody's own clips: levels from a table or from file names, then definition and manifest."""
+"""A study from somebody's own clips: definition and manifest."""
 
-import csv
-import io
 import re
-from collections import Counter, defaultdict
-from collections.abc import Iterable
 from pathlib import Path
 
 import tomlkit
 
+from experiments import design
 from experiments.definition import Experiment
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError
 from experiments.manifest import Clip, Manifest, file_sha256
+from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
-from experiments.trials import reserved_names
 from server.studies.probe import NotAFilm, probe
 from server.studies.schemas import OwnClips
-from server.studies.uploads import plain_name
-
-Placed = dict[str, tuple[dict[str, str], int]]
-"""File name -> (levels by factor, exemplar)."""
-_FIELD = re.compile(r"\{([A-Za-z][A-Za-z0-9_]*)\}")
-
-
-def levels_from_table(text: str, files: Iterable[str]) -> Placed:
-    """Read levels from CSV text; each clip needs one row, each row a clip, every level a value."""
-    reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")), delimiter=_delimiter(text))
-    columns = [name for name in (reader.fieldnames or []) if name]
-    if "file" not in columns or len(columns) < 2:
-        raise InputError(
-            f"expected a CSV with a column 'file' and one a factor, got {', '.join(columns) or 'none'}"
-        )
-    factors = [name for name in columns if name not in ("file", "exemplar")]
-    known, rows = set(files), {}
-    for number, row in enumerate(reader, start=2):
-        name = plain_name((row["file"] or "").strip())
-        if name not in known:
-            raise InputError(
-                f"line {number} of the table: no clip is called '{name}'{did_you_mean(name, known)}"
-            )
-        if name in rows:
-            raise InputError(f"line {number} of the table: '{name}' stands there twice")
-        levels = {factor: (row[factor] or "").strip() for factor in factors}
-        if empty := [factor for factor, level in levels.items() if not level]:
-            raise InputError(f"line {number} of the table: '{name}' has no level of '{empty[0]}'")
-        rows[name] = (levels, (row.get("exemplar") or "").strip())
-    if missing := sorted(known - set(rows)):
-        raise InputError(f"{len(missing)} clips have no row in the table, the first is '{missing[0]}'")
-    return _numbered(rows)
-
-
-def _delimiter(text: str) -> str:
-    first = text.partition("\n")[0]
-    return max(",;\t", key=first.count)
-
-
-def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
-    """Read levels from file names by a pattern such as `{character}_{speed}_{exemplar}.mp4`."""
-    fields = _FIELD.findall(pattern)
-    if not [name for name in fields if name != "exemplar"] or len(set(fields)) != len(fields):
-        raise InputError(
-            "expected a pattern with factors in braces, each once, such as {character}_{exemplar}.mp4"
-        )
-    escaped = re.escape(pattern)
-    for name in fields:
-        escaped = escaped.replace(re.escape("{" + name + "}"), f"(?P<{name}>[^/]+?)", 1)
-    matcher = re.compile(escaped)
-    rows = {}
-    for name in files:
-        found = matcher.fullmatch(name)
-        if found is None:
-            raise InputError(f"the file name '{name}' does not follow the pattern {pattern}")
-        levels = {field: found[field] for field in fields if field != "exemplar"}
-        rows[name] = (levels, found["exemplar"] if "exemplar" in fields else "")
-    return _numbered(rows)
-
-
-def _numbered(rows: dict[str, tuple[dict[str, str], str]]) -> Placed:
-    """Number exemplars from 1 within each cell: in the order of their marks, or of file names without any."""
-    cells: dict[tuple[str, ...], list[tuple[tuple[int, str], str]]] = defaultdict(list)
-    for name, (levels, mark) in rows.items():
-        order = (int(mark) if mark.isdigit() else 0, mark or name)
-        cells[tuple(levels.values())].append((order, name))
-    placed: Placed = {}
-    for members in cells.values():
-        for number, (_, name) in enumerate(sorted(members), start=1):
-            placed[name] = (rows[name][0], number)
-    return placed
-
-
-def check_factorial(placed: Placed) -> None:
-    """InputError unless every combination of levels has the same number of clips."""
-    if not placed:
-        raise InputError("expected at least one clip, got none")
-    counts = Counter(tuple(levels.values()) for levels, _ in placed.values())
-    levels_of = _levels(placed)
-    wanted = 1
-    for levels in levels_of.values():
-        wanted *= len(levels)
-    if len(counts) != wanted:
-        raise InputError(f"expected clips in all {wanted} cells of the design, got {len(counts)} of them")
-    most, fewest = counts.most_common()[0], counts.most_common()[-1]
-    if most[1] != fewest[1]:
-        raise InputError(
-            f"every cell needs the same number of clips: {'/'.join(most[0])} has {most[1]}, "
-            f"{'/'.join(fewest[0])} has {fewest[1]}"
-        )
-    if reserved := [name for name in levels_of if name in reserved_names()]:
-        raise InputError(
-            f"a factor cannot be called '{reserved[0]}', the name of a ratings column; rename it"
-        )
-
-
-def _levels(placed: Placed) -> dict[str, list[str]]:
-    names = next(iter(placed.values()))[0]
-    return {name: sorted({levels[name] for levels, _ in placed.values()}) for name in names}
 
 
 def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
@@ -127,7 +25,7 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
     )
     document.add("title", tomlkit.item(asked.title))
     factors = tomlkit.aot()
-    for factor, levels in _levels(placed).items():
+    for factor, levels in levels_of(placed).items():
         table = tomlkit.table()
         table.add("name", factor)
         table.add("label", factor.replace("_", " ").capitalize())
@@ -154,6 +52,31 @@ def _texts(asked: OwnClips) -> dict[str, str]:
         f"Then answer: *{asked.question}*\n",
         "debrief": "# Thank you\n\nYour answers are stored.\n",
     }
+
+
+def merged_manifest(known: Manifest, added: Manifest) -> Manifest:
+    """`known` with the clips of `added`: those of a cell and exemplar known already take its place."""
+    clips = {(clip.cell, clip.exemplar): clip for clip in known.clips}
+    clips |= {(clip.cell, clip.exemplar): clip for clip in added.clips}
+    return known.model_copy(update={"clips": tuple(clips.values())})
+
+
+def check_declared(added: Manifest, experiment: Experiment) -> None:
+    """InputError for the first of these clips that has no place in the design."""
+    declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
+    stray = next((clip for clip in added.clips if (clip.cell, clip.exemplar) not in declared), None)
+    if stray is not None:
+        raise InputError(
+            f"'{stray.file}' is exemplar {stray.exemplar} of the cell {stray.cell}, which the definition "
+            "does not declare; add its level, or more clips a cell, in the builder: both are saved together"
+        )
+
+
+def only_declared(manifest: Manifest, experiment: Experiment) -> Manifest:
+    """`manifest` without clips of cells and exemplars that the definition does not declare."""
+    declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
+    kept = tuple(clip for clip in manifest.clips if (clip.cell, clip.exemplar) in declared)
+    return manifest.model_copy(update={"clips": kept}) if kept else manifest
 
 
 def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifest:

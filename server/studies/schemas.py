@@ -144,6 +144,8 @@ class NewVersion(_In):
     revision: Revision
     toml: TomlText
     note: Label = ""
+    upload: str | None = Field(default=None, description="Clips to add, or to put in the place of others.")
+    levels: LevelsTable | LevelsPattern | None = None
 
 
 class ChangeStatus(_In):

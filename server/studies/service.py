@@ -13,6 +13,7 @@ from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
+from experiments.own_clips import Placed, check_factorial, levels_from_names, levels_from_table
 from experiments.schema.stored import load_stored
 from experiments.trials import KINDS
 from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
@@ -35,6 +36,7 @@ from server.studies.schemas import (
     FactorOut,
     JudgedEdit,
     LevelOut,
+    LevelsPattern,
     LevelsTable,
     NewStudy,
     NewVersion,
@@ -167,14 +169,8 @@ def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, M
 
 
 def _own(wanted: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path]:
-    files = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in FILMS)
-    if wanted.levels is None:
-        raise Invalid("Say which levels each clip has: by a CSV table or a file-name pattern.")
-    if isinstance(wanted.levels, LevelsTable):
-        placed = own_clips.levels_from_table(wanted.levels.csv, files)
-    else:
-        placed = own_clips.levels_from_names(wanted.levels.pattern, files)
-    own_clips.check_factorial(placed)
+    placed = _placed(wanted.levels, folder)
+    check_factorial(placed)
     if wanted.toml is None and wanted.own_clips is None:
         raise Invalid("Give the study a title and a question, or a definition.")
     text = wanted.toml
@@ -182,6 +178,15 @@ def _own(wanted: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Pat
         text = own_clips.definition_text(wanted.name, placed, wanted.own_clips)
     experiment = parse_experiment(text or "")
     return text or "", experiment, own_clips.manifest_of(experiment, placed, folder), folder
+
+
+def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
+    files = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in FILMS)
+    if levels is None:
+        raise Invalid("Say which levels each clip has: by a CSV table or a file-name pattern.")
+    if isinstance(levels, LevelsTable):
+        return levels_from_table(levels.csv, files)
+    return levels_from_names(levels.pattern, files)
 
 
 def _for_edit(session: Session, name: str, revision: int) -> Study:
@@ -196,12 +201,30 @@ def _for_edit(session: Session, name: str, revision: int) -> Study:
 
 
 def add_definition(services: Services, name: str, wanted: NewVersion, who: Identity) -> None:
-    """Store a changed definition as a new version with the same clips."""
+    """Store a changed definition as a new version, with the clips there are and those of an upload."""
     experiment = parse_experiment(wanted.toml)
+    added = _added_clips(services, wanted, experiment)
     with services.database.write() as session:
         study = _for_edit(session, name, wanted.revision)
         manifest = Manifest.model_validate(active_version(session, study).manifest)
+        if added is not None:
+            own_clips.check_declared(added, experiment)
+            manifest = own_clips.merged_manifest(manifest, added)
+        manifest = own_clips.only_declared(manifest, experiment)
         add_version(session, study, wanted.toml, experiment, manifest, who, wanted.note)
+
+
+def _added_clips(services: Services, wanted: NewVersion, experiment: Experiment) -> Manifest | None:
+    """The manifest of uploaded clips, their bytes in the store; None where none were uploaded."""
+    if wanted.upload is None:
+        return None
+    folder = upload_folder(services.settings.upload_folder, wanted.upload)
+    if (folder / MANIFEST_NAME).is_file():
+        manifest = read_manifest(folder)
+    else:
+        manifest = own_clips.manifest_of(experiment, _placed(wanted.levels, folder), folder)
+    store_clips(services.clips, manifest, folder)
+    return manifest
 
 
 def change_status(session: Session, name: str, revision: int, status: str, who: Identity) -> None:

@@ -5,12 +5,12 @@ import secrets
 import shutil
 import time
 import zipfile
-from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 from typing import IO
 
 from experiments.files import whole_file
 from experiments.manifest import MANIFEST_NAME, file_sha256
+from experiments.own_clips import check_names, one_form, suggest_pattern
 from server.errors import ApiError, Invalid, NotFound
 from server.studies.probe import NotAFilm, probe
 from server.studies.schemas import UploadedFile, UploadOut
@@ -22,6 +22,7 @@ MAX_RATIO = 200
 FILMS = (".mp4", ".m4v", ".mov", ".webm")
 TABLES = (".csv", ".json")
 CHUNK_BYTES = 1 << 20
+NAME = re.compile(r"\w[^\x00-\x1f\x7f]*")
 
 
 class UploadTooLarge(ApiError):
@@ -69,7 +70,10 @@ def receive(place: Path, name: str, source: IO[bytes], limit: int) -> None:
         finally:
             packed.unlink(missing_ok=True)
     else:
-        _copy(source, place / safe_name(name), limit)
+        target = place / safe_name(name)
+        if target.exists():
+            raise Invalid(f"'{target.name}' came more than once; file names must differ.")
+        _copy(source, target, limit)
 
 
 def safe_name(path: str) -> str:
@@ -81,12 +85,10 @@ def safe_name(path: str) -> str:
         raise Invalid(f"The file '{pure.name[:100]}' is neither a film ({', '.join(FILMS)}) nor a CSV table.")
     if len(pure.name) > 150:
         raise Invalid(f"The file name '{pure.name[:100]}...' is too long; 150 characters are the most.")
-    return plain_name(pure.name)
-
-
-def plain_name(name: str) -> str:
-    """A file name as it is kept: whatever is neither letter, digit, dot, minus nor underscore becomes `_`."""
-    return re.sub(r"[^A-Za-z0-9._-]", "_", name)
+    name = one_form(pure.name)
+    if not NAME.fullmatch(name):
+        raise Invalid(f"The file name '{name[:100]}' should begin with a letter or digit; rename the file.")
+    return name
 
 
 def unpack(packed: Path, place: Path) -> None:
@@ -120,6 +122,7 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
     names = [safe_name(member.filename) for member in members]
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise Invalid(f"The zip holds '{repeated[0]}' more than once; file names must differ.")
+    check_names(names)
 
 
 def _copy(source: IO[bytes], target: Path, limit: int) -> None:
@@ -136,6 +139,7 @@ def describe(identifier: str, place: Path) -> UploadOut:
     """Probe every film of an upload."""
     paths = sorted(path for path in place.iterdir() if path.is_file() and not path.name.startswith("."))
     films = [path for path in paths if path.suffix.lower() in FILMS]
+    check_names(path.name for path in films)
     return UploadOut(
         id=identifier,
         files=[_described(path) for path in films],
@@ -152,15 +156,3 @@ def _described(path: Path) -> UploadedFile:
     except NotAFilm as error:
         return UploadedFile.model_validate(shared | {"problem": str(error)})
     return UploadedFile.model_validate(shared | vars(film))
-
-
-def suggest_pattern(names: Iterable[str]) -> str | None:
-    """A pattern where every name has the same number of parts between underscores."""
-    stems = [PurePosixPath(name).stem.split("_") for name in names]
-    if not stems or len({len(parts) for parts in stems}) != 1 or len(stems[0]) < 2:
-        return None
-    columns = list(zip(*stems, strict=True))
-    words = [f"factor{place}" for place in range(1, len(columns) + 1)]
-    if all(part.isdigit() for part in columns[-1]):
-        words[-1] = "exemplar"
-    return "_".join("{" + word + "}" for word in words) + ".mp4"

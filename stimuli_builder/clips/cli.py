@@ -1,4 +1,4 @@
-"""`stimuli plan`, `stimuli build`, `stimuli clip` and `stimuli verify`."""
+"""`stimuli plan`, `stimuli build` and `stimuli verify`; other commands have files of their own."""
 
 import json
 import sys
@@ -58,11 +58,13 @@ Examples:
 def register(app: typer.Typer) -> None:
     """Add the commands of the clip builder to `app`."""
     from stimuli_builder.clips.cli_clip import CLIP_HELP, clip_command
+    from stimuli_builder.clips.cli_manifest import MANIFEST_HELP, manifest_command
     from stimuli_builder.clips.cli_strips import STRIPS_HELP, strips_command
 
     app.command("plan", help=PLAN_HELP)(plan_command)
     app.command("build", help=BUILD_HELP)(build_command)
     app.command("clip", help=CLIP_HELP)(clip_command)
+    app.command("manifest", help=MANIFEST_HELP)(manifest_command)
     app.command("strips", help=STRIPS_HELP)(strips_command)
     app.command("verify", help=VERIFY_HELP)(verify_command)
 

@@ -47,9 +47,26 @@ def planned_clips(experiment: Experiment, options: Options) -> list[PlannedClip]
     Raises
     ------
     InputError
-        A cell asks for something its character or profile cannot give; the line names the cell.
+        A cell asks for something its character or profile cannot give; the line names the cell. Or two
+        levels would give the same clips.
     """
+    check_levels(experiment)
     return list(_planned(experiment, options))
+
+
+def check_levels(experiment: Experiment) -> None:
+    """InputError where two levels of a factor render alike: their clips would be the same blinks."""
+    for factor in experiment.factors:
+        if factor.name in experiment.exemplars.own_per:
+            continue
+        for number, level in enumerate(factor.levels):
+            for other in factor.levels[:number]:
+                if other.render == level.render:
+                    raise InputError(
+                        f"factor '{factor.name}': '{other.name}' and '{level.name}' change nothing "
+                        "of the rendering, so their clips would be the same; give them `render`, or write "
+                        "the manifest of clips of your own with `stimuli manifest`"
+                    )
 
 
 def _planned(experiment: Experiment, options: Options) -> Iterator[PlannedClip]:

@@ -3601,6 +3601,13 @@ export interface components {
              * @default
              */
             note?: string;
+            /**
+             * Upload
+             * @description Clips to add, or to put in the place of others.
+             */
+            upload?: string | null;
+            /** Levels */
+            levels?: components["schemas"]["LevelsTable"] | components["schemas"]["LevelsPattern"] | null;
         };
         /**
          * NextTrials

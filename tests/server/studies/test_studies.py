@@ -1,9 +1,11 @@
 import io
+import re
 import tomllib
 import zipfile
 from pathlib import Path
 from typing import Any
 
+import av
 import pytest
 
 from experiments.load import parse_experiment
@@ -31,6 +33,7 @@ def films(*names: str) -> dict[str, bytes]:
     return {name: video + (len(name) + 8).to_bytes(4, "big") + b"free" + name.encode() for name in names}
 
 
+PATTERN = "{speed}_{mood}_{exemplar}.mp4"
 OWN = ("fast_happy_1.mp4", "fast_happy_2.mp4", "fast_sad_1.mp4", "fast_sad_2.mp4",
        "slow_happy_1.mp4", "slow_happy_2.mp4", "slow_sad_1.mp4", "slow_sad_2.mp4")  # fmt: skip
 
@@ -48,6 +51,119 @@ def test_own_clips_become_a_study_by_a_file_name_pattern(experimenter: Admin) ->
     design = made.json()["design"]
     assert (design["cells"], design["unique_clips"], design["trials_per_participant"]) == (4, 8, 8)
     assert made.json()["summary"]["status"] == "draft"
+
+
+OTHER_SCRIPTS = ["Ärm_x.mp4", "Örm_x.mp4", "腕, links_x.mp4"]
+
+
+def test_names_in_any_script_stay_whole(experimenter: Admin) -> None:
+    found = upload(experimenter, "clips.zip", zipped(films(*OTHER_SCRIPTS))).json()
+    assert sorted(file["name"] for file in found["files"]) == OTHER_SCRIPTS
+    levels = {"pattern": "{arm}_x.mp4"}
+    body = {"name": "arms", "upload": found["id"], "levels": levels, "own_clips": {"title": "A"}}
+    made = experimenter.send("POST", "/studies", body)
+    assert made.status_code == 201, made.text
+    clips = experimenter.get("/studies/arms/clips").json()
+    assert {clip["file"] for clip in clips} == set(OTHER_SCRIPTS)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("Arm_x.mp4", "arm_x.mp4"), (f"{chr(0xC4)}rm_x.mp4", f"A{chr(0x308)}rm_x.mp4")],
+    ids=["case", "accent"],
+)
+def test_names_that_are_one_on_some_systems_are_refused(experimenter: Admin, names: tuple[str, str]) -> None:
+    answer = upload(experimenter, "clips.zip", zipped(films(*names)))
+    assert answer.status_code == 422
+    assert re.search("one name on some systems|more than once", answer.json()["error"]["message"])
+
+
+def test_one_name_twice_is_refused_also_without_a_zip(experimenter: Admin) -> None:
+    files = [("files", ("a_x.mp4", b"1")), ("files", ("a_x.mp4", b"2"))]
+    answer = experimenter.client.post("/api/admin/uploads", files=files)
+    assert (answer.status_code, "more than once" in answer.json()["error"]["message"]) == (422, True)
+
+
+def test_a_webm_is_refused_with_the_way_to_convert_it(experimenter: Admin) -> None:
+    found = upload(experimenter, "a_1.webm", webm()).json()
+    assert re.search("vp9.*expected .*H.264.*ffmpeg", found["files"][0]["problem"])
+
+
+def webm() -> bytes:
+    stream = io.BytesIO()
+    with av.open(stream, "w", format="webm") as container:
+        track = container.add_stream("libvpx-vp9", rate=30)
+        track.width, track.height, track.pix_fmt = 64, 64, "yuv420p"
+        for _ in range(3):
+            container.mux(track.encode(av.VideoFrame(64, 64, "yuv420p")))
+        container.mux(track.encode())
+    return stream.getvalue()
+
+
+def test_levels_that_are_numbers_stand_in_their_order(experimenter: Admin) -> None:
+    names = [f"{speed}_{n}.mp4" for speed in ("10", "2", "n1.5") for n in (1, 2)]
+    table = "file,speed\n" + "\n".join(f"{name},{name.split('_')[0].replace('n', '-')}" for name in names)
+    found = upload(experimenter, "clips.zip", zipped(films(*names))).json()
+    body = {"name": "fast", "upload": found["id"], "levels": {"csv": table}, "own_clips": {"title": "A"}}
+    made = experimenter.send("POST", "/studies", body).json()
+    assert [level["name"] for level in made["design"]["factors"][0]["levels"]] == ["-1.5", "2", "10"]
+
+
+def own_study(experimenter: Admin) -> dict[str, Any]:
+    found = upload(experimenter, "clips.zip", zipped(films(*OWN))).json()
+    body = {
+        "name": "faces",
+        "upload": found["id"],
+        "levels": {"pattern": PATTERN},
+        "own_clips": {"title": "F"},
+    }
+    made = experimenter.send("POST", "/studies", body)
+    assert made.status_code == 201, made.text
+    return dict(made.json())
+
+
+def test_a_version_takes_further_clips_and_others_in_their_place(experimenter: Admin) -> None:
+    made = own_study(experimenter)
+    before = {clip["file"]: clip["clip_sha256"] for clip in experimenter.get("/studies/faces/clips").json()}
+    others = {
+        "calm_happy_1.mp4": 5,
+        "calm_happy_2.mp4": 6,
+        "calm_sad_1.mp4": 7,
+        "calm_sad_2.mp4": 8,
+        "fast_sad_1.mp4": 9,
+    }
+    files = {
+        name: encoded_video(4, 30) + bytes([0, 0, 0, 9]) + b"free" + bytes([mark])
+        for name, mark in others.items()
+    }
+    found = upload(experimenter, "more.zip", zipped(files)).json()
+    data = tomllib.loads(made["toml"])
+    data["factors"][0]["levels"].append({"name": "calm", "label": "calm"})
+    toml = experimenter.send("POST", "/definitions/edit", {"toml": made["toml"], "data": data}).json()["toml"]
+    body = {"revision": made["summary"]["revision"], "toml": toml}
+    refused = experimenter.send("POST", "/studies/faces/versions", body)
+    assert "4 are missing from the manifest" in refused.json()["error"]["message"]
+    clips = {"upload": found["id"], "levels": {"pattern": PATTERN}}
+    undeclared = experimenter.send("POST", "/studies/faces/versions", body | clips | {"toml": made["toml"]})
+    assert "which the definition does not declare" in undeclared.json()["error"]["message"]
+    saved = experimenter.send("POST", "/studies/faces/versions", body | clips)
+    assert saved.status_code == 201, saved.text
+    after = {clip["file"]: clip["clip_sha256"] for clip in experimenter.get("/studies/faces/clips").json()}
+    assert set(after) == set(OWN) | set(files)
+    assert {name for name in before if before[name] != after[name]} == {"fast_sad_1.mp4"}
+    assert [series["versions"] for series in saved.json()["series"]] == [[1], [2]]
+
+
+def test_a_level_that_is_taken_out_takes_its_clips_along(experimenter: Admin) -> None:
+    made = own_study(experimenter)
+    data = tomllib.loads(made["toml"])
+    del data["factors"][0]["levels"][0]
+    toml = experimenter.send("POST", "/definitions/edit", {"toml": made["toml"], "data": data}).json()["toml"]
+    saved = experimenter.send(
+        "POST", "/studies/faces/versions", {"revision": made["summary"]["revision"], "toml": toml}
+    )
+    assert saved.status_code == 201, saved.text
+    assert len(experimenter.get("/studies/faces/clips").json()) == 4
 
 
 def test_own_clips_become_a_study_by_a_table(experimenter: Admin) -> None:

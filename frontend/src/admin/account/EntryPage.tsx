@@ -1,11 +1,13 @@
 /** The frame of the pages before somebody is signed in: a title, a form, a note. */
 
 import { Button, Container, Paper, Stack, Title } from "@mantine/core";
+import { useDocumentTitle } from "@mantine/hooks";
 import type { UseMutationResult } from "@tanstack/react-query";
 import type { SubmitEvent, ReactNode } from "react";
 import { ErrorAlert } from "../ui/Answer";
 
 export function EntryPage({ title, children }: { title: string; children: ReactNode }) {
+  useDocumentTitle(title === "Palpebra" ? "Sign in – Palpebra" : `${title} – Palpebra`);
   return (
     <Container size={420} py={64} component="main">
       <Title order={1} ta="center" mb="lg">

@@ -15,7 +15,8 @@ export function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: num
     u: uncertain,
     f: flagged,
     x: failed,
-    ".": total((run) => run.trials) - answered,
+    // What was left in runs that are over will not come.
+    ".": total((run) => (run.status === "active" && run.presence !== "dropped" ? run.trials - run.answered : 0)),
   };
   const doubtful = runs.filter((run) => run.answered >= 10 && run.flagged + run.failed > 0.1 * run.answered);
   return (

@@ -8,6 +8,7 @@ import { useEffect, useState } from "react";
 import { sessionQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { AccountMenu } from "./AccountMenu";
+import { usePageTitle } from "./usePageTitle";
 
 const PAGES = [
   { to: "/", label: "Studies", role: "viewer", group: "Rating" },
@@ -32,6 +33,7 @@ export function Shell() {
   const session = useQuery(sessionQuery);
   const [opened, { toggle, close }] = useDisclosure(false);
   const { pathname } = useLocation();
+  usePageTitle(pathname);
   return (
     <Answer of={session}>
       {({ account }) =>

@@ -3,10 +3,11 @@ import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
-import { clipsQuery } from "../queries";
+import { clipsQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
 import { Pages } from "../ui/DataTable";
 import { PlotFigure } from "../ui/PlotFigure";
+import { AddClips } from "./AddClips";
 import { ClipVideo } from "./ClipVideo";
 import { closurePlot } from "./closurePlot";
 
@@ -14,16 +15,18 @@ const A_PAGE = 6;
 
 export function ClipsTab() {
   const { study = "" } = useParams({ strict: false });
-  return <Answer of={useQuery(clipsQuery(study))}>{(clips) => <Clips clips={clips} />}</Answer>;
+  return <Answer of={useQuery(clipsQuery(study))}>{(clips) => <Clips study={study} clips={clips} />}</Answer>;
 }
 
-function Clips({ clips }: { clips: Schemas["ClipOut"][] }) {
+function Clips({ study, clips }: { study: string; clips: Schemas["ClipOut"][] }) {
+  const mayChange = useMay("experimenter");
   const [cell, setCell] = useState<string | null>(null);
   const [page, setPage] = useState(1);
   const cells = useMemo(() => [...new Set(clips.map((clip) => clip.cell))], [clips]);
   const chosen = clips.filter((clip) => cell === null || clip.cell === cell);
   return (
     <Stack>
+      {mayChange && <AddClips study={study} />}
       <Group justify="space-between" align="end">
         <Select
           label="Cell"

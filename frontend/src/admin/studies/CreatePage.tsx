@@ -18,7 +18,7 @@ export function CreatePage() {
         onChange={(event) => setName(event.currentTarget.value)}
         maw={400}
       />
-      <Tabs defaultValue="shipped" keepMounted={false}>
+      <Tabs defaultValue="shipped">
         <Tabs.List className="tabs-line">
           <Tabs.Tab value="shipped">From a shipped experiment</Tabs.Tab>
           <Tabs.Tab value="clips">From your own clips</Tabs.Tab>

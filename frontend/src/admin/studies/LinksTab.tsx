@@ -1,12 +1,14 @@
 import { Button, CopyButton, Group, Stack, Text } from "@mantine/core";
-import { useInfiniteQuery } from "@tanstack/react-query";
+import { useInfiniteQuery, useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { api, type Schemas, unwrap } from "../api";
+import { studyQuery } from "../queries";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
 import { PagedAnswer } from "../ui/PagedAnswer";
 import { useChange } from "../ui/useChange";
 import { NewLinks } from "./NewLinks";
+import { addressFor } from "./recruit";
 
 export function LinksTab() {
   const { study = "" } = useParams({ strict: false });
@@ -17,12 +19,13 @@ export function LinksTab() {
     initialPageParam: null as string | null,
     getNextPageParam: (last) => last.next,
   });
+  const recruiter = useQuery(studyQuery(study)).data?.recruiter ?? null;
   const rows = links.data?.pages.flatMap((page) => page.links) ?? [];
   return (
     <Stack>
       <NewLinks study={study} />
       <PagedAnswer of={links} shown={rows.length} total={links.data?.pages.at(-1)?.total} more="More links">
-        <LinkTable study={study} rows={rows} />
+        <LinkTable study={study} rows={rows} recruiter={recruiter} />
       </PagedAnswer>
       <Button
         component="a"
@@ -37,7 +40,13 @@ export function LinksTab() {
   );
 }
 
-function LinkTable({ study, rows }: { study: string; rows: Schemas["LinkOut"][] }) {
+interface TableProps {
+  study: string;
+  rows: Schemas["LinkOut"][];
+  recruiter: Record<string, unknown> | null;
+}
+
+function LinkTable({ study, rows, recruiter }: TableProps) {
   const revoke = useChange(
     (link: string) => unwrap(api.DELETE("/api/admin/studies/{study}/links/{link}", { params: { path: { study, link } } })),
     { touches: [["links", study]], done: "The link is withdrawn." },
@@ -49,7 +58,10 @@ function LinkTable({ study, rows }: { study: string; rows: Schemas["LinkOut"][] 
       empty="No links yet."
       paged={false}
       columns={[
-        { title: "Link", cell: (row) => <Address url={row.url} /> },
+        {
+          title: "Link",
+          cell: (row) => <Address url={row.kind === "general" ? addressFor(row.url, row.recruiter ?? recruiter) : row.url} />,
+        },
         { title: "For", wrap: true, cell: (row) => row.label || "–" },
         ...(rows.some((row) => row.group_name !== "")
           ? [{ title: "Group", cell: (row: Schemas["LinkOut"]) => row.group_name || "–" }]

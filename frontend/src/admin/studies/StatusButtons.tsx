@@ -1,7 +1,10 @@
 import { Button, Group } from "@mantine/core";
+import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
+import { keptWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
+import { OpenedDialog } from "./OpenedDialog";
 
 type Status = Schemas["StudySummary"]["status"];
 const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draft", "live", "closed"], live: ["closed"], closed: ["live"] };
@@ -13,10 +16,15 @@ const WORDS: Record<Status, [label: string, question: string]> = {
 };
 
 export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
+  const [opened, setOpened] = useState(false);
   const path = { params: { path: { study: summary.name } } };
   const change = useChange(
     (status: Status) => unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
-    { touches: [["study", summary.name], ["studies"]], done: "The status is changed." },
+    {
+      touches: [["study", summary.name], ["studies"]],
+      done: "The status is changed.",
+      then: (detail) => setOpened(detail.summary.status === "live" || detail.summary.status === "pilot"),
+    },
   );
   const preview = useChange(
     () =>
@@ -37,11 +45,12 @@ export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] })
         <ConfirmButton
           key={status}
           label={WORDS[status][0]}
-          question={WORDS[status][1]}
+          question={`${WORDS[status][1]}${keptWork(summary.name) === null ? "" : " The work in the builder is not saved and not part of it."}`}
           confirm={WORDS[status][0]}
           onConfirm={() => change.mutate(status)}
         />
       ))}
+      {opened && <OpenedDialog study={summary.name} onClose={() => setOpened(false)} />}
     </Group>
   );
 }

@@ -1,0 +1,150 @@
+"""Which cell each of somebody's own clips belongs to: by a table of levels, or by a pattern of file names."""
+
+import csv
+import io
+import re
+import unicodedata
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import PurePosixPath
+
+from experiments.errors import InputError, did_you_mean
+from experiments.trials import reserved_names
+
+Placed = dict[str, tuple[dict[str, str], int]]
+"""File name -> (levels by factor, exemplar)."""
+FIRST_FIELD = "exemplar"
+_FIELD = re.compile(r"\{([A-Za-z][A-Za-z0-9_]*)\}")
+
+
+def one_form(name: str) -> str:
+    """A name in the one form of Unicode that equal-looking names share (NFC)."""
+    return unicodedata.normalize("NFC", name)
+
+
+def levels_from_table(text: str, files: Iterable[str]) -> Placed:
+    """Read levels from CSV text; each clip needs one row, each row a clip, every level a value."""
+    reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")), delimiter=_delimiter(text))
+    columns = [name for name in (reader.fieldnames or []) if name]
+    if "file" not in columns or len(columns) < 2:
+        raise InputError(
+            f"expected a CSV with a column 'file' and one a factor, got {', '.join(columns) or 'none'}"
+        )
+    factors = [name for name in columns if name not in ("file", FIRST_FIELD)]
+    known, rows = set(files), {}
+    for number, row in enumerate(reader, start=2):
+        name = one_form((row["file"] or "").strip())
+        if name not in known:
+            raise InputError(
+                f"line {number} of the table: no clip is called '{name}'{did_you_mean(name, known)}"
+            )
+        if name in rows:
+            raise InputError(f"line {number} of the table: '{name}' stands there twice")
+        levels = {factor: (row[factor] or "").strip() for factor in factors}
+        if empty := [factor for factor, level in levels.items() if not level]:
+            raise InputError(f"line {number} of the table: '{name}' has no level of '{empty[0]}'")
+        rows[name] = (levels, (row.get(FIRST_FIELD) or "").strip())
+    if missing := sorted(known - set(rows)):
+        raise InputError(f"{len(missing)} clips have no row in the table, the first is '{missing[0]}'")
+    return _numbered(rows)
+
+
+def _delimiter(text: str) -> str:
+    first = text.partition("\n")[0]
+    return max(",;\t", key=first.count)
+
+
+def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
+    """Read levels from file names by a pattern such as `{character}_{speed}_{exemplar}.mp4`."""
+    fields = _FIELD.findall(pattern)
+    if not [name for name in fields if name != FIRST_FIELD] or len(set(fields)) != len(fields):
+        raise InputError(
+            "expected a pattern with factors in braces, each once, such as {character}_{exemplar}.mp4"
+        )
+    escaped = re.escape(one_form(pattern))
+    for name in fields:
+        escaped = escaped.replace(re.escape("{" + name + "}"), f"(?P<{name}>[^/]+?)", 1)
+    matcher = re.compile(escaped)
+    rows = {}
+    for name in files:
+        fit = matcher.fullmatch(name)
+        if fit is None:
+            raise InputError(f"the file name '{name}' does not follow the pattern {pattern}")
+        levels = {field: fit[field] for field in fields if field != FIRST_FIELD}
+        rows[name] = (levels, fit[FIRST_FIELD] if FIRST_FIELD in fields else "")
+    return _numbered(rows)
+
+
+def _numbered(rows: dict[str, tuple[dict[str, str], str]]) -> Placed:
+    """Number exemplars from 1 within each cell: in the order of their marks, or of file names without any."""
+    cells: dict[tuple[str, ...], list[tuple[tuple[int, str], str]]] = defaultdict(list)
+    for name, (levels, mark) in rows.items():
+        order = (int(mark) if mark.isdecimal() else 0, mark or name)
+        cells[tuple(levels.values())].append((order, name))
+    placed: Placed = {}
+    for members in cells.values():
+        for number, (_, name) in enumerate(sorted(members), start=1):
+            placed[name] = (rows[name][0], number)
+    return placed
+
+
+def check_factorial(placed: Placed) -> None:
+    """InputError unless every combination of levels has the same number of clips."""
+    if not placed:
+        raise InputError("expected at least one clip, got none")
+    counts = Counter(tuple(levels.values()) for levels, _ in placed.values())
+    known = levels_of(placed)
+    cells = 1
+    for levels in known.values():
+        cells *= len(levels)
+    if len(counts) != cells:
+        raise InputError(f"expected clips in all {cells} cells of the design, got {len(counts)} of them")
+    most, fewest = counts.most_common()[0], counts.most_common()[-1]
+    if most[1] != fewest[1]:
+        raise InputError(
+            f"every cell needs the same number of clips: {'/'.join(most[0])} has {most[1]}, "
+            f"{'/'.join(fewest[0])} has {fewest[1]}"
+        )
+    if reserved := [name for name in known if name in reserved_names()]:
+        raise InputError(
+            f"a factor cannot be called '{reserved[0]}', the name of a ratings column; rename it"
+        )
+
+
+def levels_of(placed: Placed) -> dict[str, list[str]]:
+    """Levels of each factor: numbers in their order, other words in the order in which clips have them."""
+    names = next(iter(placed.values()))[0]
+    return {name: _in_order([levels[name] for levels, _ in placed.values()]) for name in names}
+
+
+def _in_order(levels: Sequence[str]) -> list[str]:
+    different = list(dict.fromkeys(levels))
+    try:
+        return sorted(different, key=float)
+    except ValueError:
+        return different
+
+
+def check_names(names: Iterable[str]) -> None:
+    """InputError where two names are one on some systems: equal but for case or the form of an accent."""
+    seen: dict[str, str] = {}
+    for name in names:
+        folded = one_form(name).casefold()
+        if folded in seen:
+            raise InputError(
+                f"'{seen[folded]}' and '{name}' are one name on some systems; rename one of them"
+            )
+        seen[folded] = name
+
+
+def suggest_pattern(names: Iterable[str]) -> str | None:
+    """A pattern where every name has the same number of parts between underscores; None elsewhere."""
+    stems = [PurePosixPath(name).stem.split("_") for name in names]
+    endings = {PurePosixPath(name).suffix for name in names}
+    if not stems or len(endings) != 1 or len({len(parts) for parts in stems}) != 1 or len(stems[0]) < 2:
+        return None
+    columns = list(zip(*stems, strict=True))
+    words = [f"factor{place}" for place in range(1, len(columns) + 1)]
+    if all(part.isdigit() for part in columns[-1]):
+        words[-1] = FIRST_FIELD
+    return "_".join("{" + word + "}" for word in words) + endings.pop()

@@ -1,0 +1,96 @@
+"""A new user's way without TOML: twelve clips of one's own to a live link with questionnaire and practice."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.browser.admin.conftest import Dashboard
+from tests.helpers.tiny_clips import encoded_video
+
+pytestmark = pytest.mark.browser
+MAX_INTERACTIONS = 40
+
+
+class Hand:
+    """Somebody at the keyboard: each press and each text entered is an interaction."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.interactions = 0
+
+    def click(self, place: Locator) -> None:
+        self.interactions += 1
+        place.click()
+
+    def press(self, name: str) -> None:
+        self.click(self.page.get_by_role("button", name=name))
+
+    def fill(self, place: Locator, text: str) -> None:
+        self.interactions += 1
+        place.fill(text)
+
+    def bring(self, files: list[Path]) -> None:
+        """Choose files: one press for the dialog, one for the choice."""
+        self.interactions += 2
+        self.page.locator('input[type="file"]:not([accept=".zip"])').first.set_input_files(files)
+
+
+@pytest.fixture
+def clips(tmp_path: Path) -> list[Path]:
+    """Twelve clips: two robots at three speeds, two clips each, with a name beyond ASCII."""
+    box, paths = encoded_video(8, 30) + bytes([0, 0, 0, 9]) + b"free", []
+    for robot in ("Ärmel", "rosie"):
+        for speed in ("slow", "middle", "fast"):
+            for number in (1, 2):
+                path = tmp_path / f"{robot}_{speed}_{number}.mp4"
+                path.write_bytes(box + bytes([len(paths)]))
+                paths.append(path)
+    return paths
+
+
+def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> None:
+    page = dashboard.open("/")
+    hand = Hand(page)
+    hand.click(page.get_by_role("link", name="New study"))
+    hand.fill(page.get_by_label("Short name"), "robots")
+    hand.click(page.get_by_role("tab", name="From your own clips"))
+    hand.bring(clips)
+    page.get_by_text("12 clips received").wait_for()
+    # Another tab and back: the upload is still there.
+    page.get_by_role("tab", name="From a definition (TOML)").click()
+    page.get_by_role("tab", name="From your own clips").click()
+    expect(page.get_by_text("12 clips received")).to_be_visible()
+    hand.fill(page.get_by_label("Pattern", exact=True), "{robot}_{speed}_{exemplar}.mp4")
+    hand.fill(page.get_by_label("Title of the study"), "Robots")
+    hand.fill(page.get_by_label("Question", exact=True), "How alive is it?")
+    hand.press("Create")
+    page.get_by_text("robots, version 1").wait_for()
+
+    hand.click(page.get_by_role("tab", name="Build"))
+    hand.click(page.get_by_role("link", name="Practice and order"))
+    hand.fill(page.get_by_label("Trials", exact=True), "3")
+    hand.click(page.get_by_role("link", name="Questionnaires"))
+    hand.press("Add from the question bank")
+    hand.click(page.get_by_role("menuitem", name="Demographics"))
+    save = page.get_by_role("button", name="Save as a new version")
+    expect(save).to_be_enabled()
+    hand.click(save)
+    page.get_by_text("robots, version 2").wait_for()
+
+    hand.press("Set live")
+    hand.click(page.get_by_role("dialog").get_by_role("button", name="Set live"))
+    expect(page.get_by_text("Participants can begin", exact=True)).to_be_visible()
+    dialog = page.get_by_role("dialog")
+    link = dialog.locator("code").first.inner_text()
+    assert "/run/" in link
+    assert (
+        dialog.locator("code").nth(1).inner_text().startswith(f"{link}?PROLIFIC_PID={{{{%PROLIFIC_PID%}}}}")
+    )
+    assert hand.interactions <= MAX_INTERACTIONS, f"{hand.interactions} interactions"
+    assert page.title() == "Build – Robots – Palpebra"
+
+    visit = page.context.new_page()
+    visit.goto(dashboard.server.address + link[link.index("/run/") :])
+    expect(visit.get_by_text("You will watch short clips")).to_be_visible()
+    visit.close()
