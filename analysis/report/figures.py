@@ -160,12 +160,10 @@ def _jitter(n: int) -> Floats:
 
 def _asked(experiment: "Experiment") -> str:
     """What the axis of ratings is called: the ends of the scale as participants read them."""
-    scale, language = clip_rating_of(experiment).scale, experiment.languages[0]
-    ends = [
-        f"{n} {words.get(language, '')}".strip()
-        for n, words in ((scale.minimum, scale.low), (scale.maximum, scale.high))
-    ]
-    return f"Rating ({ends[0]} – {ends[1]})"
+    scale, language = scale_called(experiment), experiment.languages[0]
+    low = f"{scale.minimum:g} {scale.low.get(language, '')}".strip()
+    high = f"{scale.maximum:g} {scale.high.get(language, '')}".strip()
+    return f"Rating ({low} – {high})"
 
 
 def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
