@@ -1,6 +1,7 @@
 """The analysis of single-clip ratings: cell means, their tests, and models beside them."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -17,14 +18,30 @@ from analysis.within.cell_means import cell_table
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.scales import scale_called
+from experiments.trials.scales import RatedScale, scales_of
 
-READING = Reading(RATINGS, numbers=("response",), further=("exemplar",))
+READING = Reading(RATINGS, numbers=("response",), further=("exemplar",), beside=("scale",))
 
 
 def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     """Refuse a rating off the declared scale, and an unknown level."""
-    scale = scale_called(experiment)
+    for scale in scales_of(experiment):
+        _check_scale(scale, on_scale(experiment, rows, scale.name), source)
+    for factor in experiment.factors:
+        known = [level.name for level in factor.levels]
+        refuse_unknown(rows, factor.name, known, f"level of '{factor.name}'", source)
+
+
+def on_scale(experiment: Experiment, rows: pd.DataFrame, name: str) -> pd.DataFrame:
+    """The rows of one scale: all of them where the study has one."""
+    if len(scales_of(experiment)) == 1:
+        return rows
+    if "scale" not in rows.columns:
+        raise InputError(f"'{experiment.name}' has several scales; the data have no column 'scale'")
+    return rows[(rows["scale"] == name).to_numpy()]
+
+
+def _check_scale(scale: RatedScale, rows: pd.DataFrame, source: str) -> None:
     given = rows["response"].to_numpy()
     steps = (given - scale.minimum) / scale.step
     off = (given < scale.minimum) | (given > scale.maximum) | (np.abs(steps - np.round(steps)) > 1e-6)
@@ -35,9 +52,6 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
             f"{source}: {where(rows, at)}: expected {rating} from {scale.minimum:g} to {scale.maximum:g}, "
             f"got {given[at]:g}"
         )
-    for factor in experiment.factors:
-        known = [level.name for level in factor.levels]
-        refuse_unknown(rows, factor.name, known, f"level of '{factor.name}'", source)
 
 
 def analyse_study(experiment: Experiment, answers: StudyAnswers, pool: Pool = Pool()) -> Analysis:
@@ -45,8 +59,8 @@ def analyse_study(experiment: Experiment, answers: StudyAnswers, pool: Pool = Po
     return analyse(prepare(experiment, PLAN, answers, pool))
 
 
-def analyse(prepared: Prepared) -> Analysis:
-    """Average and test."""
+def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
+    """Average and test; `rating` names what was rated."""
     experiment, rows = prepared.experiment, prepared.rows
     factors = experiment.analysis.factors or experiment.factor_names
     levels = {f.name: [level.name for level in f.levels] for f in experiment.factors}
@@ -58,7 +72,7 @@ def analyse(prepared: Prepared) -> Analysis:
         name=experiment.name,
         title=experiment.title,
         source=prepared.source,
-        rating="response",
+        rating=rating,
         synthetic=prepared.synthetic,
         decisions=prepared.decisions,
         labels=labels_of(experiment),
@@ -72,14 +86,18 @@ def contents(prepared: Prepared) -> Contents:
     """What the report says."""
     from analysis.report.within_contents import contents_of
 
+    if len(scales_of(prepared.experiment)) > 1:
+        from analysis.plans.several_scales import contents_of_scales
+
+        return contents_of_scales(prepared)
     analysis = analyse(prepared)
+    return contents_of(analysis, partial(_more, analysis))
 
-    def more(progress: Progress) -> tuple[Section, ...]:
-        from analysis.plans.sensitivity import sensitivity_sections
 
-        return sensitivity_sections(analysis, progress)
+def _more(analysis: Analysis, progress: Progress) -> tuple[Section, ...]:
+    from analysis.plans.sensitivity import sensitivity_sections
 
-    return contents_of(analysis, more)
+    return sensitivity_sections(analysis, progress)
 
 
 def groups_of(
@@ -103,4 +121,4 @@ def groups_of(
     return between_design(factors, [levels[name] for name in factors], codes)
 
 
-PLAN = Plan(READING, check, contents)
+PLAN = Plan(READING, check, contents, keys=("scale",))

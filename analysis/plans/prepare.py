@@ -13,7 +13,6 @@ from analysis.read.pool import Pool, pooled
 from analysis.read.study_answers import StudyAnswers
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.scales import scales_of
 
 if TYPE_CHECKING:
     from analysis.report.contents import Contents
@@ -52,7 +51,6 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
         An answer that the declaration does not allow, a trial stored twice with different data.
     """
     chosen, pooling = pooled(answers.rows, pool, answers.source)
-    chosen, scale = _of_one_scale(experiment, chosen)
     rows, repeats = _without_repeats(chosen, plan.keys, answers.source)
     rows = plan.numbered(rows)
     main = _main(rows)
@@ -64,24 +62,12 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     checked = replace(answers, rows=rows)
     exclusions = apply_exclusions(experiment, checked)
     _refuse_nobody(exclusions, answers.source, pool)
-    decisions = (*answers.decisions, *pooling, *scale, *repeats)
+    decisions = (*answers.decisions, *pooling, *repeats)
     return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions)
 
 
 def _main(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[(rows["kind"] == "main").to_numpy()] if "kind" in rows.columns else rows
-
-
-def _of_one_scale(experiment: Experiment, rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """The rows of the first scale, and attention checks, which have none; all where there is one scale."""
-    scales = scales_of(experiment)
-    if len(scales) < 2 or "scale" not in rows.columns:
-        return rows, ()
-    first = scales[0]
-    checks = (rows["kind"] == "attention").to_numpy() if "kind" in rows.columns else False
-    turned = ", which is reverse-keyed: a high answer means little" if first.reverse else ""
-    said = f"of {len(scales)} scales the first is analysed, {first.name}{turned}"
-    return rows[(rows["scale"] == first.name).to_numpy() | checks], (said,)
 
 
 def where(rows: pd.DataFrame, position: int) -> str:

@@ -25,6 +25,7 @@ class Reading:
     ----------
     view: of the kind. Its columns beside, that each must be there:
     texts, numbers: read as names, and as numbers with NaN for none.
+    beside: names that a table may lack.
     further: numbers that only the slow parts of a report need; absent from a database unless asked for.
     """
 
@@ -32,6 +33,7 @@ class Reading:
     texts: tuple[str, ...] = ()
     numbers: tuple[str, ...] = ()
     further: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
 
     @property
     def has_levels(self) -> bool:
@@ -41,7 +43,7 @@ class Reading:
     @property
     def all_texts(self) -> tuple[str, ...]:
         """Text columns of a trial that the view has."""
-        return self._there((*TRIAL_TEXTS, *self.texts))
+        return self._there((*TRIAL_TEXTS, *self.texts, *self.beside))
 
     @property
     def all_numbers(self) -> tuple[str, ...]:

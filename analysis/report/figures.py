@@ -171,7 +171,7 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
     axes.set_ylabel(_asked(analysis.experiment) if analysis.experiment else analysis.rating)
     if analysis.experiment is not None:
-        scale = scale_called(analysis.experiment)
+        scale = scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
         margin = (scale.maximum - scale.minimum) / 30
         axes.set_ylim(scale.minimum - margin, scale.maximum + margin)
         if scale.type == "points":

@@ -1,0 +1,77 @@
+"""A study with several scales: a part of the report a scale, and how far they agree."""
+
+import csv
+import json
+import random
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from analysis.cli import app
+from experiments import design
+from experiments.load import load_experiment
+from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.scales import scales_of
+from tests.conftest import REPOSITORY
+
+TOML = REPOSITORY / "experiments" / "sliders-demo.toml"
+DEMO = load_experiment(str(TOML))
+SCALES = scales_of(DEMO)
+
+
+@pytest.fixture
+def rows() -> list[dict[str, object]]:
+    """Ratings that follow one liking of each clip, upside down on reverse-keyed scales."""
+    rng, rows = random.Random(4), []
+    liking = {clip: rng.gauss(0, 0.15) for clip in design.clips(DEMO)}
+    for person in range(8):
+        for index, (clip, like) in enumerate(liking.items()):
+            own = like + rng.gauss(0, 0.1)
+            for scale in SCALES:
+                share = min(1.0, max(0.0, 0.5 + own + rng.gauss(0, 0.05)))
+                share = 1 - share if scale.reverse else share
+                given = scale.nearest(scale.minimum + share * (scale.maximum - scale.minimum))
+                row: dict[str, object] = dict.fromkeys(RATINGS.csv_header(DEMO.factor_names), "")
+                row |= {"study": "s", "experiment": DEMO.name, "synthetic": 1, "kind": "main", "play": 1}
+                row |= {"run": f"r{person}", "participant": f"P{person}", "run_status": "complete"}
+                row |= {"trial_index": index, "exemplar": clip.exemplar, "scale": scale.name, "rt": 900}
+                row |= {"response": given, "verdict": "good", "excluded": 0, "run_origin": "simulated"}
+                rows.append(row | dict(clip.levels) | {"study_version": 1, "data_series": 1})
+    return rows
+
+
+def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> None:
+    path = tmp_path / "r.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, RATINGS.csv_header(DEMO.factor_names))
+        writer.writeheader()
+        writer.writerows(rows)
+    out = tmp_path / "out"
+    done = CliRunner().invoke(
+        app, ["run", str(TOML), "--csv", str(path), "--out", str(out), "--no-sensitivity"]
+    )
+    assert done.exit_code == 0, done.output
+    report = (out / "report.md").read_text(encoding="utf-8")
+    assert all(f"## {scale.name}" in report for scale in SCALES)
+
+    numbers = json.loads((out / "results.json").read_text(encoding="utf-8"))
+    assert [one["scale"] for one in numbers["scales"]] == [scale.name for scale in SCALES]
+    for one, scale in zip(numbers["scales"], SCALES, strict=True):
+        mine = [float(row["response"]) for row in rows if row["scale"] == scale.name]
+        main = [mean["mean"] for mean in one["marginal_means"] if mean["effect"] == DEMO.factor_names[0]]
+        assert np.mean(main) == pytest.approx(np.mean(mine))
+    assert numbers["cronbach_alpha"]["alpha"] == pytest.approx(alpha_of(rows))
+    assert numbers["cronbach_alpha"]["alpha"] > 0.5
+    assert len(list(out.glob("*.svg"))) >= len(SCALES)
+
+
+def alpha_of(rows: list[dict[str, object]]) -> float:
+    """Cronbach's alpha by its definition: k / (k - 1) (1 - sum of variances / variance of the sum)."""
+    turned = []
+    for scale in SCALES:
+        mine = [float(str(row["response"])) for row in rows if row["scale"] == scale.name]
+        turned.append([scale.minimum + scale.maximum - x if scale.reverse else x for x in mine])
+    table = np.array(turned)
+    k = len(table)
+    return k / (k - 1) * (1 - table.var(axis=1, ddof=1).sum() / table.sum(axis=0).var(ddof=1))
