@@ -30,7 +30,7 @@ export function codePage(root: HTMLElement, t: Translate, why: MessageKey, ident
   alert.id = uniqueId("alert");
   const input = h("input", {
     id: uniqueId("code"),
-    class: "input",
+    type: "text",
     autocomplete: "off",
     autocapitalize: "characters",
     spellcheck: false,
