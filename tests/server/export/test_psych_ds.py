@@ -25,6 +25,7 @@ from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, add_study
 from tests.helpers.tiny_clips import make_clip_folder
+from tests.server.trials.test_comparisons import PAIRS, compare, mains
 
 VALIDATOR = Path(__file__).resolve().parents[4] / "shared/tools/psych-ds-validator/run.mjs"
 DATA_FILE = re.compile(r"([a-z]+-[a-zA-Z0-9]+)(_[a-z]+-[a-zA-Z0-9]+)*_data\.csv")
@@ -153,6 +154,19 @@ def test_the_official_validator_agrees(dataset: Path) -> None:
 
 def test_the_official_validator_agrees_on_two_versions(dataset_of_two_versions: Path) -> None:
     ask_the_official_validator(dataset_of_two_versions)
+
+
+def test_the_official_validator_agrees_on_comparisons(
+    viewer: Admin, client: TestClient, services: Services, tmp_path: Path
+) -> None:
+    study = add_study(services, tmp_path / "clips", PAIRS)
+    person = Participant(client, study.link_token).agree()
+    for trial in mains(person):
+        assert compare(person, trial, "left").status_code == 201
+    dataset = exported(viewer, tmp_path)
+    names = {path.name for path in (dataset / "data").iterdir()}
+    assert names == {f"study-short_description-{table}_data.csv" for table in ("comparisons", "runs")}
+    ask_the_official_validator(dataset)
 
 
 def ask_the_official_validator(dataset: Path) -> None:
