@@ -12,6 +12,7 @@ export interface Schema {
   enum?: string[];
   properties?: Record<string, Schema>;
   patternProperties?: Record<string, Schema>;
+  additionalProperties?: Schema;
   required?: string[];
   items?: Schema;
   anyOf?: Schema[];
@@ -49,6 +50,8 @@ export type Editor =
   | { kind: "translated" }
   | { kind: "words" }
   | { kind: "lists" }
+  | { kind: "translations" }
+  | { kind: "dictionary" }
   | { kind: "table"; keys: [name: string, schema: Schema][]; required: string[] }
   | { kind: "variants"; tag: string; variants: Record<string, Schema> }
   | { kind: "elements"; of: Schema; atLeast: number }
@@ -93,11 +96,13 @@ function listEditor(schema: Schema): Editor {
   if (items.type === "string") return { kind: "words" };
   if (items.type === "array" && withoutNull(resolved(items.items ?? {})).type === "string") return { kind: "lists" };
   const inner = editorOf(items).kind;
+  if (inner === "translated") return { kind: "translations" };
   return inner === "table" || inner === "variants" ? { kind: "elements", of: items, atLeast: schema.minItems ?? 0 } : { kind: "raw" };
 }
 
 function tableEditor(schema: Schema): Editor {
   if (schema.properties !== undefined) return { kind: "table", keys: Object.entries(schema.properties), required: schema.required ?? [] };
+  if (schema.additionalProperties?.type === "string") return { kind: "dictionary" };
   const [inner] = Object.values(schema.patternProperties ?? {});
   if (inner === undefined) return { kind: "raw" };
   return resolved(inner).type === "string" ? { kind: "translated" } : { kind: "languages", of: resolved(inner) };
@@ -144,7 +149,10 @@ export function starter(given: Schema, languages: readonly string[]): unknown {
       return Array.from({ length: editor.atLeast }, () => starter(editor.of, languages));
     case "words":
     case "lists":
+    case "translations":
       return [];
+    case "dictionary":
+      return {};
     case "raw":
       return null;
   }

@@ -2,6 +2,7 @@
 
 import { editorOf } from "../schema";
 import { Choice, Flag, Lists, Numeric, OneText, Raw, Translated, Words } from "./scalars";
+import { Dictionary, Translations } from "./lines";
 import { ByLanguage, Elements, Table, Variants } from "./tables";
 import type { FieldProps } from "./useField";
 
@@ -23,6 +24,10 @@ export function Field(props: FieldProps) {
       return <Words {...props} />;
     case "lists":
       return <Lists {...props} />;
+    case "translations":
+      return <Translations {...props} />;
+    case "dictionary":
+      return <Dictionary {...props} />;
     case "table":
       return <Table {...props} />;
     case "variants":

@@ -1,0 +1,64 @@
+/** Editors that take an element a line. */
+
+import { Stack, Textarea } from "@mantine/core";
+import { useState } from "react";
+import { languageName } from "../../ui/format";
+import { type Data, isTable, textAt } from "../data";
+import { type FieldProps, useField } from "./useField";
+
+/** Texts in an order, each in every language: a line a text. */
+export function Translations(props: FieldProps) {
+  const { value, label, help, problem, set, builder } = useField(props);
+  const texts = Array.isArray(value) ? (value as unknown[]) : [];
+  const change = (language: string, entered: string) => {
+    const lines = entered === "" ? [] : entered.split("\n");
+    const others = texts.map((text) => (isTable(text) ? text : {}));
+    const length = builder.languages.length === 1 ? lines.length : Math.max(lines.length, lines.length === 0 ? 0 : others.length);
+    const next: Data[] = Array.from({ length }, (_, place) => ({ ...others[place], [language]: lines[place] ?? "" }));
+    set(next.length === 0 ? undefined : next);
+  };
+  return (
+    <Stack gap={4}>
+      {builder.languages.map((language, place) => (
+        <Textarea
+          key={language}
+          label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
+          description={place === 0 ? `${help} Here: one a line.` : undefined}
+          error={place === 0 ? problem : null}
+          autosize
+          minRows={2}
+          maxRows={12}
+          value={texts.map((text) => textAt(text, [language])).join("\n")}
+          onChange={(event) => change(language, event.currentTarget.value)}
+        />
+      ))}
+    </Stack>
+  );
+}
+
+/** Words that stand for words: `key = value`, one a line. */
+export function Dictionary(props: FieldProps) {
+  const { value, label, help, problem, set } = useField(props);
+  const [text, setText] = useState(() =>
+    Object.entries(isTable(value) ? value : {})
+      .map(([key, word]) => `${key} = ${String(word)}`)
+      .join("\n"),
+  );
+  return (
+    <Textarea
+      label={label}
+      description={`${help} Here: key = value, one a line.`}
+      error={problem}
+      autosize
+      minRows={2}
+      maxRows={12}
+      value={text}
+      onChange={(event) => {
+        setText(event.currentTarget.value);
+        const pairs = event.currentTarget.value.split("\n").map((line) => line.split("=").map((part) => part.trim()));
+        const full = pairs.filter(([key, ...rest]) => key !== undefined && key !== "" && rest.length > 0);
+        set(full.length === 0 ? undefined : Object.fromEntries(full.map(([key, ...rest]) => [key, rest.join("=")])));
+      }}
+    />
+  );
+}
