@@ -71,7 +71,7 @@ load: setup-test ## real servers under load and kill -9, a table at the end (LOA
 addon: setup ## build the Blender add-on: dist/palpebra_blinks-VERSION.zip
 	@$(BIN)/python tools/build_addon.py
 
-playground: setup ## build the blink engine's playground: dist/playground.html, one page that opens from a folder
+playground: setup ## build the blink engine's pages that open from a folder: dist/playground.html, dist/vrm.html
 	@$(BIN)/python tools/build_playground.py
 
 docs: setup-test ## write the references in docs/ (data dictionary, settings, declaration) from the code

@@ -1,4 +1,4 @@
-"""Build the playground of the blink engine: one page that opens from a folder (`make playground`)."""
+"""Build the pages of the blink engine that open from a folder: the playground and the VRM avatar."""
 
 import argparse
 import base64
@@ -13,56 +13,75 @@ sys.path.insert(0, str(ROOT))
 
 from experiments.files import whole_text  # noqa: E402
 
+BUILT = ROOT / "frontend" / "dist"
 PAGE = """<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Blink engine: playground</title>
+<title>{title}</title>
 <style>{style}</style>
 </head>
 <body>
-<h1>Natural blinks</h1>
-<p>Blinks as the engine draws them, beside the uniform timer that most programs have. Everything on this
-page happens on your computer.</p>
-<div id="playground" class="playground"></div>
-<script type="application/json" id="strips">{strips}</script>
+<h1>{title}</h1>
+{body}
 <script>{script}</script>
 </body>
 </html>
 """
+PLAYGROUND = """<p>Blinks as the engine draws them, beside the uniform timer that most programs have.
+Everything on this page happens on your computer.</p>
+<div id="playground" class="playground"></div>
+<script type="application/json" id="strips">{strips}</script>"""
+VRM = """<canvas width="640" height="480" aria-label="An avatar that blinks"></canvas>
+<p id="said" role="status"></p>"""
 
 
-def page(built: Path, strips: Path) -> str:
-    """The page, from `npm run build:playground` and `stimuli strips`; all of it stands in one file."""
+def playground_page(strips: Path) -> str:
+    """The playground, with the pictures that `stimuli strips` wrote to a folder."""
     declared = json.loads((strips / "strips.json").read_text(encoding="utf-8"))
     declared["pictures"] = {
         name: "data:image/webp;base64," + base64.b64encode((strips / f"{name}.webp").read_bytes()).decode()
         for name in declared["characters"]
     }
-    script = (built / "playground.js").read_text(encoding="utf-8")
-    return PAGE.format(
-        style=(built / "playground.css").read_text(encoding="utf-8"),
-        # Inside a script element only "</" could end it early.
-        strips=json.dumps(declared).replace("</", "<\\/"),
-        script=script.replace("</script", "<\\/script"),
+    # Inside a script element only "</" could end it early.
+    return _page(
+        "playground", "Natural blinks", PLAYGROUND.format(strips=json.dumps(declared).replace("</", "<\\/"))
     )
 
 
-def main() -> None:
-    """Build script, pictures and page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=ROOT / "dist" / "playground.html", help="page to write")
-    target = parser.parse_args().out
+def vrm_page() -> str:
+    """A VRM avatar in three.js that blinks by the engine."""
+    return _page("vrm", "An avatar that blinks", VRM)
+
+
+def build_scripts() -> None:
+    """Bundle the scripts of both pages."""
     subprocess.run(["npm", "run", "--silent", "build:playground"], cwd=ROOT / "frontend", check=True)
-    with TemporaryDirectory() as folder:
-        stimuli = [str(Path(sys.executable).with_name("stimuli")), "strips", "--out", folder]
+
+
+def _page(name: str, title: str, body: str) -> str:
+    script, style = (
+        (BUILT / name / f"{name}.{suffix}").read_text(encoding="utf-8") for suffix in ("js", "css")
+    )
+    return PAGE.format(title=title, style=style, body=body, script=script.replace("</script", "<\\/script"))
+
+
+def main() -> None:
+    """Build scripts, pictures and pages."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder to write to (dist)")
+    folder = parser.parse_args().out
+    build_scripts()
+    with TemporaryDirectory() as strips:
+        stimuli = [str(Path(sys.executable).with_name("stimuli")), "strips", "--out", strips]
         subprocess.run(stimuli, check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
-        text = page(ROOT / "frontend" / "dist" / "playground", Path(folder))
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with whole_text(target) as stream:
-        stream.write(text)
-    sys.stdout.write(f"wrote {target} ({len(text) / 1e6:.1f} MB); open it in a browser\n")
+        pages = {"playground.html": playground_page(Path(strips)), "vrm.html": vrm_page()}
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages.items():
+        with whole_text(folder / name) as stream:
+            stream.write(text)
+        sys.stdout.write(f"wrote {folder / name} ({len(text) / 1e6:.1f} MB); open it in a browser\n")
 
 
 if __name__ == "__main__":

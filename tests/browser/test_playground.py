@@ -1,13 +1,13 @@
-"""The playground page, opened from a folder: both characters blink when told to, and nothing is fetched."""
+"""The pages of the blink engine, opened from a folder: they blink, and fetch nothing."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import BrowserContext
 
+from blink_engine import BlinkEngine
 from stimuli_builder.clips.strips import write_strips
-from tools.build_playground import ROOT, page
+from tools.build_playground import build_scripts, playground_page, vrm_page
 
 FACES = ".playground-side:first-child canvas:not(.playground-trace)"
 DARK = """() => [...document.querySelectorAll('FACES')].map((canvas) => {
@@ -18,23 +18,22 @@ DARK = """() => [...document.querySelectorAll('FACES')].map((canvas) => {
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> str:
-    folder = tmp_path_factory.mktemp("playground")
-    built = ["npm", "run", "--silent", "build:playground"]
-    subprocess.run(built, cwd=ROOT / "frontend", check=True, stdout=subprocess.DEVNULL)
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pages")
+    build_scripts()
     write_strips(folder)
-    page_file = folder / "playground.html"
-    page_file.write_text(page(ROOT / "frontend" / "dist" / "playground", folder), encoding="utf-8")
-    return page_file.as_uri()
+    (folder / "playground.html").write_text(playground_page(folder), encoding="utf-8")
+    (folder / "vrm.html").write_text(vrm_page(), encoding="utf-8")
+    return folder
 
 
-def test_both_characters_blink_when_told_to(context: BrowserContext, address: str) -> None:
+def test_both_characters_blink_when_told_to(context: BrowserContext, pages: Path) -> None:
     opened = context.new_page()
     requests: list[str] = []
     errors: list[str] = []
     opened.on("request", lambda request: requests.append(request.url))
     opened.on("pageerror", lambda error: errors.append(str(error)))
-    opened.goto(address)
+    opened.goto((pages / "playground.html").as_uri())
     opened.wait_for_function(f"({DARK})().every((mean) => mean > 0)")
     opened.evaluate(
         """(measure) => {
@@ -52,13 +51,34 @@ def test_both_characters_blink_when_told_to(context: BrowserContext, address: st
 
 
 def test_a_saved_curve_is_a_file_that_others_read(
-    context: BrowserContext, address: str, tmp_path: Path
+    context: BrowserContext, pages: Path, tmp_path: Path
 ) -> None:
     opened = context.new_page()
-    opened.goto(address)
+    opened.goto((pages / "playground.html").as_uri())
     with opened.expect_download() as saving:
         opened.get_by_role("button", name="Save 60 s as CSV").click()
     saving.value.save_as(tmp_path / "curve.csv")
     lines = (tmp_path / "curve.csv").read_text().splitlines()
     assert lines[0] == "frame,time_s,closure_left,closure_right,lower_up_mm,lower_nasal_mm"
     assert len(lines) == 3601
+
+
+def test_an_avatar_is_given_the_engines_lids(context: BrowserContext, pages: Path) -> None:
+    opened = context.new_page()
+    opened.goto((pages / "vrm.html").as_uri())
+    opened.wait_for_selector("#said:not(:empty)")
+    assert opened.inner_text("#said").startswith("Blinking as a listener")
+    # As many moments as it takes to see ten within a blink: read together, as the page set them together.
+    opened.evaluate("""() => {
+      const canvas = document.querySelector('canvas');
+      window.seen = [];
+      new MutationObserver(() => {
+        const { time, lidLeft, lidRight } = canvas.dataset;
+        window.seen.push([time, lidLeft, lidRight].map(Number));
+      }).observe(canvas, { attributes: true, attributeFilter: ['data-lid-right'] });
+    }""")
+    opened.wait_for_function("window.seen.filter(([, left]) => left > 0.02).length >= 10", timeout=60_000)
+    engine = BlinkEngine(seed=1, state="listening")
+    for time_s, left, right in opened.evaluate("window.seen"):
+        frame = engine.frame(time_s)
+        assert (left, right) == pytest.approx((frame.left, frame.right), abs=1e-4)

@@ -1,0 +1,87 @@
+/** A VRM avatar that blinks by the engine: drop a .vrm file onto the page. */
+import "./page.css";
+import { type VRM, VRMLoaderPlugin } from "@pixiv/three-vrm";
+import { AmbientLight, Box3, DirectionalLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { BlinkEngine } from "../../blink-engine";
+import { sampleHead } from "./sample-head";
+
+const loader = new GLTFLoader();
+loader.register((parser) => new VRMLoaderPlugin(parser));
+
+const scene = new Scene();
+const sun = new DirectionalLight(0xffffff, 2.5);
+sun.position.set(0.5, 1, 2);
+scene.add(sun, new AmbientLight(0xffffff, 1));
+const camera = new PerspectiveCamera(30, 4 / 3, 0.01, 100);
+const engine = new BlinkEngine({ seed: 1, state: "listening" });
+let avatar: VRM | null = null;
+
+async function take(model: ArrayBuffer): Promise<void> {
+  const { vrm } = (await loader.parseAsync(model, "")).userData as { vrm?: VRM };
+  if (vrm === undefined) throw new Error("expected a VRM model; this file is another kind of glTF");
+  if (avatar !== null) scene.remove(avatar.scene);
+  avatar = vrm;
+  scene.add(vrm.scene);
+  const head = vrm.humanoid.getRawBoneNode("head") ?? vrm.scene;
+  const box = new Box3().setFromObject(head);
+  const centre = box.isEmpty() ? head.getWorldPosition(new Vector3()) : box.getCenter(new Vector3());
+  camera.position.set(centre.x, centre.y, centre.z + 0.65);
+  camera.lookAt(centre);
+}
+
+/** The lids of this moment, by the names that VRM gives them. */
+function blink(vrm: VRM, time_s: number): void {
+  const { left, right } = engine.frame(time_s);
+  vrm.expressionManager?.setValue("blinkLeft", left);
+  vrm.expressionManager?.setValue("blinkRight", right);
+  vrm.update(1 / 60);
+}
+
+function start(canvas: HTMLCanvasElement, said: HTMLElement): void {
+  const renderer = new WebGLRenderer({ canvas, antialias: true });
+  renderer.setSize(640, 480, false);
+  renderer.setClearColor(0x808080);
+  const begun = performance.now();
+  const tick = (now: number): void => {
+    const time_s = Math.max(0, now - begun) / 1000;
+    if (avatar !== null) {
+      blink(avatar, time_s);
+      canvas.dataset["time"] = String(time_s);
+      for (const side of ["Left", "Right"]) canvas.dataset[`lid${side}`] = String(influence(avatar, `blink${side}`));
+    }
+    renderer.render(scene, camera);
+    requestAnimationFrame(tick);
+  };
+  const open = (model: ArrayBuffer): void => {
+    take(model).then(
+      () => (said.textContent = "Blinking as a listener. Drop a .vrm file here to see yours."),
+      (error: unknown) => (said.textContent = `This model cannot be used: ${error instanceof Error ? error.message : String(error)}`),
+    );
+  };
+  document.addEventListener("dragover", (event) => event.preventDefault());
+  document.addEventListener("drop", (event) => {
+    event.preventDefault();
+    void event.dataTransfer?.files[0]?.arrayBuffer().then(open);
+  });
+  open(sampleHead());
+  requestAnimationFrame(tick);
+}
+
+/** What the model's own mesh was given, read back from it. */
+function influence(vrm: VRM, name: string): number {
+  let value = Number.NaN;
+  vrm.scene.traverse((node) => {
+    const { morphTargetDictionary: places, morphTargetInfluences: values } = node as {
+      morphTargetDictionary?: Record<string, number>;
+      morphTargetInfluences?: number[];
+    };
+    const place = places?.[name];
+    if (place !== undefined) value = values?.[place] ?? value;
+  });
+  return value;
+}
+
+const canvas = document.querySelector("canvas");
+const said = document.querySelector<HTMLElement>("#said");
+if (canvas !== null && said !== null) start(canvas, said);
