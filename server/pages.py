@@ -31,6 +31,7 @@ def home() -> RedirectResponse:
 
 
 @router.get("/run/{link_token}")
+@router.head("/run/{link_token}", include_in_schema=False)
 def participant_page(services: ServicesDep, link_token: str) -> Response:  # noqa: ARG001 - read by the page
     """The participant's page; it reads its link from the address."""
     return _page(services, "participant")

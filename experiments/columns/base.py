@@ -5,7 +5,7 @@ Names that jsPsych uses for the same thing are kept (`trial_index`, `rt`, `respo
 t trial_ratings, c version_clips.
 """
 
-from experiments.columns.column import Column
+from experiments.columns.column import JOINED, Column
 
 STUDY: tuple[Column, ...] = (
     Column("study", "text", "Name of the study, unique on this server.", source="s.name"),
@@ -257,3 +257,37 @@ CLOCK: tuple[Column, ...] = (
         source="t",
     ),
 )
+
+_OF_TRIAL = "w.study_run_id = t.study_run_id AND w.trial_index = t.trial_index"
+_OUTCOMES = (
+    "SELECT coalesce(w.outcome, CASE WHEN w.completed THEN 'shown' ELSE 'begun' END) AS outcome "  # noqa: S608
+    f"FROM views w WHERE {_OF_TRIAL} AND w.play = t.play ORDER BY w.number"
+)
+
+VIEWS: tuple[Column, ...] = (
+    Column(
+        "views",
+        "integer",
+        "How often the trial's clips were begun to be shown up to this answer, views broken off included; "
+        "empty where the page kept no views.",
+        minimum=1,
+        source=f"nullif((SELECT count(*) FROM views w WHERE {_OF_TRIAL} "  # noqa: S608 - constants
+        "AND w.play <= t.play), 0)",
+    ),
+    Column(
+        "view_outcomes",
+        "text",
+        "How each view of this play ended, in order: shown, interrupted (a reload or a crash), or begun "
+        "where its end is not known.",
+        source=f"(SELECT {JOINED}(o.outcome, ' ') FROM ({_OUTCOMES}) o)",  # noqa: S608 - constants
+    ),
+    Column(
+        "disturbances",
+        "text",
+        "JSON object of what disturbed the views of this play and how often; empty where the page did not "
+        "watch.",
+        source="t",
+        json=True,
+    ),
+)
+"""Each view of the trial, as it was begun and as it ended."""

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+JOINED = "{joined}"
+"""Stands in a source for the function that joins texts, whose name is another one in each database."""
 ColumnType = Literal["text", "integer", "number", "boolean", "time"]
 """A `number` read from JSON keeps its writing: what was stored as 4 is exported as 4 and not as 4.0."""
 
@@ -18,7 +20,7 @@ class Column:
     values: every value there is, for columns of names.
     minimum, maximum: the range of numbers, ends included; None where open.
     source: the SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the
-    column is of no view.
+    column is of no view. `JOINED` in it is put into the database's own words.
     json: True where the source is a JSON column, exported as text.
     member: path of the value in the JSON object that the source is (`choice`, `left.frames_drawn`); empty
     where the source is the value. otherwise: SQL of what stands where nothing is there; empty for NULL.

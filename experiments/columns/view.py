@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 from experiments.columns.base import LEVELS
-from experiments.columns.column import Column, ColumnType, names_of
+from experiments.columns.column import JOINED, Column, ColumnType, names_of
 
 Dialect = Literal["sqlite", "postgresql"]
 
@@ -16,6 +16,7 @@ _TIME: dict[Dialect, str] = {
     "postgresql": """to_char({} AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
 }
 _JSON: dict[Dialect, str] = {"sqlite": "{}", "postgresql": "CAST({} AS text)"}
+_JOIN: dict[Dialect, str] = {"sqlite": "group_concat", "postgresql": "string_agg"}
 _CAST: dict[ColumnType, str] = {"integer": "integer", "number": "numeric", "boolean": "boolean"}
 
 
@@ -86,7 +87,9 @@ def _spelled(column: Column, dialect: Dialect) -> str:
         return f"coalesce({member}, {column.otherwise})" if column.otherwise else member
     if column.type == "time":
         return _TIME[dialect].format(column.expression)
-    return _JSON[dialect].format(column.expression) if column.json else column.expression
+    if column.json:
+        return _JSON[dialect].format(column.expression)
+    return column.expression.replace(JOINED, _JOIN[dialect])
 
 
 def _member(column: Column, dialect: Dialect) -> str:

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from experiments.assignment import grouping, shares
-from experiments.base import Declaration, Language, Name
+from experiments.base import Declaration, Language, Name, Translated
 from experiments.definition.analysis_plan import AnalysisPlan
 from experiments.definition.assignment import Assignment
 from experiments.definition.blocks import Blocks, Practice
@@ -38,7 +38,10 @@ class Experiment(Declaration):
     name: Name
     """Name of the experiment in manifests, exports and file names."""
     title: str
-    """Title that experimenters and participants read."""
+    """Title that experimenters read, and participants where `participant_title` is not given."""
+    participant_title: Translated | None = None
+    """Title on the participant's first page and the browser's tab, in every language. A study's own title may
+    tell what is expected of the answers."""
     version: Annotated[int, Field(ge=1)] = 1
     """The experimenter's own count of versions; nothing depends on it."""
     source: str = ""
@@ -86,6 +89,11 @@ class Experiment(Declaration):
     def factor_names(self) -> tuple[str, ...]:
         """Factor names in declared order."""
         return tuple(factor.name for factor in self.factors)
+
+    def title_for(self, language: str) -> str:
+        """The title that participants read in this language."""
+        titles = self.participant_title or {}
+        return titles.get(language) or titles.get(self.languages[0]) or self.title
 
     def factor(self, name: str) -> Factor:
         """Return the factor called `name`."""

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from experiments.base import Declaration
+from experiments.rules.disturbances import Consequence, Disturbances
 
 
 class PlaybackRules(Declaration):
@@ -32,5 +33,16 @@ class PlaybackRules(Declaration):
     """Whether a play fails where the page lost focus or visibility during it; else it is flagged."""
     flag_video_fallback: bool = True
     """Whether a play by the video element, which reports frames less exactly, is flagged."""
+    disturbances: Disturbances = Disturbances()
+    """What disturbances of a view do to its play."""
     max_repeats: Annotated[int, Field(ge=0, le=5)] = 1
     """How often a clip whose play failed is offered again, at the end of the block."""
+
+    def consequence(self, disturbance: str) -> Consequence:
+        """What a disturbance of this name does; one that no key names is recorded only."""
+        if disturbance == "focus_lost" and self.disturbances.focus_lost is None:
+            return "repeat" if self.fail_on_focus_lost else "flag"
+        if disturbance not in Disturbances.model_fields:
+            return "ignore"
+        declared: Consequence = getattr(self.disturbances, disturbance)
+        return declared

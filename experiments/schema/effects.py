@@ -13,6 +13,7 @@ Effect = Literal["wording", "measured"]
 EFFECTS: Mapping[str, Effect] = {
     "name": "measured",
     "title": "wording",
+    "participant_title": "wording",
     "version": "wording",
     "source": "wording",
     "participants": "wording",

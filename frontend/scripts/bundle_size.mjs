@@ -1,6 +1,6 @@
 // Prints what a page loads at first, gzipped, and fails above its budget: `node bundle_size.mjs participant | admin`.
-// The participant's page counts whole, but of the kinds of trial, which load on demand, the largest; the admin site counts the entry and the largest page, whose parts load when
-// they are first opened.
+// The participant's page counts whole, but of the kinds of trial and of the languages, which load on demand, the
+// largest; the admin site counts the entry and the largest page, whose parts load when they are first opened.
 import { existsSync, readdirSync, readFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 

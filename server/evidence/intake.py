@@ -109,8 +109,7 @@ def _in_time(connection: Connection, answer: Answer, batch: Batch) -> bool:
     first = min(filter(None, (spent.first_issued_at, batch.issued_at)))
     for issued_at, before_ms in ((batch.issued_at, spent.batch_ms), (first, spent.run_ms)):
         needed, there_was = before_ms + answer.clip_ms, _ms(answer.received_at - issued_at)
-        # A negative time: the server's own clock was set back, which is nobody's fault.
-        if there_was >= 0 and needed * (1 - SLACK_SHARE) > there_was + SLACK_MS:
+        if _too_short(needed, there_was) and not _seen_before(connection, answer, issued_at, before_ms):
             raise ClipsOutlastTickets(
                 f"Clips of {needed / 1000:.1f} s cannot have been watched in the {there_was / 1000:.1f} s "
                 "since their tickets were issued; nothing is stored.",
@@ -118,6 +117,20 @@ def _in_time(connection: Connection, answer: Answer, batch: Batch) -> bool:
                 there_was_ms=there_was,
             )
     return _is_late(answer, spent.last_received_at)
+
+
+def _too_short(needed_ms: float, there_was_ms: float) -> bool:
+    # A negative time: the server's own clock was set back, which is nobody's fault.
+    return there_was_ms >= 0 and needed_ms * (1 - SLACK_SHARE) > there_was_ms + SLACK_MS
+
+
+def _seen_before(connection: Connection, answer: Answer, issued_at: datetime, before_ms: float) -> bool:
+    """True where the clip was seen by tickets from before a reload: only the answer came by the new ones."""
+    viewed_at = repository.first_view(connection, answer.run, answer.trial_index, answer.play)
+    if viewed_at is None or viewed_at >= issued_at:
+        return False
+    own, others = _ms(answer.received_at - viewed_at), _ms(answer.received_at - issued_at)
+    return not _too_short(answer.clip_ms, own) and not _too_short(before_ms, others)
 
 
 def _is_late(answer: Answer, last_received_at: datetime | None) -> bool:

@@ -7,7 +7,7 @@ from sqlalchemy import Connection, Table, bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
 from server.db import insert_once
-from server.models import AnswerEvidence, AssignedTrial, Rating, RunEvent, StudyRun, TrialClip
+from server.models import AnswerEvidence, AssignedTrial, Rating, RunEvent, StudyRun, TrialClip, View
 
 REFUSED = "answer_refused"
 """The event of a run that had an answer refused."""
@@ -29,6 +29,14 @@ def spent(connection: Connection, run: int, issued_at: datetime) -> Any:
     The row has run_ms, batch_ms, first_issued_at, last_received_at.
     """
     return connection.execute(_SPENT, {"run": run, "issued_at": issued_at}).one()
+
+
+def first_view(connection: Connection, run: int, trial_index: int, play: int) -> datetime | None:
+    """When the server heard of the first view of a play; None where it has not."""
+    query = select(func.min(View.received_at)).where(
+        View.study_run_id == run, View.trial_index == trial_index, View.play == play
+    )
+    return connection.scalar(query)
 
 
 def add(connection: Connection, values: dict[str, Any]) -> None:

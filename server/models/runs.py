@@ -156,6 +156,7 @@ class Rating(Base):
     rating_id: made by the client, so that sending it again stores it once.
     kind: of the trial, as declared. payload: the kind's answer (`experiments.trials.<kind>.answer`).
     playback: of each clip by its role, where a trial shows several; the columns then sum it up.
+    disturbances: how often each disturbed the views of this play; null where the page did not watch.
     drawn: [frame index, time in ms] of every drawn frame of a trial's one clip.
     """
 
@@ -204,19 +205,24 @@ class Rating(Base):
     verdict: Mapped[str] = mapped_column(String(10))
     verdict_rule: Mapped[str] = mapped_column(String(40), default="")
     drawn: Mapped[list[list[float]] | None]
+    disturbances: Mapped[dict[str, int] | None]
     saved_at: Mapped[datetime] = mapped_column(default=now)
 
 
 class View(Base):
     """One view of a trial's clips, stored when it begins; it stays open where the page dies before its end.
 
-    view_id: made by the client. number: of the trial's views, from 1. screen: its state at the start.
+    view_id: made by the client. number: of the trial's views, from 1. play: the play it is part of.
+    screen: its state at the start. outcome: null until it has ended, or where an older page does not tell.
+    showings: what was measured of each clip, or clips at once, in order; the frames are with the clips.
+    disturbances: how often each disturbed this view.
     """
 
     __tablename__ = "views"
     __table_args__ = (
         UniqueConstraint("study_run_id", "view_id"),
         UniqueConstraint("study_run_id", "trial_index", "number"),
+        one_of("outcome", "shown", "interrupted"),
         ForeignKeyConstraint(
             ["study_run_id", "trial_index"],
             ["assigned_trials.study_run_id", "assigned_trials.trial_index"],
@@ -229,11 +235,15 @@ class View(Base):
     study_run_id: Mapped[int]
     trial_index: Mapped[int]
     number: Mapped[int]
+    play: Mapped[int]
     started_at_client: Mapped[datetime]
     received_at: Mapped[datetime] = mapped_column(default=now)
     ended_at_client: Mapped[datetime | None]
     completed: Mapped[bool] = mapped_column(default=False)
+    outcome: Mapped[str | None] = mapped_column(String(12))
     screen: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    showings: Mapped[list[dict[str, Any]] | None]
+    disturbances: Mapped[dict[str, int]] = mapped_column(default=dict)
 
 
 class ViewClip(Base):

@@ -73,7 +73,8 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
     return LinkState(
         study=LinkedStudy(
             name=link.study.name,
-            title=experiment.title,
+            title=experiment.title_for(experiment.languages[0]),
+            titles={language: experiment.title_for(language) for language in experiment.languages},
             languages=list(experiment.languages),
             background=experiment.display.background,
             expected_minutes=expected_minutes(experiment),

@@ -53,7 +53,8 @@ class LinkedStudy(BaseModel):
     """What a visitor may know of a study before the run begins."""
 
     name: str
-    title: str
+    title: str = Field(description="What participants read, in the study's first language.")
+    titles: dict[str, str] = Field(description="The same in every language of the study.")
     languages: list[str]
     background: str
     expected_minutes: float

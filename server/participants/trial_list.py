@@ -9,11 +9,14 @@ from server.trials.schemas import SeriesPlace, TrialClip, TrialInfo
 from server.trials.series import service as series
 from server.trials.verdict import is_settled
 from server.versions import LoadedVersion
+from server.views.repository import numbers
+from server.views.service import unanswered_views
 
 
 def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[TrialInfo]:
     """Every trial of a run; nothing in it tells the participant which cell a clip is of."""
     done, clips = repository.plays(session, run), repository.trial_clips(session, run)
+    begun, unanswered = numbers(session, run), unanswered_views(session, run)
     most = loaded.experiment.playback.max_repeats
     places = _places(session, run, loaded)
     trials = []
@@ -45,6 +48,8 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
                 plays_wanted=len(plays) if settled else len(plays) + 1,
                 answered=settled,
                 series=place,
+                views_begun=begun.get(row.trial_index, 0),
+                views=[] if settled else unanswered.get(row.trial_index, []),
             )
         )
     return trials

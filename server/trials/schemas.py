@@ -8,16 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_vali
 from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.union import AnyAnswer
 from server.evidence.schemas import RatingEvidence
-
-Milliseconds = Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=0, le=1_000_000)]
-FrameTime = tuple[
-    Annotated[int, Field(ge=0, le=1_000_000)], Annotated[float, Field(ge=-1e10, le=1e10, allow_inf_nan=False)]
-]
-
+from server.trials.measures import Count, DisturbanceCounts, FrameTime, Milliseconds, Role
+from server.views.schemas import ViewState
 
 RunStatus = Literal["active", "complete", "screened_out", "withdrawn"]
-Role = Literal["shown", "left", "right", "first", "second", "reference"]
 
 
 class ShownClip(BaseModel):
@@ -66,6 +60,10 @@ class PlaybackLog(BaseModel):
     )
     stalls: Count | None = None
     focus_lost: Count | None = Field(default=None, description="How often focus was lost.")
+    disturbances: DisturbanceCounts | None = Field(
+        default=None,
+        description="How often each of [playback.disturbances] disturbed the views.",
+    )
     refresh_rate_hz: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] | None = None
     device_pixel_ratio: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
     drawn: Annotated[list[FrameTime], Field(max_length=5000)] | None = Field(
@@ -151,6 +149,8 @@ class TrialInfo(BaseModel):
     plays_done: int
     plays_wanted: int
     answered: bool
+    views_begun: int = Field(description="The highest number of a view of this trial; 0 where it has none.")
+    views: list[ViewState] = Field(description="Views that still wait for the answer of their play.")
     series: SeriesPlace | None = Field(default=None, description="Of trials that answers decide on.")
 
 

@@ -4,15 +4,18 @@
 `uncertain` says that nothing is known against the play, and not enough for it.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from experiments.rules import PlaybackRules
+from experiments.rules.disturbances import Consequence
 
 Verdict = Literal["good", "uncertain", "flagged", "failed"]
 Ruling = tuple[Verdict, str]
 GOOD: Ruling = ("good", "")
+INTERRUPTED = "interrupted"
+"""A view that was broken off by a reload or a crash: the play has no answer."""
 ASSUMED_REFRESH_HZ = 60.0
 SLACK_SHARE = 0.7
 """Share of a frame's slack that the clock may be uneven by; measured by `make scope` (decision 0351)."""
@@ -26,6 +29,7 @@ class Playback:
 
     frames_seen: different frames in the page's log of drawn frames, see `frames_in_log`.
     clock_gap_ms, clock_late_ms: how unevenly the animation clock ran that drew the clip.
+    disturbances: how often each disturbed the views, by name.
     """
 
     method: Literal["webcodecs", "video", "none"]
@@ -39,6 +43,7 @@ class Playback:
     refresh_rate_hz: float | None = None
     clock_gap_ms: float | None = None
     clock_late_ms: float | None = None
+    disturbances: Mapping[str, int] = field(default_factory=dict)
 
 
 def judge(
@@ -61,6 +66,8 @@ def judge(
     """
     if clip_sha256 is None:
         return GOOD if rated else ("failed", "not_rated")
+    if playback.disturbances.get(INTERRUPTED):
+        return "failed", INTERRUPTED
     if playback.method == "none":
         return "failed", "clip_not_played"
     if playback.clip_sha256 != clip_sha256:
@@ -80,12 +87,19 @@ def _failed(rules: PlaybackRules, playback: Playback) -> str:
         return "failed_missing_frames"
     if (playback.longest_gap_ms or 0) > rules.failed_longest_gap_ms:
         return "failed_longest_gap_ms"
-    return "focus_lost" if playback.focus_lost and rules.fail_on_focus_lost else ""
+    return _disturbed(rules, playback, "repeat")
+
+
+def _disturbed(rules: PlaybackRules, playback: Playback, consequence: Consequence) -> str:
+    """The first disturbance of the play that has this consequence; empty where none has."""
+    counts = {"focus_lost": int(bool(playback.focus_lost)), **playback.disturbances}
+    named = (name for name, count in counts.items() if count and rules.consequence(name) == consequence)
+    return next(named, "")
 
 
 def _flagged(rules: PlaybackRules, playback: Playback, frames: int) -> str:
-    if playback.focus_lost:
-        return "focus_lost"
+    if disturbed := _disturbed(rules, playback, "flag"):
+        return disturbed
     if (playback.frames_missing or 0) > rules.flagged_missing_frames:
         return "flagged_missing_frames"
     if (playback.frames_late or 0) > rules.flagged_late_frames:

@@ -1,6 +1,8 @@
 """Where the page says that a view begins, and that it has ended."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
+from sqlalchemy import Connection
+from sqlalchemy.orm import Session
 
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
@@ -12,7 +14,15 @@ router = APIRouter(prefix="/api", tags=["views"], responses=ERROR_RESPONSES)
 
 
 @router.post("/run/views")
-def post_views(services: ServicesDep, token: RunToken, body: ViewsIn) -> ViewsSaved:
+async def post_views(services: ServicesDep, request: Request, token: RunToken, body: ViewsIn) -> ViewsSaved:
     """Begin views durably and complete them; sending the same again changes nothing."""
-    with services.database.write() as session:
-        return service.save_views(session, token, body)
+
+    received_at = services.time_of(request)
+
+    def save(connection: Connection) -> ViewsSaved:
+        with Session(connection, expire_on_commit=False) as session:
+            saved = service.save_views(session, token, body, received_at)
+            session.flush()
+        return saved
+
+    return await services.group_commit.run(token, save)

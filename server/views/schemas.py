@@ -1,12 +1,12 @@
 """Views as the page sends them: when they begin, and once more when they have ended."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 from uuid import UUID
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
 
-from server.trials.schemas import Count, FrameTime, Role
+from server.trials.measures import Count, DisturbanceCounts, FrameTime, Milliseconds, Role
 
 # The earliest and latest moments of the calendar have no UTC in it.
 Moment = Annotated[
@@ -25,6 +25,33 @@ class SeenClip(BaseModel):
     )
 
 
+class ViewShowing(BaseModel):
+    """What was measured of one clip of a view, or of several at once; its frames are with the clips.
+
+    With it another page, or another device, can ask for the answer without a second view.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+    roles: Annotated[list[Role], Field(min_length=1, max_length=6)]
+    method: Literal["webcodecs", "video"]
+    frames: Count
+    fps: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+    ended_ms: Milliseconds = Field(description="From the view's start key to the clip's end.")
+    stalls: Count
+    clock_gap_ms: Milliseconds | None
+    clock_late_ms: Annotated[float, Field(ge=-1e10, le=1e10, allow_inf_nan=False)] | None
+    focus_lost: Count
+    visible_share: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(
+        default=None, description="Smallest share of the clip inside the window."
+    )
+    refresh_ms: Milliseconds | None = Field(
+        default=None, description="Median time between refreshes during the clip."
+    )
+
+
+Outcome = Literal["shown", "interrupted"]
+
+
 class ViewIn(BaseModel):
     """One view; sent without an end when it begins, with one when it has ended."""
 
@@ -32,12 +59,20 @@ class ViewIn(BaseModel):
     id: UUID
     trial_index: Count
     number: Annotated[int, Field(ge=1, le=1000)] = Field(description="Of the trial's views, from 1.")
+    play: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        default=None, description="The play that it is part of; an older page has one view a play."
+    )
     started_at_client: Moment
     ended_at_client: Moment | None = None
     screen: dict[Annotated[str, StringConstraints(max_length=100)], Any] = Field(
         default_factory=dict, max_length=50
     )
     clips: Annotated[list[SeenClip], Field(max_length=6)] = []
+    outcome: Outcome | None = Field(
+        default=None, description="How it ended: shown to its end, or broken off by a reload or a crash."
+    )
+    showings: Annotated[list[ViewShowing], Field(max_length=6)] | None = None
+    disturbances: DisturbanceCounts = {}
 
 
 class ViewsIn(BaseModel):
@@ -53,3 +88,17 @@ class ViewsSaved(BaseModel):
     begun: int
     completed: int
     saved_at: datetime
+
+
+class ViewState(BaseModel):
+    """A view of a trial that still waits for its answer, as the page gets it back."""
+
+    id: str
+    number: int
+    play: int
+    started_at_client: datetime
+    ended: bool
+    outcome: Outcome | None
+    showings: list[ViewShowing] | None
+    clips: list[SeenClip]
+    disturbances: dict[str, int]

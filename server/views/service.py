@@ -1,16 +1,17 @@
 """Store views once each: what began is known though the page dies, what ended carries its frames."""
 
+from datetime import datetime
+
 from sqlalchemy.orm import Session
 
-from server.clock import now
 from server.errors import Conflict
 from server.models import StudyRun, View, ViewClip
 from server.participants.lookup import find_run
 from server.trials.refusals import ConsentMissing
 from server.trials.service import TrialNotInRun
 from server.views import repository
-from server.views.frame_log import packed
-from server.views.schemas import ViewIn, ViewsIn, ViewsSaved
+from server.views.frame_log import packed, unpacked
+from server.views.schemas import SeenClip, ViewIn, ViewsIn, ViewsSaved, ViewState
 
 
 class ViewDiffers(Conflict):
@@ -19,7 +20,7 @@ class ViewDiffers(Conflict):
     code = "view_differs"
 
 
-def save_views(session: Session, token: str, sent: ViewsIn) -> ViewsSaved:
+def save_views(session: Session, token: str, sent: ViewsIn, moment: datetime) -> ViewsSaved:
     """Begin and complete views, all of them or none; also after the run's end, since the page sends late."""
     run = find_run(session, token, lock=True)
     if run.consented_at is None:
@@ -32,14 +33,14 @@ def save_views(session: Session, token: str, sent: ViewsIn) -> ViewsSaved:
     known = {view.view_id: view for view in repository.stored(session, run, trials)}
     numbers = {(view.trial_index, view.number): view.view_id for view in known.values()}
     _refuse_others(sent, known, numbers)
-    moment = run.last_seen_at = now()
+    run.last_seen_at = moment
     begun = completed = 0
     for view in sent.views:
         row = known.get(str(view.id))
         if row is None:
-            row = known[str(view.id)] = _begin(session, run, view)
+            row = known[str(view.id)] = _begin(session, run, view, moment)
             begun += 1
-        if view.ended_at_client is not None and not row.completed:
+        if (view.outcome or view.ended_at_client) and not row.completed:
             _complete(session, row, view)
             completed += 1
     return ViewsSaved(begun=begun, completed=completed, saved_at=moment)
@@ -56,13 +57,15 @@ def _refuse_others(sent: ViewsIn, known: dict[str, View], numbers: dict[tuple[in
             )
 
 
-def _begin(session: Session, run: StudyRun, view: ViewIn) -> View:
+def _begin(session: Session, run: StudyRun, view: ViewIn, moment: datetime) -> View:
     row = View(
         view_id=str(view.id),
         study_run_id=run.id,
         trial_index=view.trial_index,
         number=view.number,
+        play=view.play or view.number,
         started_at_client=view.started_at_client,
+        received_at=moment,
         screen=view.screen,
         completed=False,
     )
@@ -71,7 +74,10 @@ def _begin(session: Session, run: StudyRun, view: ViewIn) -> View:
 
 
 def _complete(session: Session, row: View, view: ViewIn) -> None:
-    row.ended_at_client, row.completed = view.ended_at_client, True
+    row.ended_at_client, row.completed, row.outcome = view.ended_at_client, True, view.outcome
+    row.disturbances = dict(view.disturbances)
+    if view.showings is not None:
+        row.showings = [showing.model_dump() for showing in view.showings]
     clips = {clip.role: clip for clip in view.clips}
     repository.add_clips(
         session,
@@ -79,4 +85,35 @@ def _complete(session: Session, row: View, view: ViewIn) -> None:
             ViewClip(view=row.id, role=role, clip_sha256=clip.clip_sha256, frame_log=packed(clip.drawn))
             for role, clip in clips.items()
         ],
+    )
+
+
+def unanswered_views(session: Session, run: StudyRun) -> dict[int, list[ViewState]]:
+    """The views of each trial that were begun for a play without an answer yet, in their order."""
+    waiting = repository.unanswered(session, run)
+    clips = repository.clips_of(session, waiting)
+    found: dict[int, list[ViewState]] = {}
+    for view in waiting:
+        found.setdefault(view.trial_index, []).append(_state(view, clips.get(view.id, [])))
+    return found
+
+
+def _state(view: View, clips: list[ViewClip]) -> ViewState:
+    return ViewState.model_validate(
+        {
+            "id": view.view_id,
+            "number": view.number,
+            "play": view.play,
+            "started_at_client": view.started_at_client,
+            "ended": view.completed,
+            "outcome": view.outcome,
+            "showings": view.showings,
+            "clips": [
+                SeenClip.model_validate(
+                    {"role": clip.role, "clip_sha256": clip.clip_sha256, "drawn": unpacked(clip.frame_log)}
+                )
+                for clip in clips
+            ],
+            "disturbances": view.disturbances,
+        }
     )

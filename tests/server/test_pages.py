@@ -99,3 +99,9 @@ def test_readiness_tells_of_clips_that_cannot_be_read(
     answer = client.get("/readyz")
     assert answer.status_code == 503
     assert "No such file" in answer.json()["error"]["message"]
+
+
+def test_a_link_answers_who_asks_for_its_head(client: TestClient, study: StudyInDatabase) -> None:
+    """Messengers and checkers of links ask so."""
+    asked, got = (client.request(method, f"/run/{study.link_token}") for method in ("HEAD", "GET"))
+    assert asked.status_code == got.status_code

@@ -75,6 +75,7 @@ RATINGS = View(
         *base.ORIGIN,
         *base.CLOCK,
         *SCALE,
+        *base.VIEWS,
     ),
     rows=_rows,
 )

@@ -82,6 +82,7 @@ COMPARISONS = View(
         *base.SAVED,
         *base.ORIGIN,
         *base.CLOCK,
+        *base.VIEWS,
     ),
     rows=rows_of("paired_comparison", _ROLES),
 )

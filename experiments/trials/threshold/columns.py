@@ -113,6 +113,7 @@ THRESHOLDS = View(
         *base.SAVED,
         *base.ORIGIN,
         *base.CLOCK,
+        *base.VIEWS,
     ),
     rows=rows_of("threshold", {}, _TABLES),
 )

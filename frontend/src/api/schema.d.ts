@@ -2209,6 +2209,62 @@ export interface components {
             allow_touch: boolean;
         };
         /**
+         * Disturbances
+         * @description What each disturbance of a view does to its play: `ignore`, `flag`, or `repeat` (it is failed).
+         *
+         *     Every one is recorded with the view whatever it does. A view that was broken off, by a reload or a crash,
+         *     always fails its play.
+         */
+        Disturbances: {
+            /**
+             * Full Screen Left
+             * @description Full screen was left during the clip.
+             * @default flag
+             * @enum {string}
+             */
+            full_screen_left: "ignore" | "flag" | "repeat";
+            /**
+             * Window Too Small
+             * @description The window became smaller than the clip.
+             * @default flag
+             * @enum {string}
+             */
+            window_too_small: "ignore" | "flag" | "repeat";
+            /**
+             * Clip Cut Off
+             * @description Less than the whole clip was inside the window.
+             * @default flag
+             * @enum {string}
+             */
+            clip_cut_off: "ignore" | "flag" | "repeat";
+            /**
+             * Zoomed
+             * @description The page was zoomed, so that the clip was not shown at its size.
+             * @default flag
+             * @enum {string}
+             */
+            zoomed: "ignore" | "flag" | "repeat";
+            /**
+             * Refresh Dropped
+             * @description The screen refreshed much less often than it did before, as a power saver makes it.
+             * @default flag
+             * @enum {string}
+             */
+            refresh_dropped: "ignore" | "flag" | "repeat";
+            /**
+             * Scale Reloaded
+             * @description The page was left after the clip and the answer given on a later page, without a second view.
+             * @default flag
+             * @enum {string}
+             */
+            scale_reloaded: "ignore" | "flag" | "repeat";
+            /**
+             * Focus Lost
+             * @description The page was hidden or lost focus during the clip; where not given, `fail_on_focus_lost` decides.
+             */
+            focus_lost: ("ignore" | "flag" | "repeat") | null;
+        };
+        /**
          * DropFailedPlays
          * @description Leave out trials whose clip was not shown as declared (verdict failed).
          */
@@ -2479,9 +2535,17 @@ export interface components {
             name: string;
             /**
              * Title
-             * @description Title that experimenters and participants read.
+             * @description Title that experimenters read, and participants where `participant_title` is not given.
              */
             title: string;
+            /**
+             * Participant Title
+             * @description Title on the participant's first page and the browser's tab, in every language. A study's own title may
+             *     tell what is expected of the answers.
+             */
+            participant_title: {
+                [key: string]: string;
+            } | null;
             /**
              * Version
              * @description The experimenter's own count of versions; nothing depends on it.
@@ -2603,6 +2667,14 @@ export interface components {
              *       "uncertain_unevenness_ms": 3,
              *       "fail_on_focus_lost": true,
              *       "flag_video_fallback": true,
+             *       "disturbances": {
+             *         "clip_cut_off": "flag",
+             *         "full_screen_left": "flag",
+             *         "refresh_dropped": "flag",
+             *         "scale_reloaded": "flag",
+             *         "window_too_small": "flag",
+             *         "zoomed": "flag"
+             *       },
              *       "max_repeats": 1
              *     }
              */
@@ -3172,8 +3244,18 @@ export interface components {
         LinkedStudy: {
             /** Name */
             name: string;
-            /** Title */
+            /**
+             * Title
+             * @description What participants read, in the study's first language.
+             */
             title: string;
+            /**
+             * Titles
+             * @description The same in every language of the study.
+             */
+            titles: {
+                [key: string]: string;
+            };
             /** Languages */
             languages: string[];
             /** Background */
@@ -3950,6 +4032,13 @@ export interface components {
              * @description How often focus was lost.
              */
             focus_lost?: number | null;
+            /**
+             * Disturbances
+             * @description How often each of [playback.disturbances] disturbed the views.
+             */
+            disturbances?: {
+                [key: string]: number;
+            } | null;
             /** Refresh Rate Hz */
             refresh_rate_hz?: number | null;
             /** Device Pixel Ratio */
@@ -4021,6 +4110,18 @@ export interface components {
              * @default true
              */
             flag_video_fallback: boolean;
+            /**
+             * @description What disturbances of a view do to its play.
+             * @default {
+             *       "full_screen_left": "flag",
+             *       "window_too_small": "flag",
+             *       "clip_cut_off": "flag",
+             *       "zoomed": "flag",
+             *       "refresh_dropped": "flag",
+             *       "scale_reloaded": "flag"
+             *     }
+             */
+            disturbances: components["schemas"]["Disturbances"];
             /**
              * Max Repeats
              * @description How often a clip whose play failed is offered again, at the end of the block.
@@ -6002,6 +6103,16 @@ export interface components {
             plays_wanted: number;
             /** Answered */
             answered: boolean;
+            /**
+             * Views Begun
+             * @description The highest number of a view of this trial; 0 where it has none.
+             */
+            views_begun: number;
+            /**
+             * Views
+             * @description Views that still wait for the answer of their play.
+             */
+            views: components["schemas"]["ViewState"][];
             /** @description Of trials that answers decide on. */
             series?: components["schemas"]["SeriesPlace"] | null;
         };
@@ -6140,6 +6251,11 @@ export interface components {
              */
             number: number;
             /**
+             * Play
+             * @description The play that it is part of; an older page has one view a play.
+             */
+            play?: number | null;
+            /**
              * Started At Client
              * Format: date-time
              */
@@ -6155,6 +6271,91 @@ export interface components {
              * @default []
              */
             clips?: components["schemas"]["SeenClip"][];
+            /**
+             * Outcome
+             * @description How it ended: shown to its end, or broken off by a reload or a crash.
+             */
+            outcome?: ("shown" | "interrupted") | null;
+            /** Showings */
+            showings?: components["schemas"]["ViewShowing"][] | null;
+            /**
+             * Disturbances
+             * @default {}
+             */
+            disturbances?: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * ViewShowing
+         * @description What was measured of one clip of a view, or of several at once; its frames are with the clips.
+         *
+         *     With it another page, or another device, can ask for the answer without a second view.
+         */
+        ViewShowing: {
+            /** Roles */
+            roles: ("shown" | "left" | "right" | "first" | "second" | "reference")[];
+            /**
+             * Method
+             * @enum {string}
+             */
+            method: "webcodecs" | "video";
+            /** Frames */
+            frames: number;
+            /** Fps */
+            fps: number;
+            /**
+             * Ended Ms
+             * @description From the view's start key to the clip's end.
+             */
+            ended_ms: number;
+            /** Stalls */
+            stalls: number;
+            /** Clock Gap Ms */
+            clock_gap_ms: number | null;
+            /** Clock Late Ms */
+            clock_late_ms: number | null;
+            /** Focus Lost */
+            focus_lost: number;
+            /**
+             * Visible Share
+             * @description Smallest share of the clip inside the window.
+             */
+            visible_share?: number | null;
+            /**
+             * Refresh Ms
+             * @description Median time between refreshes during the clip.
+             */
+            refresh_ms?: number | null;
+        };
+        /**
+         * ViewState
+         * @description A view of a trial that still waits for its answer, as the page gets it back.
+         */
+        ViewState: {
+            /** Id */
+            id: string;
+            /** Number */
+            number: number;
+            /** Play */
+            play: number;
+            /**
+             * Started At Client
+             * Format: date-time
+             */
+            started_at_client: string;
+            /** Ended */
+            ended: boolean;
+            /** Outcome */
+            outcome: ("shown" | "interrupted") | null;
+            /** Showings */
+            showings: components["schemas"]["ViewShowing"][] | null;
+            /** Clips */
+            clips: components["schemas"]["SeenClip"][];
+            /** Disturbances */
+            disturbances: {
+                [key: string]: number;
+            };
         };
         /**
          * ViewsIn
@@ -6270,6 +6471,7 @@ export type DeclaredPairs = components['schemas']['DeclaredPairs'];
 export type DefinitionText = components['schemas']['DefinitionText'];
 export type DesignOut = components['schemas']['DesignOut'];
 export type Display = components['schemas']['Display'];
+export type Disturbances = components['schemas']['Disturbances'];
 export type DropFailedPlays = components['schemas']['DropFailedPlays'];
 export type DropSlowTrials = components['schemas']['DropSlowTrials'];
 export type EditDefinition = components['schemas']['EditDefinition'];
@@ -6422,6 +6624,8 @@ export type UploadOut = components['schemas']['UploadOut'];
 export type UploadedFile = components['schemas']['UploadedFile'];
 export type VersionOut = components['schemas']['VersionOut'];
 export type ViewIn = components['schemas']['ViewIn'];
+export type ViewShowing = components['schemas']['ViewShowing'];
+export type ViewState = components['schemas']['ViewState'];
 export type ViewsIn = components['schemas']['ViewsIn'];
 export type ViewsSaved = components['schemas']['ViewsSaved'];
 export type WithinFactor = components['schemas']['WithinFactor'];

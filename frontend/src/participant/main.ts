@@ -4,6 +4,7 @@ import type { LinkState, RunStarted, RunState } from "../api/schema";
 import { Refused } from "./request";
 import { loadMessages, preferred, SHIPPED, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround } from "./flow/appearance";
+import { fetchFirst } from "./flow/blocks";
 import { ended } from "./flow/ended";
 import { abilities, type Abilities, findings, type GateFinding } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
@@ -12,7 +13,7 @@ import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGa
 import { describeDevice, flush, openSession } from "./flow/open-session";
 import { asksForCode, codePage, type Claim } from "./flow/resume-code";
 import { serveOffline } from "./flow/serve-offline";
-import { type Beginning, startPage } from "./flow/start-page";
+import { type Beginning, startPage, titleOf } from "./flow/start-page";
 import { timeline } from "./flow/timeline";
 import { watch } from "./flow/watchers";
 import { runTimeline, type SimulationMode } from "./jspsych";
@@ -25,6 +26,8 @@ import { emptied, showNotice } from "./screens/notice";
 import { openStopDialog } from "./screens/stop-dialog";
 import type { Session } from "./session";
 import { loadKind } from "./trials";
+import { saveInterrupted } from "./trials/save-rating";
+import { settleInterrupted } from "./views/ledger";
 
 /** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
@@ -55,7 +58,7 @@ export async function main(root: HTMLElement): Promise<void> {
     const language = preferred(link.study.languages, navigator.languages);
     await loadMessages(language);
     setLanguage(language);
-    document.title = link.study.title;
+    document.title = titleOf(link, language);
     t = translator(language);
     await visit({ root, t, link_token, link, language, keeping, kept });
   } catch (error) {
@@ -208,7 +211,9 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
   root.addEventListener("taken-over", end);
   root.addEventListener("stop", () => openStopDialog(session));
   watch(session);
+  fetchFirst(session);
   void describeDevice(session, durable);
+  await settleInterrupted(session, (trial, play) => saveInterrupted(session, trial, play));
   root.replaceChildren();
   if (run.awaits_group) {
     await runTimeline(root, timeline(session, started.run_token), simulation(run));

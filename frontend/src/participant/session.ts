@@ -45,6 +45,9 @@ export class RunApi {
   consent(): Promise<Outcome> {
     return this.write("/api/run/consent", { agreed: true });
   }
+  decline(): Promise<Outcome> {
+    return this.write("/api/run/consent", { agreed: false });
+  }
   calibration(body: CalibrationState): Promise<Outcome> {
     return this.write("/api/run/calibration", body);
   }

@@ -111,6 +111,9 @@ function ratingOf(trial: RunState["trials"][number]): RatingBody {
     clock_gap_ms: 17,
     clock_late_ms: 1,
     focus_lost: 0,
+    disturbances: {},
+    visible_share: 1,
+    refresh_ms: 16.7,
   };
   return {
     trial_index: trial.trial_index,

@@ -30,6 +30,8 @@ const trial = (trial_index: number): TrialInfo => ({
   plays_done: 0,
   plays_wanted: 1,
   answered: false,
+  views_begun: 0,
+  views: [],
 });
 
 function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
@@ -49,7 +51,7 @@ function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
 const rating = (trial_index: number, play = 1) => ({
   kind: "write" as const,
   path: "/api/run/ratings/x",
-  body: { trial_index, play, time_elapsed: 900 },
+  body: { trial_index, play, time_elapsed: 900, playback: {} },
 });
 
 function kept(storage = new FakeStorage(), begun: Kept | null = visit()): [KeptVisit, FakeStorage] {
@@ -62,7 +64,7 @@ const readAgain = (storage: FakeStorage, now = NOW): Kept | null => kept(storage
 describe("the visit kept for a reload without a server", () => {
   it("knows what the server has accepted", () => {
     const [keeping, storage] = kept();
-    keeping.note({ kind: "write", path: "/api/run/consent", body: {} }, {});
+    keeping.note({ kind: "write", path: "/api/run/consent", body: { agreed: true } }, {});
     keeping.note({ kind: "write", path: "/api/run/forms/about", body: {} }, {});
     keeping.note({ kind: "event", path: "/api/run/events", body: {} }, {});
     keeping.note(rating(1), { receipt: { again: false } });

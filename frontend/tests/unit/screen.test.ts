@@ -26,6 +26,8 @@ const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
   plays_done: 0,
   plays_wanted: 1,
   answered: false,
+  views_begun: 0,
+  views: [],
   ...rest,
 });
 

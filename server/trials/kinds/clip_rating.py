@@ -104,6 +104,7 @@ def playback_of(log: PlaybackLog) -> Playback:
         refresh_rate_hz=log.refresh_rate_hz,
         clock_gap_ms=log.clock_gap_ms,
         clock_late_ms=log.clock_late_ms,
+        disturbances=log.disturbances or {},
     )
 
 

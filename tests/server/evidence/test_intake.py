@@ -1,5 +1,6 @@
 """What comes with an answer is checked: its ticket, the time there was, and its clip."""
 
+import uuid
 from datetime import timedelta
 from typing import Any
 
@@ -186,3 +187,30 @@ def test_a_page_from_before_the_upgrade_begins_without_evidence(
     assert all(page.rate(trial).status_code == 201 for trial in page.state()["trials"])
     assert page.state()["tickets"] is None
     assert rows(services) == []
+
+
+def test_an_answer_after_a_reload_needs_no_second_view(watcher: Watcher) -> None:
+    """The clip was seen by the tickets of the page before; those of the reloaded page are seconds old."""
+    first, second = with_clips(watcher.state())[:2]
+    view = {"id": str(uuid.uuid4()), "trial_index": first["trial_index"], "number": 1}
+    view["started_at_client"] = watcher.moment.isoformat()
+    assert watcher.request("POST", "/views", {"views": [view]}).status_code == 200
+    watcher.wait(SHOWN_S)
+    watcher.state()
+    watcher.wait(0.1)
+    assert watcher.answer(first).status_code == 201
+    assert code(watcher.answer(second)) == "409 clips_outlast_tickets"
+
+
+def test_views_told_of_at_once_are_no_time_to_watch_them(watcher: Watcher) -> None:
+    trials = with_clips(watcher.state())
+    begun = [
+        {"id": str(uuid.uuid4()), "trial_index": trial["trial_index"], "number": 1}
+        | {"started_at_client": watcher.moment.isoformat()}
+        for trial in trials
+    ]
+    watcher.request("POST", "/views", {"views": begun})
+    watcher.wait(SHOWN_S)
+    watcher.state()
+    watcher.wait(0.1)
+    assert [watcher.answer(trial).status_code for trial in trials].count(201) == 1

@@ -3,6 +3,7 @@ from dataclasses import replace
 import pytest
 
 from experiments.rules import PlaybackRules
+from experiments.rules.disturbances import Disturbances
 from server.trials.verdict import Playback, frames_in_log, is_settled, judge
 
 CLIP = "a" * 64
@@ -69,6 +70,36 @@ def test_lost_focus_may_be_declared_harmless_enough_to_flag() -> None:
         "uncertain",
         "video_fallback",
     )
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in Disturbances.model_fields if name not in ("focus_lost", "scale_reloaded")]
+)
+@pytest.mark.parametrize(
+    ("consequence", "ruling"),
+    [("ignore", "good"), ("flag", "flagged"), ("repeat", "failed"), (None, "flagged")],
+)
+def test_a_disturbance_does_what_is_declared(name: str, consequence: str | None, ruling: str) -> None:
+    rules = PlaybackRules.model_validate({"disturbances": {name: consequence} if consequence else {}})
+    verdict = judge(rules, replace(GOOD, disturbances={name: 1}), CLIP, 45, FPS, rated=True)
+    assert verdict == (ruling, "" if ruling == "good" else name)
+
+
+@pytest.mark.parametrize(
+    ("declared", "ruling"),
+    [({}, "failed"), ({"focus_lost": "flag"}, "flagged"), ({"focus_lost": "ignore"}, "good")],
+)
+def test_lost_focus_does_what_is_declared_beside_the_others(declared: dict[str, str], ruling: str) -> None:
+    rules = PlaybackRules.model_validate({"disturbances": declared})
+    for changed in ({"focus_lost": True}, {"focus_lost": True, "disturbances": {"focus_lost": 2}}):
+        assert judge(rules, replace(GOOD, **changed), CLIP, 45, FPS, rated=True)[0] == ruling
+
+
+def test_an_unknown_disturbance_is_only_recorded_and_a_broken_view_always_fails() -> None:
+    seen = replace(GOOD, disturbances={"model_config": 3, "later": 1})
+    assert judge(PlaybackRules(), seen, CLIP, 45, FPS, rated=True) == ("good", "")
+    broken = replace(GOOD, method="none", disturbances={"interrupted": 1})
+    assert judge(PlaybackRules(), broken, CLIP, 45, FPS, rated=False) == ("failed", "interrupted")
 
 
 def test_views_are_counted_one_by_one() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from sqlalchemy import text
 
 from server.context import Services
 from server.models import View, ViewClip
@@ -86,3 +87,96 @@ def test_nothing_is_stored_before_consent(participant: Participant, study: Study
     participant.start()
     answer = send(participant, a_view({"trial_index": 0}))
     assert answer.json()["error"]["code"] == "consent_missing"
+
+
+def shown(view: dict[str, Any], trial: Any, **changes: Any) -> dict[str, Any]:
+    showing = {
+        "roles": ["shown"],
+        "method": "webcodecs",
+        "frames": 4,
+        "fps": 30,
+        "ended_ms": 150,
+        "stalls": 0,
+    }
+    showing |= {"clock_gap_ms": 17.2, "clock_late_ms": 0.5, "focus_lost": 0}
+    return ended(view, trial) | {"outcome": "shown", "showings": [showing]} | changes
+
+
+def main_trial(participant: Participant, index: int = 0) -> Any:
+    return [trial for trial in participant.state()["trials"] if trial["kind"] == "main"][index]
+
+
+def test_a_view_without_its_answer_comes_back_with_the_run(participant: Participant) -> None:
+    participant.agree()
+    trial = main_trial(participant)
+    whole = shown(a_view(trial, play=1), trial)
+    send(participant, whole)
+    again = main_trial(participant)
+    assert again["views_begun"] == 1
+    [view] = again["views"]
+    assert (view["id"], view["ended"], view["outcome"], view["play"]) == (whole["id"], True, "shown", 1)
+    assert view["clips"] == whole["clips"]
+    assert view["showings"][0]["clock_gap_ms"] == 17.2
+    participant.rate(again)
+    answered = main_trial(participant)
+    assert (answered["views_begun"], answered["views"]) == (1, [])
+
+
+def test_a_view_broken_off_fails_its_play_and_both_are_exported(
+    participant: Participant, services: Services
+) -> None:
+    participant.agree()
+    trial = main_trial(participant)
+    first = a_view(trial, play=1)
+    send(participant, first)
+    assert [view["ended"] for view in main_trial(participant)["views"]] == [False]
+    send(participant, first | {"outcome": "interrupted", "disturbances": {"interrupted": 1}})
+    none = {"method": "none", "drawn": None, "disturbances": {"interrupted": 1}}
+    receipt = participant.rate(trial, None, playback=none).json()["receipt"]
+    assert (receipt["verdict"], receipt["rule"], receipt["again"]) == ("failed", "interrupted", True)
+    waiting = main_trial(participant)
+    assert (waiting["plays_done"], waiting["plays_wanted"], waiting["views"]) == (1, 2, [])
+    send(participant, shown(a_view(trial, 2, play=2), trial, disturbances={"zoomed": 1}))
+    participant.rate(trial, play=2, playback={"disturbances": {"zoomed": 1}})
+    columns = "play, views, view_outcomes, disturbances, verdict_rule"
+    query = text(f"SELECT {columns} FROM ratings WHERE kind = 'main' ORDER BY play")
+    with services.database.read() as session:
+        rows = [tuple(row) for row in session.execute(query)]
+    assert rows == [
+        (1, 1, "interrupted", '{"interrupted": 1}', "interrupted"),
+        (2, 2, "shown", '{"zoomed": 1}', "zoomed"),
+    ]
+
+
+def test_what_happened_stands_in_the_order_of_the_views(participant: Participant, services: Services) -> None:
+    participant.agree()
+    trial = main_trial(participant)
+    begun = [a_view(trial, number, play=1) for number in (1, 2, 3)]
+    send(participant, shown(begun[2], trial), begun[0], begun[1] | {"outcome": "interrupted"})
+    participant.rate(trial)
+    query = text("SELECT views, view_outcomes, disturbances FROM ratings WHERE kind = 'main'")
+    with services.database.read() as session:
+        assert tuple(session.execute(query).one()) == (3, "begun interrupted shown", None)
+
+
+def test_an_answer_whose_page_kept_no_views_has_none(participant: Participant, services: Services) -> None:
+    participant.agree()
+    participant.rate(main_trial(participant))
+    query = text("SELECT views, view_outcomes, disturbances FROM ratings WHERE kind = 'main'")
+    with services.database.read() as session:
+        assert tuple(session.execute(query).one()) == (None, None, None)
+
+
+def test_bad_views_are_refused_in_one_line_each(participant: Participant) -> None:
+    participant.agree()
+    trial = main_trial(participant)
+    for changed in (
+        {"outcome": "lost"},
+        {"play": 0},
+        {"disturbances": {"Bad Name": 1}},
+        {"showings": [{"roles": ["shown"]}]},
+        {"more": 1},
+    ):
+        answer = send(participant, a_view(trial) | changed)
+        assert answer.status_code == 422
+        assert "\n" not in answer.json()["error"]["message"]

@@ -2,7 +2,8 @@
  * What a reload without a connection needs: the link, the run's token and the run as the server gave it, brought
  * up to date with each write the server has accepted. What it has not accepted yet lies in the outbox.
  */
-import type { CalibrationState, LinkState, Receipt, RunStarted, RunState, TrialInfo } from "../../api/schema";
+import type { CalibrationState, Consent, LinkState, Receipt, RunStarted, RunState, TrialInfo, ViewsIn } from "../../api/schema";
+import { applyViews } from "../views/ledger";
 import type { RatingBody } from "../trials/rating";
 import { applyNext, nextOf } from "../trials/shared/next-trials";
 import type { OutboxItem } from "../outbox/store";
@@ -14,6 +15,7 @@ export interface Kept {
 }
 type Write = Pick<OutboxItem, "kind" | "path" | "body">;
 
+const NO_VIEWS = { views_begun: 0, views: [] } satisfies Partial<TrialInfo>;
 const RUN = "/api/run/";
 
 export class KeptVisit {
@@ -29,7 +31,7 @@ export class KeptVisit {
     try {
       const found = JSON.parse(this.storage?.getItem(this.key) ?? "null") as Kept | null;
       const until = Date.parse(found?.run.resumable_until ?? "");
-      this.kept = found && now < until ? found : null;
+      this.kept = found && now < until ? completed(found) : null;
     } catch {
       this.kept = null;
     }
@@ -64,14 +66,26 @@ export class KeptVisit {
   }
 }
 
+/** A visit that an earlier page has kept knows nothing of views. */
+function completed(kept: Kept): Kept {
+  const trials = kept.run.trials.map((trial) => ({ ...NO_VIEWS, ...trial }));
+  return { ...kept, run: { ...kept.run, trials } };
+}
+
 /** Bring a run up to date with one write: what it says counts as given, whether or not the server has it yet. */
 export function applyWrite(run: RunState, { path, body }: Pick<Write, "path" | "body">, answer: unknown = null): void {
   const [what = "", name = ""] = path.slice(RUN.length).split("/");
   if (what === "ratings") applyRating(run, body as RatingBody, answer);
+  else if (what === "views") applyViews(run.trials, (body as ViewsIn).views);
   else if (what === "forms") run.answered_forms.push(decodeURIComponent(name));
-  else if (what === "consent") run.consented_at ??= run.server_time;
+  else if (what === "consent") applyConsent(run, (body as Consent).agreed);
   else if (what === "calibration") run.calibration = body as CalibrationState;
   else if (what === "withdraw") run.status = "withdrawn";
+}
+
+function applyConsent(run: RunState, agreed: boolean): void {
+  if (agreed) run.consented_at ??= run.server_time;
+  else run.status = "withdrawn";
 }
 
 function applyRating(run: RunState, body: RatingBody, answer: unknown): void {
@@ -79,9 +93,13 @@ function applyRating(run: RunState, body: RatingBody, answer: unknown): void {
   if (next) applyNext(run.trials, next);
   const trial = run.trials.find((one) => one.trial_index === body.trial_index);
   if (!trial) return;
-  const again = (answer as { receipt?: Receipt } | null)?.receipt?.again === true;
+  const receipt = (answer as { receipt?: Receipt } | null)?.receipt;
+  // A view that was broken off fails its play by a rule that needs no server to tell.
+  const failed = Boolean(body.playback.disturbances?.["interrupted"]) && body.play <= run.playback.max_repeats;
+  const again = receipt ? receipt.again : failed && trial.kind === "main";
   const plays_done = Math.max(trial.plays_done, body.play);
   const plays_wanted = Math.max(trial.plays_wanted, again ? body.play + 1 : body.play);
-  Object.assign(trial, { answered: true, plays_done, plays_wanted } satisfies Partial<TrialInfo>);
+  const views = trial.views.filter((view) => view.play > plays_done);
+  Object.assign(trial, { answered: true, plays_done, plays_wanted, views } satisfies Partial<TrialInfo>);
   run.elapsed_ms_before = Math.max(run.elapsed_ms_before, body.time_elapsed ?? 0);
 }

@@ -1,6 +1,6 @@
 /** The first page: what this is, how long it takes, in which language. */
 import type { LinkState } from "../../api/schema";
-import { languageName, loadMessages, translator } from "../../i18n";
+import { languageName, loadMessages, pick, translator } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
 import { button, showPage } from "../../ui/page";
 import { emptied } from "../screens/notice";
@@ -28,7 +28,7 @@ export function startPage(root: HTMLElement, link: LinkState, language: string):
       const start = button(t("start_study"), () => resolve({ language: chosen, has_code: false }));
       const code = link.kind === "general" ? button(t("code_open"), () => resolve({ language: chosen, has_code: true }), "plain") : null;
       showPage(display, {
-        title: link.study.title,
+        title: titleOf(link, chosen),
         body: [h("p", { class: "lead" }, t("minutes", { minutes: Math.ceil(link.study.expected_minutes) })), preview, picker],
         actions: [start, code],
       });
@@ -44,4 +44,10 @@ function languagePicker(languages: string[], chosen: string, label: string, pick
     return h("label", { class: "tick", lang: language }, input, h("span", {}, languageName(language)));
   });
   return h("fieldset", { class: "field" }, h("legend", {}, label), h("div", { class: "choices choices-row" }, ...rows));
+}
+
+/** What the study is called in this language. A visit that an earlier page has kept knows one title. */
+export function titleOf({ study }: LinkState, language: string): string {
+  const titles = (study as Partial<LinkState["study"]>).titles;
+  return titles ? pick(titles, language) : study.title;
 }

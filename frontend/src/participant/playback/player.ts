@@ -15,10 +15,13 @@ export interface Part {
   width: number;
   height: number;
 }
-export type ShownClip = Omit<Showing, "key_at_ms" | "focus_lost">;
+/** What the player itself knows of a showing; the page adds what happened around it. */
+export type ShownClip = Omit<Showing, "key_at_ms" | "focus_lost" | "disturbances" | "visible_share">;
 export interface PlayOptions {
   fixation_ms: number;
   refresh_ms: number;
+  /** No frame is drawn before this. */
+  ready?: Promise<void>;
 }
 
 /** The clip cannot be decoded or drawn here. */

@@ -20,6 +20,12 @@ export interface Showing {
   clock_late_ms: number | null;
   /** How often the page was hidden or lost focus. */
   focus_lost: number;
+  /** What disturbed it, by name, and how often. */
+  disturbances: Record<string, number>;
+  /** Smallest share of the clip inside the window. */
+  visible_share: number;
+  /** Median time between refreshes meanwhile; null where it could not be seen. */
+  refresh_ms: number | null;
 }
 
 export interface Screen {
@@ -50,9 +56,19 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
     clock_late_ms: greatest(showings.map((showing) => showing.clock_late_ms)),
     stalls: sum(showings.map((showing) => showing.stalls)),
     focus_lost: sum(showings.map((showing) => showing.focus_lost)),
+    disturbances: disturbancesOf(showings),
     ...screen,
     drawn: showings.flatMap(({ drawn, key_at_ms }) => drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),
   };
+}
+
+/** What disturbed any of the showings, and how often in all. */
+export function disturbancesOf(showings: readonly Pick<Showing, "disturbances">[]): Record<string, number> {
+  const total: Record<string, number> = {};
+  for (const { disturbances } of showings) {
+    for (const [name, count] of Object.entries(disturbances)) total[name] = (total[name] ?? 0) + count;
+  }
+  return total;
 }
 
 function late({ drawn, fps }: Showing, refresh_ms: number): number {

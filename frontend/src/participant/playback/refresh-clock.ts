@@ -49,20 +49,26 @@ export interface Evenness {
   clock_gap_ms: number;
   /** Longest time by which a callback ran after the refresh it was for. */
   clock_late_ms: number;
+  /** Median time between two refreshes; null with fewer than two. */
+  refresh_ms: number | null;
 }
 
 export class EvennessMeter {
   private before_ms: number | null = null;
   private gap_ms = 0;
   private late_ms = 0;
+  private readonly refreshes_ms: number[] = [];
 
   add(refresh_at_ms: number, ran_at_ms: number): void {
     if (this.before_ms !== null) this.gap_ms = Math.max(this.gap_ms, ran_at_ms - this.before_ms);
     this.late_ms = Math.max(this.late_ms, ran_at_ms - refresh_at_ms);
     this.before_ms = ran_at_ms;
+    this.refreshes_ms.push(refresh_at_ms);
   }
 
   read(): Evenness {
-    return { clock_gap_ms: this.gap_ms, clock_late_ms: this.late_ms };
+    const periods = this.refreshes_ms.slice(1).map((at_ms, place) => at_ms - (this.refreshes_ms[place] ?? at_ms));
+    const refresh_ms = periods.sort((a, b) => a - b)[Math.floor(periods.length / 2)] ?? null;
+    return { clock_gap_ms: this.gap_ms, clock_late_ms: this.late_ms, refresh_ms };
   }
 }

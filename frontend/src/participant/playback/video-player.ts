@@ -42,11 +42,12 @@ export class VideoPlayer implements ClipPlayer {
     if (address && this.video.src !== address) this.video.src = address;
   }
 
-  async play(sha256: string, { fixation_ms }: PlayOptions): Promise<ShownClip> {
+  async play(sha256: string, { fixation_ms, ready: kept }: PlayOptions): Promise<ShownClip> {
     const clip = this.loaded.get(sha256);
     if (!clip) throw new ClipBroken("expected a prepared clip");
     if (this.video.src !== clip.address) await ready(this.video, clip.address);
     await new Promise((resolve) => setTimeout(resolve, fixation_ms));
+    await kept;
     const watch = watchFrames(this.video, clip.fps);
     this.video.currentTime = 0;
     this.video.style.visibility = "visible";
@@ -56,6 +57,7 @@ export class VideoPlayer implements ClipPlayer {
       method: "video",
       clock_gap_ms: null,
       clock_late_ms: null,
+      refresh_ms: null,
       ended_at_ms: absoluteNow(),
       frames: clip.frames,
       fps: clip.fps,

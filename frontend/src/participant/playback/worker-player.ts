@@ -57,16 +57,16 @@ export class WorkerPlayer implements ClipPlayer {
     );
   }
 
-  async play(sha256: string, options: PlayOptions): Promise<ShownClip> {
+  async play(sha256: string, { ready, ...options }: PlayOptions): Promise<ShownClip> {
     const { frames, fps } = (await this.prepared.get(sha256)) ?? { frames: 0, fps: 30 };
     // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
     const asked = this.ask(`played ${sha256}`, Infinity);
     this.tell({ type: "warm" });
-    await layoutShown();
+    await Promise.all([layoutShown(), ready]);
     this.tell({ type: "play", sha256, ...options });
     const message = (await asked) as FromWorker & { type: "played" };
-    const { drawn, ended_at_ms, clock_gap_ms, clock_late_ms } = message;
-    return { method: "webcodecs", drawn, ended_at_ms, clock_gap_ms, clock_late_ms, stalls: 0, frames, fps };
+    const { drawn, ended_at_ms, clock_gap_ms, clock_late_ms, refresh_ms } = message;
+    return { method: "webcodecs", drawn, ended_at_ms, clock_gap_ms, clock_late_ms, refresh_ms, stalls: 0, frames, fps };
   }
 
   release(sha256: string): void {

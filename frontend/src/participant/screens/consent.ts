@@ -3,6 +3,7 @@ import { h, uniqueId } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { alertLine, button, showPage, statusLine } from "../../ui/page";
 import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
+import { showNotice } from "./notice";
 import type { Session } from "../session";
 import { saveShown } from "./support";
 
@@ -46,6 +47,15 @@ function showConsent(session: Session, display: HTMLElement, eyebrow: string, do
   showPage(display, {
     eyebrow,
     body: [h("div", { class: "prose" }, ...markdown(session.run.texts.consent)), agree, alert, status],
-    actions: [go],
+    actions: [go, button(t("consent_decline"), () => void decline(session, status), "plain")],
   });
+}
+
+/** The run ends with nothing but the refusal stored; without a connection the outbox keeps that. */
+async function decline(session: Session, status: HTMLElement): Promise<void> {
+  const { t, root, over } = session;
+  const outcome = await saveShown(session, status, session.api.decline());
+  if (!outcome.accepted) return;
+  over.abort();
+  showNotice(root, { title: t("declined_title"), text: t("declined") });
 }

@@ -33,20 +33,21 @@ export function fieldView(field: FormField, language: string, t: Translate): Fie
     : h("div", { class: "field" }, h("label", { for: ids.control }, ...label), help, control.node, fault);
   if (!control.grouped) control.node.setAttribute("aria-describedby", described);
   const inputs = (): HTMLElement[] => [...element.querySelectorAll<HTMLElement>("input, textarea")];
-  return {
-    name: field.name,
-    element,
-    answer: control.answer,
-    check() {
-      const answer = control.answer();
-      const empty = answer === null || (Array.isArray(answer) && answer.length === 0);
-      const text = control.fault() ?? (empty && field.required ? t("form_missing") : null);
-      fault.textContent = text ?? "";
-      inputs().forEach((input) => (text ? input.setAttribute("aria-invalid", "true") : input.removeAttribute("aria-invalid")));
-      return text;
-    },
-    focus: () => inputs()[0]?.focus(),
+  const check = (): string | null => {
+    const answer = control.answer();
+    const empty = answer === null || (Array.isArray(answer) && answer.length === 0);
+    const text = control.fault() ?? (empty && field.required ? t("form_missing") : null);
+    fault.textContent = text ?? "";
+    inputs().forEach((input) => (text ? input.setAttribute("aria-invalid", "true") : input.removeAttribute("aria-invalid")));
+    return text;
   };
+  // What was marked is looked at again with each change, and only that: nobody is corrected while still writing.
+  const changed = (): void => {
+    if (fault.textContent) check();
+  };
+  element.addEventListener("input", changed);
+  element.addEventListener("change", changed);
+  return { name: field.name, element, answer: control.answer, check, focus: () => inputs()[0]?.focus() };
 }
 
 function controlOf(field: FormField, language: string, t: Translate, id: string): Control {

@@ -69,6 +69,11 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
     },
     ...views.map((view) => view.element),
   );
+  const mended = (): void => {
+    if (!body.querySelector(".fault:not(:empty)")) alert.textContent = "";
+  };
+  body.addEventListener("input", mended);
+  body.addEventListener("change", mended);
   const section = showPage(display, { title: pick(form.title, language), eyebrow, body: [body, alert, status], actions: [go] });
   section.append(stopButton(session));
 }

@@ -2,6 +2,7 @@
 import type { TrialInfo } from "../../api/schema";
 import type { Node } from "../jspsych";
 import type { Session } from "../session";
+import type { RatingBody } from "./rating";
 
 export interface Showable {
   trial: TrialInfo;
@@ -15,4 +16,6 @@ export interface TrialKind {
   node: Maker;
   /** An instructed answer between trials. */
   attention: Maker;
+  /** What is stored of a play that nobody could answer: its clip could not be shown, or its view was broken off. */
+  unrated(session: Session, trial: TrialInfo, play: number): RatingBody;
 }

@@ -25,6 +25,13 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
   if (!session.outbox.durable) await handled;
 }
 
+/** A play whose view was broken off has no answer; the trial comes once more at the end of its block. */
+export async function saveInterrupted(session: Session, trial: TrialInfo, play: number): Promise<void> {
+  const body = session.kind.unrated(session, trial, play);
+  await saveRating(session, trial, { ...body, playback: { ...body.playback, disturbances: { interrupted: 1 } } });
+  if (trial.kind === "main" && play <= session.run.playback.max_repeats) session.replays.add(trial, play + 1);
+}
+
 /** Where answers decide what is shown: the trials chosen anew, and their clips fetched before their turn. */
 function takeNext(session: Session, outcome: Outcome): void {
   const next = outcome.accepted ? nextOf(outcome.body) : null;

@@ -6,7 +6,7 @@ import { focusHeading } from "../../../ui/page";
 import { INT, OBJECT, plugin, type PluginClass } from "../../jspsych";
 import { playbackRecord } from "../../playback/record";
 import { absoluteNow } from "../../playback/protocol";
-import { screenSignal } from "../../screens/support";
+import { screenSignal, stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { declaredRating } from "./declared";
 import { onlyResponse } from "./answer";
@@ -40,6 +40,7 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
   const { signal, done } = screenSignal(session);
   const below = h("div", { class: "below" });
   const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
+  section.append(stopButton(session));
   display.replaceChildren(section);
   const question = h(
     "div",

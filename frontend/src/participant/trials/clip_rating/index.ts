@@ -3,7 +3,7 @@ import { trial } from "../../jspsych";
 import type { TrialKind } from "../kind";
 import { attentionCheck } from "./attention-check";
 import { placeIn } from "../shared/place";
-import { clipRating } from "./screen";
+import { clipRating, unrated } from "./screen";
 
 export const kind: TrialKind = {
   node: (session, what) =>
@@ -15,4 +15,5 @@ export const kind: TrialKind = {
       total: () => placeIn(session, what().trial).total,
     }),
   attention: (session, what) => trial(attentionCheck(session), { trial: () => what().trial }),
+  unrated,
 };

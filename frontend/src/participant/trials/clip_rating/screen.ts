@@ -5,15 +5,17 @@ import { BOOL, FLOAT, INT, OBJECT, plugin, type PluginClass } from "../../jspsyc
 import { ClipBroken } from "../../playback/player";
 import { playbackRecord } from "../../playback/record";
 import { clipHeight, clipWidth } from "../../screen/size";
-import { screenSignal } from "../../screens/support";
+import { screenSignal, stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
 import { showBroken } from "../shared/broken";
 import { procedureFeedback } from "../shared/feedback";
+import { beginView, isFromBefore, viewsBefore } from "../../views/ledger";
 import { declaredRating } from "./declared";
 import { prepareClip } from "./prepare";
 import { answerOf, noAnswer, onlyResponse } from "./answer";
 import { askInOrder, type Rated } from "./scale";
+import { sayAlreadySeen } from "../shared/already-seen";
 import { showOnce, type Shown, waitForStart } from "../shared/showing";
 import { simulatedRating } from "./simulate";
 import { stage, type Stage } from "../shared/stage";
@@ -63,7 +65,7 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Clip
     if (!(error instanceof ClipBroken)) throw error;
     session.events.add("clip_unavailable", { clip_sha256: trial.clip_sha256, reason: error.message });
     await showBroken(session, display);
-    return emptyBody(session, parameters);
+    return unrated(session, trial, parameters.play);
   });
   await saveRating(session, trial, body);
   if (trial.clip_sha256 && trial.clip_sha256 !== parameters.next?.clip_sha256) session.player.release(trial.clip_sha256);
@@ -77,14 +79,16 @@ function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Sta
   // Only where calibration is optional can it be too wide: it is then as wide as the window.
   const width = Math.min(wanted, window.innerWidth);
   const place = stage(session.player.element, width, clipHeight(trial, width), session.t("clip_name"));
+  place.element.append(stopButton(session));
   display.replaceChildren(place.element);
   return place;
 }
 
 async function watchAndRate(session: Session, place: Stage, parameters: ClipRatingParameters): Promise<RatingBody> {
-  const { trial, next } = parameters;
-  const sha256 = await prepareClip(session, trial, place);
-  const showings = await watch(session, place, parameters, sha256);
+  const { trial, next, play } = parameters;
+  const before = viewsBefore(trial, play).flatMap((view) => view.map(({ showing }) => showing));
+  const showings = before.length < declaredRating(session).views ? await watch(session, place, parameters, before) : before;
+  if (showings === before) sayAlreadySeen(session, place);
   const rating = rate(session, place);
   if (next) void prepareClip(session, next, null).catch(() => {});
   const rated = await rating;
@@ -97,19 +101,25 @@ async function watch(
   session: Session,
   place: Stage,
   { number, total, play, trial }: ClipRatingParameters,
-  sha256: string,
+  before: Shown[],
 ): Promise<Shown[]> {
   const { t } = session;
   const { views, start, fixation_ms, pointer_delay_ms } = declaredRating(session);
-  const showings: Shown[] = [];
+  const sha256 = await prepareClip(session, trial, place);
+  const showings = [...before];
   const key = trial.kind === "practice" ? "practice_note" : "trial_of";
-  for (let view = 1; view <= views; view += 1) {
+  for (let view = before.length + 1; view <= views; view += 1) {
     const touch = matchMedia("(pointer: coarse)").matches;
     const first = t(touch ? "ready_touch" : "ready");
     const prompt = view > 1 ? t(touch ? "ready_again_touch" : "ready_again", { view, views }) : first;
     const note = play > 1 ? t("ready_replay") : t(key, { number, total });
     const key_at_ms = await waitForStart(session, place, prompt, note, pointer_delay_ms);
-    showings.push(await showOnce(session, place, sha256, key_at_ms, start === "fixation" ? fixation_ms : 0));
+    const ledger = beginView(session, trial, play);
+    const shown = showOnce(session, place, sha256, key_at_ms, start === "fixation" ? fixation_ms : 0, ledger.kept);
+    const showing = await ledger.unlessBroken(shown);
+    showings.push(showing);
+    // The scale does not wait for it: what the page does next is not on the disk's time.
+    void ledger.end([{ roles: ["shown"], showing }]);
     if (showings.some((shown) => shown.focus_lost > 0)) session.events.add("focus_lost", { trial_index: trial.trial_index });
   }
   return showings;
@@ -126,12 +136,13 @@ async function rate(session: Session, place: Stage): Promise<Rated> {
 function ratingBody(session: Session, { trial, play }: ClipRatingParameters, showings: Shown[], rated: Rated): RatingBody {
   const last = showings.at(-1);
   const ended_at_ms = last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms;
+  // From another page's clip to this page's key there is no response time.
   const since = (start: number | undefined): number | null =>
-    start === undefined ? null : Math.round((rated.answered_at_ms - start) * 100) / 100;
+    start === undefined || isFromBefore(showings) ? null : Math.round((rated.answered_at_ms - start) * 100) / 100;
   return {
     trial_index: trial.trial_index,
     play,
-    answer: answerOf(rated, ended_at_ms),
+    answer: answerOf(rated, isFromBefore(showings) ? undefined : ended_at_ms),
     rt: since(ended_at_ms),
     rt_from_first_frame: since(last?.drawn[0]?.[1]),
     time_elapsed: session.clock.elapsed(),
@@ -142,7 +153,8 @@ function ratingBody(session: Session, { trial, play }: ClipRatingParameters, sho
   };
 }
 
-function emptyBody(session: Session, { trial, play }: ClipRatingParameters): RatingBody {
+/** What is stored of a play without an answer. */
+export function unrated(session: Session, trial: TrialInfo, play: number): RatingBody {
   return {
     trial_index: trial.trial_index,
     play,

@@ -6,7 +6,7 @@ import { focusHeading } from "../../../ui/page";
 import { OBJECT, plugin, STRING, type PluginClass } from "../../jspsych";
 import { absoluteNow } from "../../playback/protocol";
 import { playbackRecord } from "../../playback/record";
-import { screenSignal } from "../../screens/support";
+import { screenSignal, stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
 import { winnerOf, type Winner } from "./answer-keys";
@@ -42,6 +42,7 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
   const declared = declaredPairs(session);
   const below = h("div", { class: "below" });
   const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
+  section.append(stopButton(session));
   display.replaceChildren(section);
   const title = h("h1", { class: "eyebrow" }, t("attention_title"));
   const question = h("div", { class: "question" }, title, ...markdown(trial.prompt ?? ""));

@@ -3,7 +3,7 @@ import { trial } from "../../jspsych";
 import { placeIn } from "../shared/place";
 import type { TrialKind } from "../kind";
 import { pairCheck } from "./attention-check";
-import { comparison } from "./screen";
+import { comparison, unrated } from "./screen";
 import "../shared/answers.css";
 
 export const kind: TrialKind = {
@@ -16,4 +16,5 @@ export const kind: TrialKind = {
       total: () => placeIn(session, what().trial).total,
     }),
   attention: (session, what) => trial(pairCheck(session), { trial: () => what().trial }),
+  unrated,
 };

@@ -7,7 +7,7 @@ import { sourcesOf } from "../../screens/preload";
 import type { Session } from "../../session";
 import { showOnce } from "../shared/showing";
 import type { Stage } from "../shared/stage";
-import type { RolesShown } from "../shared/roles";
+import type { RolesShown } from "../../views/ledger";
 import { declaredPairs } from "./declared";
 import type { Layout, Place } from "./layout";
 
@@ -76,14 +76,15 @@ export async function showAll(
   place: Stage,
   steps: Step[],
   key_at_ms: number,
-): Promise<(RolesShown & { showing: Awaited<ReturnType<typeof showOnce>> })[]> {
+  kept: Promise<void>,
+): Promise<RolesShown[]> {
   const shown = [];
   for (const { id, roles, gap_ms, label } of steps) {
     if (gap_ms > 0) {
       place.setPlaying(true);
       await new Promise((resolve) => setTimeout(resolve, gap_ms));
     }
-    const showing = await showOnce(session, place, id, key_at_ms, 0, label);
+    const showing = await showOnce(session, place, id, key_at_ms, 0, kept, label);
     if (showing.focus_lost > 0) session.events.add("focus_lost", { roles });
     shown.push({ roles, showing });
   }

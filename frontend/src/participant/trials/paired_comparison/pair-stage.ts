@@ -3,6 +3,7 @@ import type { TrialInfo } from "../../../api/schema";
 import { clipHeight, clipWidth } from "../../screen/size";
 import { askRoom } from "../../screens/screen-setup";
 import type { Session } from "../../session";
+import { stopButton } from "../../screens/support";
 import { stage, type Stage } from "../shared/stage";
 import { declaredPairs } from "./declared";
 import { layoutOf, roomNeeded, type Layout, type Size } from "./layout";
@@ -17,6 +18,7 @@ export async function stageFor(session: Session, display: HTMLElement, trial: Tr
     const layout = layoutOf(presentation, pixels, shown, room, px_per_mm);
     if (layout) {
       const place = stage(session.player.element, layout.shown.width, layout.shown.height, session.t("pair_name"));
+      place.element.append(stopButton(session));
       display.replaceChildren(place.element);
       return { place, layout };
     }

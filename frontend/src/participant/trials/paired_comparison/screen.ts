@@ -9,19 +9,20 @@ import { screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
 import { showBroken } from "../shared/broken";
 import { procedureFeedback } from "../shared/feedback";
+import { sayAlreadySeen } from "../shared/already-seen";
 import { waitForStart } from "../shared/showing";
 import type { Stage } from "../shared/stage";
 import type { RatingBody } from "../rating";
 import { saveRating } from "../save-rating";
 import { askWinner, type Compared } from "./answers";
-import { clipsOf, type RolesShown } from "../shared/roles";
+import { clipsOf } from "../shared/roles";
 import { comparisonBody } from "./body";
+import { beginView, isFromBefore, type RolesShown, viewsBefore } from "../../views/ledger";
 import { declaredPairs } from "./declared";
-import type { Arrangement } from "./layout";
+import type { Arrangement, Layout } from "./layout";
 import { preparePair, releasePair, showAll } from "./pair-player";
 import { stageFor } from "./pair-stage";
 import { simulatedComparison } from "./simulate";
-import { beginView } from "../shared/view-log";
 
 export interface ComparisonParameters {
   trial: TrialInfo;
@@ -64,8 +65,7 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Comp
     const clips = trial.clips.map(({ clip_sha256 }) => clip_sha256);
     session.events.add("clip_unavailable", { clip_sha256: clips[0], clips, reason: error.message });
     await showBroken(session, display);
-    const given = { winner: null, arrangement: null, rt: null, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
-    return comparisonBody(trial, play, given, playbackRecord(null, [], session.screen.record()));
+    return unrated(session, trial, play);
   });
   await saveRating(session, trial, body);
   releasePair(session, trial, next);
@@ -73,9 +73,27 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Comp
   return { winner, rt: body.rt, again: play > 1 };
 }
 
+/** What is stored of a showing without an answer. */
+export function unrated(session: Session, trial: TrialInfo, play: number): RatingBody {
+  const given = { winner: null, arrangement: null, rt: null, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
+  return comparisonBody(trial, play, given, playbackRecord(null, [], session.screen.record()));
+}
+
 async function watchAndCompare(session: Session, display: HTMLElement, parameters: ComparisonParameters): Promise<RatingBody> {
   const { trial, play } = parameters;
   const { place, layout } = await stageFor(session, display, trial);
+  const before = viewsBefore(trial, play).at(-1);
+  if (before) sayAlreadySeen(session, place);
+  const shown = before ?? (await watch(session, place, layout, parameters));
+  const compared = await compare(session, place, layout.arrangement);
+  const body = bodyOf(session, parameters, layout.arrangement, shown, compared);
+  const showings = shown.map(({ showing }) => showing);
+  if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
+  return body;
+}
+
+async function watch(session: Session, place: Stage, layout: Layout, parameters: ComparisonParameters): Promise<RolesShown[]> {
+  const { trial, play } = parameters;
   const pair = await preparePair(session, trial, layout, place);
   const key_at_ms = await waitForStart(
     session,
@@ -84,15 +102,11 @@ async function watchAndCompare(session: Session, display: HTMLElement, parameter
     note(session, parameters),
     declaredPairs(session).pointer_delay_ms,
   );
-  const end = await beginView(session, trial, play);
-  const shown = await showAll(session, place, pair, key_at_ms);
-  const asked = compare(session, place, layout.arrangement);
-  await end(shown);
-  const compared = await asked;
-  const body = bodyOf(session, parameters, layout.arrangement, shown, compared);
-  const showings = shown.map(({ showing }) => showing);
-  if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
-  return body;
+  const ledger = beginView(session, trial, play);
+  const shown = await ledger.unlessBroken(showAll(session, place, pair, key_at_ms, ledger.kept));
+  // The question does not wait for it: what the page does next is not on the disk's time.
+  void ledger.end(shown);
+  return shown;
 }
 
 function readyText({ t }: Session): string {
@@ -122,8 +136,9 @@ function bodyOf(
 ): RatingBody {
   const showings = shown.map(({ showing }) => showing);
   const last = showings.at(-1);
+  // From another page's clips to this page's key there is no response time.
   const since = (start: number | undefined): number | null =>
-    start === undefined ? null : Math.round((answered_at_ms - start) * 100) / 100;
+    start === undefined || isFromBefore(showings) ? null : Math.round((answered_at_ms - start) * 100) / 100;
   const given = {
     winner,
     arrangement,

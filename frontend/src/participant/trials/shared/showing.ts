@@ -4,9 +4,9 @@ import { h } from "../../../ui/element";
 import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
 import type { Showing } from "../../playback/record";
-import { watchFocus } from "../../screen/attention";
 import { screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
+import { refreshDropped, watchDisturbances } from "../../views/disturbances";
 import type { Stage } from "./stage";
 
 export interface Shown extends Showing {
@@ -39,13 +39,14 @@ export function waitForStart(session: Session, place: Stage, prompt: string, not
   });
 }
 
-/** Play the prepared clip once, with nothing else on the screen. */
+/** Play the prepared clip once, with nothing else on the screen, and not before `kept`: the view is on disk first. */
 export async function showOnce(
   session: Session,
   place: Stage,
   sha256: string,
   key_at_ms: number,
   fixation_ms: number,
+  kept: Promise<void>,
   label = "",
 ): Promise<Shown> {
   const { player, screen, t } = session;
@@ -61,13 +62,16 @@ export async function showOnce(
   );
   place.setPlaying(true);
   place.below.replaceChildren(h("p", { class: label ? "count" : "spoken", role: "status" }, label || t("clip_playing")));
-  const focus = watchFocus();
+  const watched = watchDisturbances(player.element);
   const refresh_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : FALLBACK_REFRESH_MS;
   try {
-    const shown = await player.play(sha256, { fixation_ms, refresh_ms });
-    return { ...shown, key_at_ms, focus_lost: focus.stop(), early_keys };
+    const shown = await player.play(sha256, { fixation_ms, refresh_ms, ready: kept });
+    const { counts, focus_lost, visible_share } = watched.stop();
+    const dropped = screen.refresh_rate_hz !== null && refreshDropped(shown.refresh_ms, refresh_ms);
+    const disturbances = dropped ? { ...counts, refresh_dropped: 1 } : counts;
+    return { ...shown, key_at_ms, focus_lost, visible_share, disturbances, early_keys };
   } finally {
-    focus.stop();
+    watched.stop();
     done();
     place.setPlaying(false);
   }

@@ -3,7 +3,7 @@ import { trial } from "../../jspsych";
 import type { TrialKind } from "../kind";
 import { placeIn } from "../shared/place";
 import { thresholdCheck } from "./attention-check";
-import { thresholdTrial } from "./screen";
+import { thresholdTrial, unrated } from "./screen";
 import "../shared/answers.css";
 
 export const kind: TrialKind = {
@@ -16,4 +16,5 @@ export const kind: TrialKind = {
       total: () => placeIn(session, what().trial).total,
     }),
   attention: (session, what) => trial(thresholdCheck(session), { trial: () => what().trial }),
+  unrated,
 };

@@ -17,7 +17,8 @@ import { begin } from "../shared/next-trials";
 import { clipsOf } from "../shared/roles";
 import { showOnce, type Shown, waitForStart } from "../shared/showing";
 import { stage, type Stage } from "../shared/stage";
-import { beginView } from "../shared/view-log";
+import { sayAlreadySeen } from "../shared/already-seen";
+import { beginView, isFromBefore, viewsBefore } from "../../views/ledger";
 import { askResponse, type Response } from "./answers";
 import { awaitChoice } from "./await-choice";
 import { thresholdBody } from "./body";
@@ -70,14 +71,19 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Thre
     if (!(error instanceof ClipBroken)) throw error;
     session.events.add("clip_unavailable", { clip_sha256: trial.clip_sha256, reason: error.message });
     await showBroken(session, display);
-    const given = { chosen: null, rt: null, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
-    return thresholdBody(trial, play, given, playbackRecord(null, [], session.screen.record()));
+    return unrated(session, trial, play);
   });
   await saveRating(session, trial, body);
   const kept = new Set(next?.clips.map(({ clip_sha256 }) => clip_sha256));
   for (const { clip_sha256 } of trial.clips) if (!kept.has(clip_sha256)) session.player.release(clip_sha256);
   const chosen = body.answer.kind === "threshold" ? body.answer.chosen : null;
   return { chosen, rt: body.rt, again: play > 1 };
+}
+
+/** What is stored of a play without an answer. */
+export function unrated(session: Session, trial: TrialInfo, play: number): RatingBody {
+  const given = { chosen: null, rt: null, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
+  return thresholdBody(trial, play, given, playbackRecord(null, [], session.screen.record()));
 }
 
 function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
@@ -94,17 +100,26 @@ async function watchAndAnswer(session: Session, display: HTMLElement, parameters
   const { trial, play } = parameters;
   const declared = declaredThreshold(session);
   const place = placeFor(session, display, trial);
-  await prepare(session, trial);
-  const key_at_ms = await waitForStart(session, place, readyText(session, trial), note(session, parameters), declared.pointer_delay_ms);
-  const end = await beginView(session, trial, play);
-  const shown = await showInTurn(session, place, trial, key_at_ms);
+  const before = viewsBefore(trial, play).at(-1);
+  if (before) sayAlreadySeen(session, place);
+  const shown = before ?? (await watch(session, place, parameters));
   const question = h("h1", { class: "question" }, pick(declared.question, session.language));
-  const asked = askResponse(session, place.below, question);
-  await end(shown);
-  const body = bodyOf(session, parameters, shown, await asked);
+  const answered = await askResponse(session, place.below, question);
+  const body = bodyOf(session, parameters, shown, answered);
   const showings = shown.map(({ showing }) => showing);
   if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
   return body;
+}
+
+async function watch(session: Session, place: Stage, parameters: ThresholdParameters): Promise<RoleShown[]> {
+  const { trial, play } = parameters;
+  const declared = declaredThreshold(session);
+  await prepare(session, trial);
+  const key_at_ms = await waitForStart(session, place, readyText(session, trial), note(session, parameters), declared.pointer_delay_ms);
+  const ledger = beginView(session, trial, play);
+  const shown = await ledger.unlessBroken(showInTurn(session, place, trial, key_at_ms, ledger.kept));
+  void ledger.end(shown);
+  return shown;
 }
 
 /** Fetch and decode every clip, and blank the first one's place. Throws ClipBroken. */
@@ -125,7 +140,7 @@ async function decoded(session: Session, trial: TrialInfo, { clip_sha256, fps }:
   await session.player.prepare(clip_sha256, bytes, fps);
 }
 
-async function showInTurn(session: Session, place: Stage, trial: TrialInfo, key_at_ms: number): Promise<RoleShown[]> {
+async function showInTurn(session: Session, place: Stage, trial: TrialInfo, key_at_ms: number, kept: Promise<void>): Promise<RoleShown[]> {
   const { gap_ms } = declaredThreshold(session);
   const shown: RoleShown[] = [];
   for (const { role, clip_sha256 } of trial.clips) {
@@ -134,7 +149,7 @@ async function showInTurn(session: Session, place: Stage, trial: TrialInfo, key_
       session.player.blank(clip_sha256);
       await new Promise((resolve) => setTimeout(resolve, gap_ms));
     }
-    const showing = await showOnce(session, place, clip_sha256, key_at_ms, 0);
+    const showing = await showOnce(session, place, clip_sha256, key_at_ms, 0, kept);
     if (showing.focus_lost > 0) session.events.add("focus_lost", { trial_index: trial.trial_index });
     shown.push({ roles: [role], showing });
   }
@@ -153,16 +168,16 @@ function note({ t }: Session, { play, trial, number, total }: ThresholdParameter
 }
 
 function bodyOf(session: Session, { trial, play }: ThresholdParameters, shown: RoleShown[], chosen: Chosen<Response>): RatingBody {
-  const last = shown.at(-1)?.showing;
+  const showings = shown.map(({ showing }) => showing);
+  const last = showings.at(-1);
   const since = (start: number | undefined): number | null =>
-    start === undefined ? null : Math.round((chosen.answered_at_ms - start) * 100) / 100;
+    start === undefined || isFromBefore(showings) ? null : Math.round((chosen.answered_at_ms - start) * 100) / 100;
   const given = {
     chosen: chosen.name,
     rt: since(last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms),
     rt_from_first_frame: since(last?.drawn[0]?.[1]),
     time_elapsed: session.clock.elapsed(),
   };
-  const showings = shown.map(({ showing }) => showing);
   const playback = playbackRecord(trial.clip_sha256, showings, session.screen.record());
   const clips = trial.clips.length > 1 ? clipsOf(trial, shown) : null;
   return thresholdBody(trial, play, given, { ...playback, clips });

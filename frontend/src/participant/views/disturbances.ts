@@ -1,0 +1,77 @@
+/** What disturbs a view, named as [playback.disturbances] names it; the server knows what each does to the play. */
+import { watchFocus } from "../screen/attention";
+
+export interface Disturbed {
+  /** How often each disturbed; a name that is missing did not. */
+  counts: Record<string, number>;
+  focus_lost: number;
+  /** Smallest share of the clip inside the window. */
+  visible_share: number;
+}
+
+interface Box {
+  left: number;
+  top: number;
+  right: number;
+  bottom: number;
+}
+
+const WHOLE_SHARE = 0.995;
+const SAME_ZOOM = 0.001;
+/** A refresh this much longer than before is another rate, not a hiccup. */
+const DROPPED = 1.4;
+
+/** Share of a box inside a window of this size, 0 to 1. */
+export function visibleShare({ left, top, right, bottom }: Box, width: number, height: number): number {
+  const area = (right - left) * (bottom - top);
+  if (area <= 0) return 1;
+  const across = Math.max(0, Math.min(right, width) - Math.max(left, 0));
+  const down = Math.max(0, Math.min(bottom, height) - Math.max(top, 0));
+  return Math.min(1, (across * down) / area);
+}
+
+/** True where the screen refreshed at another, lower rate than was measured at the run's start. */
+export function refreshDropped(refresh_ms: number | null, expected_ms: number): boolean {
+  return refresh_ms !== null && refresh_ms > expected_ms * DROPPED;
+}
+
+const zoom = (): number => window.devicePixelRatio * (window.visualViewport?.scale ?? 1);
+
+/** Watch the window around `clip` from now until `stop`. It listens only: asking at each refresh costs frames. */
+export function watchDisturbances(clip: HTMLElement): { stop: () => Disturbed } {
+  const counts: Record<string, number> = {};
+  const own = new AbortController();
+  const { signal } = own;
+  const focus = watchFocus();
+  const zoom_before = zoom();
+  let visible_share = 1;
+  let small = false;
+  let zoomed = false;
+  const add = (name: string): void => void (counts[name] = (counts[name] ?? 0) + 1);
+  const look = (): void => {
+    const box = clip.getBoundingClientRect();
+    const is_small = window.innerWidth < Math.floor(box.width) || window.innerHeight < Math.floor(box.height);
+    if (is_small && !small) add("window_too_small");
+    small = is_small;
+    const share = visibleShare(box, window.innerWidth, window.innerHeight);
+    if (share < WHOLE_SHARE && visible_share >= WHOLE_SHARE) add("clip_cut_off");
+    visible_share = Math.min(visible_share, share);
+    const is_zoomed = Math.abs(zoom() - zoom_before) > SAME_ZOOM;
+    if (is_zoomed && !zoomed) add("zoomed");
+    zoomed = is_zoomed;
+  };
+  look();
+  window.addEventListener("resize", look, { signal });
+  window.addEventListener("scroll", look, { signal, passive: true });
+  window.visualViewport?.addEventListener("resize", look, { signal });
+  document.addEventListener("fullscreenchange", () => !document.fullscreenElement && add("full_screen_left"), { signal });
+  return {
+    stop() {
+      look();
+      own.abort();
+      const focus_lost = focus.stop();
+      if (focus_lost > 0) counts["focus_lost"] = focus_lost;
+      return { counts: { ...counts }, focus_lost, visible_share };
+    },
+  };
+}

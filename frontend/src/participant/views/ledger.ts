@@ -1,0 +1,148 @@
+/**
+ * The view ledger: each view is on disk before its first frame, and on the server as soon as that can be reached.
+ * What a page that died had begun, the next page ends as interrupted; what it had shown whole is answered without
+ * another view.
+ */
+import type { TrialInfo, ViewIn, ViewState } from "../../api/schema";
+import { disturbancesOf } from "../playback/record";
+import type { Shown } from "../trials/shared/showing";
+import type { Session } from "../session";
+
+/** A showing and the roles of the clips that were in it: one clock has drawn them all. */
+export interface RolesShown {
+  roles: string[];
+  showing: Shown;
+}
+
+export interface OpenView {
+  /** Resolves when the start is kept: no frame may be drawn before. */
+  kept: Promise<void>;
+  end(shown: readonly RolesShown[]): Promise<void>;
+  /** What is shown; where that fails, the view has ended as interrupted. */
+  unlessBroken<Result>(showing: Promise<Result>): Promise<Result>;
+}
+
+const PATH = "/api/run/views";
+/** Where the browser keeps nothing the server is asked to; a clip waits no longer than this for it. */
+const NOT_KEPT_WAIT_MS = 3_000;
+const INTERRUPTED = { outcome: "interrupted", disturbances: { interrupted: 1 } } as const;
+const RELOADED = "scale_reloaded";
+const round = (ms: number): number => Math.round(ms * 100) / 100;
+
+/** Begin a view of a trial that starts now. */
+export function beginView(session: Session, trial: TrialInfo, play: number): OpenView {
+  trial.views_begun += 1;
+  const view: ViewIn = {
+    id: crypto.randomUUID(),
+    trial_index: trial.trial_index,
+    number: trial.views_begun,
+    play,
+    started_at_client: new Date().toISOString(),
+    screen: { ...session.screen.record(), width_px: window.innerWidth, height_px: window.innerHeight },
+  };
+  return {
+    kept: send(session, view),
+    unlessBroken: (showing) =>
+      showing.catch(async (error: unknown) => {
+        await send(session, { ...view, ...INTERRUPTED });
+        throw error;
+      }),
+    end: (shown) => send(session, { ...view, ended_at_client: new Date().toISOString(), ...ending(trial, shown) }),
+  };
+}
+
+async function send(session: Session, view: ViewIn): Promise<void> {
+  const { receipt } = await session.outbox.put("POST", PATH, { views: [view] });
+  if (session.outbox.durable) return;
+  await Promise.race([receipt, new Promise((resolve) => setTimeout(resolve, NOT_KEPT_WAIT_MS))]);
+}
+
+function ending(trial: TrialInfo, shown: readonly RolesShown[]): Partial<ViewIn> {
+  const showings = shown.map(({ roles, showing }) => ({
+    roles: roles as NonNullable<ViewIn["showings"]>[number]["roles"],
+    method: showing.method as "webcodecs" | "video",
+    frames: showing.frames,
+    fps: showing.fps,
+    ended_ms: Math.max(0, round(showing.ended_at_ms - showing.key_at_ms)),
+    stalls: showing.stalls,
+    clock_gap_ms: showing.clock_gap_ms,
+    clock_late_ms: showing.clock_late_ms,
+    focus_lost: showing.focus_lost,
+    visible_share: showing.visible_share,
+    refresh_ms: showing.refresh_ms,
+  }));
+  return { outcome: "shown", showings, clips: seenClips(trial, shown), disturbances: disturbancesOf(shown.map(({ showing }) => showing)) };
+}
+
+/** Every clip of a showing as the server keeps a view: each with the log of the one clock. */
+function seenClips(trial: TrialInfo, shown: readonly RolesShown[]): NonNullable<ViewIn["clips"]> {
+  return trial.clips.map(({ role, clip_sha256, frames }) => {
+    const showing = shown.find(({ roles }) => roles.includes(role))?.showing;
+    const start = showing?.key_at_ms ?? 0;
+    const log = (showing?.drawn ?? []).map(([index, at_ms]): [number, number] => [Math.min(index, frames - 1), at_ms - start]);
+    const first = log.filter(([index], place) => place === 0 || log[place - 1]?.[0] !== index);
+    return { role, clip_sha256, drawn: first.map(([index, ms]): [number, number] => [index, round(ms)]) };
+  });
+}
+
+/** The views of this play that an earlier page has shown to their end; times are this clock's, as far as it was right. */
+export function viewsBefore(trial: TrialInfo, play: number): RolesShown[][] {
+  // Where answers decide on clips, another one may have been chosen meanwhile.
+  const same = (view: ViewState): boolean => view.clips.every((seen) => trial.clips.some((clip) => clip.clip_sha256 === seen.clip_sha256));
+  return trial.views.filter((view) => view.play === play && view.outcome === "shown" && view.showings && same(view)).map(restored);
+}
+
+/** True where the last of these was shown by an earlier page. */
+export function isFromBefore(showings: readonly Pick<Shown, "disturbances">[]): boolean {
+  return Boolean(showings.at(-1)?.disturbances[RELOADED]);
+}
+
+function restored(view: ViewState): RolesShown[] {
+  const key_at_ms = Date.parse(view.started_at_client);
+  return (view.showings ?? []).map(({ roles, visible_share, refresh_ms, ended_ms, ...measured }) => {
+    // Of clips at once the longest one's log has every frame that the clock drew.
+    const logs = view.clips.filter(({ role }) => roles.includes(role)).map(({ drawn }) => drawn);
+    const log = logs.reduce((longest, one) => (one.length > longest.length ? one : longest), []);
+    const drawn = log.map(([index, ms]): [number, number] => [index, key_at_ms + ms]);
+    const kept = { visible_share: visible_share ?? 1, refresh_ms: refresh_ms ?? null, early_keys: 0 };
+    const disturbances = { ...view.disturbances, [RELOADED]: 1 };
+    return { roles, showing: { ...measured, ...kept, drawn, key_at_ms, ended_at_ms: key_at_ms + ended_ms, disturbances } };
+  });
+}
+
+/**
+ * End what an earlier page has left open, as interrupted. Its play fails without an answer, so that the trial comes
+ * once more at the end of its block; in practice it is shown again in its place.
+ */
+export async function settleInterrupted(session: Session, file: (trial: TrialInfo, play: number) => Promise<void>): Promise<void> {
+  for (const trial of session.run.trials) {
+    for (const { id, number, play, started_at_client } of trial.views.filter(({ ended }) => !ended)) {
+      const start = { id, trial_index: trial.trial_index, number, play, started_at_client };
+      await send(session, { ...start, ...INTERRUPTED });
+      if (trial.kind !== "practice" && trial.plays_done < play) await file(trial, play);
+    }
+  }
+}
+
+/** Bring a run up to date with views that were sent, whether or not the server has them yet. */
+export function applyViews(trials: readonly TrialInfo[], sent: readonly ViewIn[]): void {
+  for (const view of sent) {
+    const trial = trials.find((one) => one.trial_index === view.trial_index);
+    if (!trial) continue;
+    const play = view.play ?? view.number;
+    trial.views_begun = Math.max(trial.views_begun, view.number);
+    trial.views = trial.views.filter((one) => one.id !== view.id);
+    if (play <= trial.plays_done) continue;
+    trial.views.push({
+      id: view.id,
+      number: view.number,
+      play,
+      started_at_client: view.started_at_client,
+      ended: Boolean(view.outcome ?? view.ended_at_client),
+      outcome: view.outcome ?? null,
+      showings: view.showings ?? null,
+      clips: view.clips ?? [],
+      disturbances: view.disturbances ?? {},
+    });
+  }
+}
