@@ -58,7 +58,11 @@ export function Variants(props: FieldProps) {
   const editor = editorOf(props.schema);
   if (editor.kind !== "variants") return null;
   const table = isTable(value) ? value : {};
-  const chosen = typeof table[editor.tag] === "string" ? String(table[editor.tag]) : builder.trialKind;
+  const optional = mayBeNull(props.schema);
+  const [first = ""] = Object.keys(editor.variants);
+  const implied = builder.trialKind in editor.variants ? builder.trialKind : first;
+  const tagged = table[editor.tag];
+  const chosen = typeof tagged === "string" ? tagged : optional && !isTable(value) ? "" : implied;
   const variant = editor.variants[chosen];
   const keys = variant === undefined ? null : editorOf(variant);
   return (
@@ -68,9 +72,10 @@ export function Variants(props: FieldProps) {
         description={resolved(variant ?? {}).description?.replaceAll("`", "") ?? help}
         maw={480}
         allowDeselect={false}
+        clearable={optional}
         data={Object.keys(editor.variants).map((tag) => ({ value: tag, label: tag.replaceAll("_", " ") }))}
         value={variant === undefined ? null : chosen}
-        onChange={(tag) => tag !== null && set(starterOf(editor, tag, builder.languages, table))}
+        onChange={(tag) => set(tag === null ? undefined : starterOf(editor, tag, builder.languages, table))}
       />
       {keys?.kind === "table" && <Keys path={props.path} editor={keys} but={[editor.tag]} />}
     </Stack>
