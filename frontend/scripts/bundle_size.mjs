@@ -38,7 +38,21 @@ if (site === "participant") {
   const trials = new URL("../src/participant/trials/", import.meta.url);
   const kinds = readdirSync(trials).filter((name) => existsSync(new URL(`${name}/index.ts`, trials)));
   const kindOf = (file) => kinds.find((kind) => file.startsWith(`${kind}-`)) ?? null;
-  const filesOfKind = (kind) => names.map(({ name }) => name).filter((name) => kindOf(name) === kind);
+  // What only some kinds share counts with each of them; the fallback for browsers without the worker not at all.
+  const textOf = (name) => readFileSync(new URL(name, folder), "utf8");
+  const importsOf = (name) => [...textOf(name).matchAll(/from\s*"\.\/([^"]+\.js)"/g)].map(([, file]) => file.replace(/-.{8}\.js$/, ""));
+  const entry = names.map(({ name }) => name).find((name) => /^index-.{8}\.js$/.test(name));
+  const mainOf = (kind) => names.map(({ name }) => name).find((name) => name.startsWith(`${kind}-`) && name.endsWith(".js"));
+  const stemsOf = (kind) =>
+    (mainOf(kind) ? importsOf(mainOf(kind)) : []).filter((stem) => stem !== "index" && !importsOf(entry).includes(stem));
+  const common = (stem) => kinds.every((kind) => stemsOf(kind).includes(stem));
+  const shared = [...new Set(kinds.flatMap(stemsOf))].filter((stem) => !common(stem));
+  const sharedOf = (name) => shared.find((stem) => name.startsWith(`${stem}-`)) ?? null;
+  const filesOfKind = (kind) =>
+    names
+      .map(({ name }) => name)
+      .filter((name) => !name.startsWith("video-player-"))
+      .filter((name) => (sharedOf(name) ? kind !== null && stemsOf(kind).includes(sharedOf(name)) : kindOf(name) === kind));
   const total = (kind) => sum(filesOfKind(kind));
   const languages = readdirSync(new URL("../src/i18n/languages/", import.meta.url)).map((name) => name.replace(/\.ts$/, ""));
   const ofLanguages = names.map(({ name }) => name).filter((name) => languages.some((tag) => new RegExp(`^${tag}-.{8}\\.js$`).test(name)));

@@ -17,6 +17,7 @@ import { type Beginning, startPage, titleOf } from "./flow/start-page";
 import { timeline } from "./flow/timeline";
 import { watch } from "./flow/watchers";
 import { runTimeline, type SimulationMode } from "./jspsych";
+import { choosePlayer } from "./playback/choose";
 import { IndexedDbStore } from "./outbox/indexed-db";
 import { Outbox } from "./outbox/outbox";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
@@ -135,7 +136,8 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   if (!kept) keeping.begin({ link, started, run });
   const kind = known ?? (await loadKind(run.trial.kind));
   await loadMessages(run.language);
-  const session = openSession({ root, link, run, kind, outbox, unsent });
+  const player = await choosePlayer(run.display.background);
+  const session = openSession({ root, link, run, kind, player, outbox, unsent });
   setLanguage(run.language);
   const over = (): Promise<void> => {
     keeping.forget();

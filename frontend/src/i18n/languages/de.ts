@@ -10,11 +10,10 @@ export const messages: Messages = {
   step: "Schritt {step} von {steps}",
 
   consent_agree: "Ich habe das gelesen und bin mit der Teilnahme einverstanden",
-  consent_needed:
-    "Bitte setzen Sie den Haken, wenn Sie einverstanden sind. Sonst wählen Sie „Ich bin nicht einverstanden“: Es werden keine Antworten gespeichert.",
+  consent_needed: "Bitte setzen Sie den Haken, oder wählen Sie „Ich bin nicht einverstanden“.",
   consent_decline: "Ich bin nicht einverstanden",
   declined_title: "Sie nehmen nicht teil",
-  declined: "Sie haben nicht zugestimmt; die Studie endet hier. Es wurden keine Antworten gespeichert. Sie können diese Seite schließen.",
+  declined: "Die Studie endet hier. Es wurden keine Antworten gespeichert. Sie können diese Seite schließen.",
   saving: "Wird gespeichert …",
   saving_offline:
     "Gerade besteht keine Verbindung. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald sie wieder da ist.",
@@ -104,7 +103,7 @@ export const messages: Messages = {
   decoding: "Der Film wird vorbereitet …",
   trial_of: "{number} von {total}",
   clip_name: "Der Film",
-  already_seen: "Diesen Clip haben Sie schon gesehen. Bitte antworten Sie jetzt.",
+  already_seen: "Diesen Film haben Sie schon gesehen. Bitte antworten Sie jetzt.",
   clip_playing: "Der Film läuft.",
   clip_broken_title: "Dieser Film lässt sich nicht zeigen",
   clip_broken: "Das liegt nicht an Ihnen, und wir haben es vermerkt. Bitte machen Sie mit dem nächsten weiter.",

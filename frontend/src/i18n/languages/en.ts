@@ -9,10 +9,10 @@ export const messages = {
   step: "Step {step} of {steps}",
 
   consent_agree: "I have read this and agree to take part",
-  consent_needed: "Please tick the box if you agree. If you do not, choose ‘I do not agree’: none of your answers are stored.",
+  consent_needed: "Please tick the box, or choose ‘I do not agree’.",
   consent_decline: "I do not agree",
   declined_title: "You are not taking part",
-  declined: "You did not agree, so the study ends here. No answers have been stored. You can close this page.",
+  declined: "The study ends here. No answers have been stored. You can close this page.",
   saving: "Saving …",
   saving_offline: "There is no connection at the moment. Your answers are safe on this device and will be sent as soon as it is back.",
   not_saved: "The server did not accept this: {message}",

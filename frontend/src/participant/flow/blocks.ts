@@ -13,14 +13,12 @@ import { enterStage } from "./stages";
 
 const RECEIPTS_WITHIN_MS = 10_000;
 
-/** What is shown first is fetched while consent and questions are read. */
+/** What is shown first is fetched while consent and questions are read; what fails is fetched again in its turn. */
 export function fetchFirst(session: Session): void {
   const open = session.run.trials.filter((one) => !one.answered);
-  const practice = open.filter((one) => one.kind === "practice");
   const first = open.find((one) => one.kind !== "practice")?.block;
-  const block = first === undefined ? [] : trialsOf(session, first);
-  // What fails here is fetched again, and said, when its turn comes.
-  void session.clips.load(sourcesOf(practice)).then(() => session.clips.load(sourcesOf(block)));
+  // Practice is of block 0, and comes first in the run's order.
+  void session.clips.load(sourcesOf(open.filter((one) => one.kind === "practice" || one.block === first)));
 }
 
 export function practiceNodes(session: Session): Node[] {

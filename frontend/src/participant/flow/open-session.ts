@@ -5,7 +5,8 @@ import { InteractionLog } from "../evidence/interaction";
 import { EventLog } from "../outbox/events";
 import type { Outbox } from "../outbox/outbox";
 import type { OutboxItem } from "../outbox/store";
-import { choosePlayer, hasWebCodecs } from "../playback/choose";
+import { hasWebCodecs } from "../playback/choose";
+import type { ClipPlayer } from "../playback/player";
 import { ClipCache } from "../preload/clip-cache";
 import { measureRefreshRate } from "../screen/refresh-rate";
 import { RunClock } from "../screen/run-clock";
@@ -32,11 +33,12 @@ export interface Opening {
   link: LinkState;
   run: RunState;
   kind: TrialKind;
+  player: ClipPlayer;
   outbox: Outbox;
   unsent: OutboxItem[];
 }
 
-export function openSession({ root, link, run, kind, outbox, unsent }: Opening): Session {
+export function openSession({ root, link, run, kind, player, outbox, unsent }: Opening): Session {
   const screen = new ScreenState();
   unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);
@@ -51,7 +53,7 @@ export function openSession({ root, link, run, kind, outbox, unsent }: Opening):
     t: translator(run.language),
     events: new EventLog(outbox),
     clips: new ClipCache(),
-    player: choosePlayer(run.display.background),
+    player,
     clock: new RunClock(run.elapsed_ms_before),
     replays: new Replays(),
     kind,

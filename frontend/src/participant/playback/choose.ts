@@ -1,6 +1,5 @@
 /** Frame by frame in the worker where that is possible, else the video element. */
 import type { ClipPlayer } from "./player";
-import { VideoPlayer } from "./video-player";
 import { WorkerPlayer } from "./worker-player";
 
 export function hasWebCodecs(): boolean {
@@ -24,6 +23,9 @@ export function hasVideo(): boolean {
   return hasWebCodecs() || typeof document.createElement("video").play === "function";
 }
 
-export function choosePlayer(background: string): ClipPlayer {
-  return hasWebCodecs() ? new WorkerPlayer(background) : new VideoPlayer();
+/** The fallback is fetched only where it is needed: such a browser does without the worker and its decoder. */
+export async function choosePlayer(background: string): Promise<ClipPlayer> {
+  if (hasWebCodecs()) return new WorkerPlayer(background);
+  const { VideoPlayer } = await import("./video-player");
+  return new VideoPlayer();
 }

@@ -2,7 +2,6 @@
  * The fallback where WebCodecs is missing: a video element and its frame callbacks. Flagged in the data,
  * because the callbacks miss frames that were shown and say little about when.
  */
-import { absoluteNow } from "./protocol";
 import { ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type ShownClip } from "./player";
 
 const ASSUMED_FPS = 30;
@@ -58,7 +57,7 @@ export class VideoPlayer implements ClipPlayer {
       clock_gap_ms: null,
       clock_late_ms: null,
       refresh_ms: null,
-      ended_at_ms: absoluteNow(),
+      ended_at_ms: performance.timeOrigin + performance.now(),
       frames: clip.frames,
       fps: clip.fps,
       ...watch.stop(),
