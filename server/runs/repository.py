@@ -17,6 +17,8 @@ from server.models import (
     RecruiterIdentity,
     RunEvent,
     RunTally,
+    SeriesAnswer,
+    SeriesOffer,
     Study,
     StudyRun,
     StudyVersion,
@@ -147,6 +149,6 @@ def delete_personal_rows(session: Session, run: StudyRun) -> int:
     """Delete everything a person left in a run; return how many ratings that were."""
     ratings = session.scalar(select(func.count()).select_from(Rating).where(Rating.study_run_id == run.id))
     personal = (AnswerEvidence, View, RunEvent, FormAnswer, Calibration, RecruiterIdentity)
-    for table in (Rating, RunTally, *personal):
+    for table in (Rating, RunTally, SeriesAnswer, SeriesOffer, *personal):
         session.execute(delete(table).where(table.study_run_id == run.id))
     return int(ratings or 0)

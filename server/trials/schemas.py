@@ -95,6 +95,7 @@ class RatingIn(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _of_an_older_page(cls, data: Any) -> Any:
+        """The answer with its kind: older pages send `response`, null beside the answer to a pair."""
         if not isinstance(data, dict) or "response" not in data:
             return data
         if data.get("answer") is None:
@@ -102,6 +103,8 @@ class RatingIn(BaseModel):
             return {**data, "answer": {"kind": "clip_rating", "answers": rated}}
         if data["response"] is not None:
             raise ValueError(f"expected an answer alone, got the response {data['response']!r:.40} beside it")
+        if isinstance(data["answer"], dict):
+            return {**data, "answer": {"kind": "paired_comparison", **data["answer"]}}
         return data
 
 

@@ -44,15 +44,16 @@ class Offer:
 class Outlook:
     """What a run's answers lead to.
 
-    known: counting answers of each series when this was reckoned. estimates: by trial and play. closed:
-    trials that an ended series leaves over, newly or before. remaining: trials still to be answered.
+    known: counting answers of each series when this was reckoned. estimates: by trial and play. closing:
+    trials that a series leaves over by ending. closed: those, and the ones closed before. remaining: trials
+    still to be answered. The last two are known once this is kept.
     """
 
     known: Mapping[str, int]
     offers: tuple[Offer, ...]
     estimates: Mapping[tuple[int, int], Estimate]
     closing: tuple[int, ...]
-    closed: tuple[int, ...]
+    closed: tuple[int, ...] = ()
     remaining: int = 0
 
 
@@ -99,8 +100,7 @@ def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any
         for row, stimulus in zip(next_ones, chosen, strict=True):
             clip = _clip(loaded, dict(one.levels), stimuli(experiment)[stimulus], row.position)
             offers.append(Offer(row.trial_index, row.role, len(given), clip))
-    closed = (*(row.trial_index for row in trials if row.closed), *closing)
-    return Outlook(known, tuple(offers), estimates, tuple(closing), closed)
+    return Outlook(known, tuple(offers), estimates, tuple(closing))
 
 
 def ended(stop: Stop, assumed: Model, said: Answers) -> bool:
@@ -149,7 +149,9 @@ def _keep(connection: Connection, token: str, outlook: Outlook) -> Outlook | Non
     if closing:
         repository.close(connection, run.id, closing)
     remaining = run.trials_total - run.trials_answered - len(closing)
-    return replace(outlook, remaining=remaining)
+    # A trial that was played meanwhile stays open: its page must not be told that it needs no answer.
+    closed = (*(row.trial_index for row in stored if row.closed), *closing)
+    return replace(outlook, closed=closed, remaining=remaining)
 
 
 def _is_new(offer: Offer, latest: Mapping[int, int]) -> bool:

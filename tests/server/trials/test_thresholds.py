@@ -9,12 +9,13 @@ from fastapi.testclient import TestClient
 
 from server.context import Services
 from server.export.formats import FORMATS
-from server.models import SeriesOffer, Study, StudyRun
+from server.models import SeriesAnswer, SeriesOffer, Study, StudyRun
 from server.simulation.observer import observer_of
 from server.simulation.person import Person, Rater
 from server.trials.series import quest
 from server.trials.series import service as series
 from server.versions import Versions
+from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 from tests.helpers.thresholds import TWO_INTERVAL, YES_NO, text_with, thresholds
 
@@ -209,6 +210,32 @@ def test_a_series_ends_early_and_its_trials_need_no_answer(
         assert run.trials_answered <= run.trials_total
 
 
+def test_a_trial_that_failed_while_its_series_ended_is_still_asked_for(
+    client: TestClient, services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rule = YES_NO.replace("stop = { trials = 8 }", "stop = { trials = 12, at_least = 4, sd = 200.0 }")
+    study = add_study(services, tmp_path / "clips", text_with(SHORT, rule))
+    one = Participant(client, study.link_token).agree()
+    late, failed = of_series(one.state(), 0)[5], list[Any]()
+    reckoned = series.reckoned
+
+    def meanwhile(*stored: Any) -> series.Outlook:
+        outlook = reckoned(*stored)
+        if outlook.closing and not failed:
+            failed.append(None)
+            wrong = good_playback(late) | {"clip_sha256": "0" * 64}
+            failed[0] = answer(one, late, "yes", playback=wrong).json()["receipt"]
+        return outlook
+
+    monkeypatch.setattr(series, "reckoned", meanwhile)
+    for place in range(4):
+        saved = answer(one, of_series(one.state(), 0)[place], "yes").json()
+    assert failed[0]["again"]
+    assert late["trial_index"] not in saved["next"]["closed"]
+    (asked,) = [trial for trial in one.state()["trials"] if trial["trial_index"] == late["trial_index"]]
+    assert not asked["answered"]
+
+
 class Api:
     """The client that `Person` speaks through."""
 
@@ -265,3 +292,13 @@ def test_simulated_observers_answer_to_the_end_and_the_csv_has_their_series(
     header = lines[0].split(",")
     assert {"series", "duration", "value", "response", "correct", "ahead", "threshold"} <= set(header)
     assert "| ahead | integer |" in codebook
+
+
+def test_erasure_leaves_nothing_of_what_was_answered(
+    observer: Participant, services: Services, experimenter: Admin
+) -> None:
+    assert answer(observer, of_series(observer.state(), 0)[0], "yes").status_code == 201
+    path = f"/studies/short/runs/{observer.run_id}/erase"
+    assert experimenter.send("POST", path, {"confirm": observer.run_id}).status_code == 200
+    with services.database.read() as session:
+        assert session.query(SeriesAnswer).count() == session.query(SeriesOffer).count() == 0
