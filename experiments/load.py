@@ -71,6 +71,9 @@ def parse_experiment(text: str, source: str = "definition") -> Experiment:
     except tomllib.TOMLDecodeError as error:
         line = getattr(error, "lineno", None) or _line_in(str(error))
         raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
+    except RecursionError as error:
+        problem = Problem(None, "", "not valid TOML: lists or tables are nested too deeply")
+        raise DefinitionError(source, [problem]) from error
     number = data.pop("format", 1)
     try:
         data = upgraded(data, number)

@@ -113,7 +113,7 @@ def edit(wanted: EditDefinition) -> EditedDefinition:
     text = wanted.toml if wanted.data is None else with_data(wanted.toml, wanted.data)
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         data = None
     checked = check(text)
     return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)

@@ -18,6 +18,8 @@ from server.studies import toml_items
 
 IDENTITY = ("name", "value", "rule", "kind")
 """Keys by which an element of a list is known again after an edit; else its content, then its place."""
+MAX_ELEMENTS = 2000
+"""Elements of lists in a text that is edited: each is compared with each, while others wait."""
 
 
 def with_data(text: str, data: Mapping[str, Any]) -> str:
@@ -26,10 +28,11 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     Raises
     ------
     InputError
-        Where `text` is not TOML, or `data` holds what TOML cannot say.
+        Where `text` is not TOML, `data` holds what TOML cannot say, or there is too much of either.
     """
     wanted = _without_none(data)
     try:
+        _refuse_too_many(tomllib.loads(text), wanted)
         document = tomlkit.parse(text)
         _merge(document, wanted)
         merged = tomlkit.dumps(document)
@@ -40,8 +43,24 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
             raise InputError(f"not valid TOML: {error}; correct the text first") from error
     except (TypeError, ValueError) as error:
         raise InputError(f"the declaration holds what TOML cannot say: {error}") from error
+    except RecursionError as error:
+        raise InputError("lists or tables are nested too deeply; correct the text first") from error
     # Tables written out of order are beyond tomlkit's editing: the whole is then written afresh.
     return tomlkit.dumps(toml_items.fresh_document(wanted))
+
+
+def _refuse_too_many(*said: Any) -> None:
+    most = max(map(_elements, said))
+    if most > MAX_ELEMENTS:
+        raise InputError(
+            f"expected at most {MAX_ELEMENTS} elements in all lists together, got {most}; "
+            "edit such a text by hand"
+        )
+
+
+def _elements(value: Any) -> int:
+    inner = list(value.values()) if isinstance(value, Mapping) else value if isinstance(value, list) else []
+    return len(inner) * isinstance(value, list) + sum(map(_elements, inner))
 
 
 def _is_toml(text: str) -> bool:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from experiments.load import SHIPPED, locate
+from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
 from server.studies.toml_edit import with_data
 
 EXP3 = locate("exp3").read_text(encoding="utf-8")
@@ -130,3 +130,17 @@ def test_tables_out_of_order_are_written_whole() -> None:
 def test_text_that_is_no_toml_is_refused() -> None:
     with pytest.raises(InputError, match="not valid TOML"):
         with_data("name = ", {"name": "a"})
+
+
+def test_a_text_beyond_editing_is_refused_in_one_line() -> None:
+    deep = f"a = {'[' * 5000}{']' * 5000}"
+    for text, data, told in (
+        (deep, {"a": 1}, "nested too deeply"),
+        (f"a = {list(range(2001))}", {"a": 1}, "at most 2000 elements"),
+        ("a = 1", {"a": [[1] * 1000, [2] * 1000]}, "at most 2000 elements"),
+    ):
+        with pytest.raises(InputError, match=told) as refused:
+            with_data(text, data)
+        assert "\n" not in str(refused.value)
+    with pytest.raises(DefinitionError, match="nested too deeply"):
+        parse_experiment(deep)
