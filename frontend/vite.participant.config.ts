@@ -30,6 +30,7 @@ export default defineConfig({
     target: "es2022",
     modulePreload: { polyfill: false },
     sourcemap: false,
+    manifest: true,
     rolldownOptions: {
       input: { index: "src/participant/index.html", [OFFLINE]: "src/participant/service-worker.ts" },
       output: { entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : "[name]-[hash].js") },

@@ -2,7 +2,7 @@
 import "./style/index.css";
 import type { LinkState, RunStarted, RunState } from "../api/schema";
 import { Refused } from "./request";
-import { loadMessages, preferred, SHIPPED, translator, type Translate } from "../i18n";
+import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround } from "./flow/appearance";
 import { fetchFirst } from "./flow/blocks";
 import { ended } from "./flow/ended";
@@ -11,7 +11,7 @@ import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity
 import { type Kept, KeptVisit } from "./flow/kept-visit";
 import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGate, showRefusal, startRun } from "./flow/link";
 import { describeDevice, flush, openSession } from "./flow/open-session";
-import { asksForCode, codePage, type Claim } from "./flow/resume-code";
+import { asksForCode, type Claim } from "./flow/resume-code";
 import { serveOffline } from "./flow/serve-offline";
 import { type Beginning, startPage, titleOf } from "./flow/start-page";
 import { timeline } from "./flow/timeline";
@@ -94,13 +94,15 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
   const start = { language, query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent }, evidence: true };
   const claimed = (claim: Claim): Promise<RunStarted> => startRun(link_token, { ...start, client_id: identity.client_id(), ...claim });
   const kept = identity.code;
-  if (has_code) return codePage(root, t, "code_enter", identity, claimed);
+  const askForCode = async (why: MessageKey): Promise<RunStarted> =>
+    (await import("./flow/code-page")).codePage(root, t, why, identity, claimed);
+  if (has_code) return askForCode("code_enter");
   try {
     return await persistently(root, t, () => claimed(kept ? { resume_code: kept } : {}));
   } catch (error) {
     const why = asksForCode(error);
     if (!why) throw error;
-    return codePage(root, t, why, identity, claimed);
+    return askForCode(why);
   }
 }
 

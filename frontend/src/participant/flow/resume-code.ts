@@ -1,12 +1,7 @@
 /** Taking up a visit by its resume code, where the browser and the link do not say whose it is. */
 import type { RunStarted } from "../../api/schema";
-import type { MessageKey, Translate } from "../../i18n";
-import { h, uniqueId } from "../../ui/element";
-import { alertLine, button, showPage } from "../../ui/page";
+import type { MessageKey } from "../../i18n";
 import { Refused } from "../request";
-import { emptied } from "../screens/notice";
-import type { Identity } from "./identity";
-import { isNoAnswer } from "./link";
 
 /** What a start says beside what every start says. */
 export type Claim = { resume_code: string } | { anew: true } | Record<string, never>;
@@ -17,59 +12,7 @@ const ASKED_FOR: Record<string, MessageKey> = {
   taken_part_already: "code_over",
   resume_code_wrong: "code_enter",
 };
-const WRONG: Record<string, MessageKey> = { resume_code_wrong: "code_wrong", too_many_requests: "code_wait" };
-
 /** Why a code must be entered; null where the refusal is another. */
 export function asksForCode(error: unknown): MessageKey | null {
   return error instanceof Refused ? (ASKED_FOR[error.code] ?? null) : null;
-}
-
-/** Ask for the code until one fits, or the rater begins anew; other refusals are thrown. */
-export function codePage(root: HTMLElement, t: Translate, why: MessageKey, identity: Identity, start: Start): Promise<RunStarted> {
-  const alert = alertLine();
-  alert.id = uniqueId("alert");
-  const input = h("input", {
-    id: uniqueId("code"),
-    type: "text",
-    autocomplete: "off",
-    autocapitalize: "characters",
-    spellcheck: false,
-    maxlength: 20,
-    "aria-describedby": alert.id,
-  });
-  return new Promise((resolve, reject) => {
-    const claim = (what: Claim): void => {
-      alert.textContent = "";
-      start(what).then(
-        (started) => {
-          if ("resume_code" in what) identity.keepCode(what.resume_code);
-          resolve(started);
-        },
-        (error: unknown) => {
-          // Nothing has begun here: who loads the page again comes to the first page.
-          if (why === "code_enter") identity.forget();
-          const key = error instanceof Refused ? WRONG[error.code] : isNoAnswer(error) ? "no_answer" : undefined;
-          if (!key) return reject(error instanceof Error ? error : new Error(String(error)));
-          alert.textContent = t(key);
-          input.focus();
-        },
-      );
-    };
-    const enter = (event: Event): void => {
-      event.preventDefault();
-      claim({ resume_code: input.value });
-    };
-    const go = h("button", { type: "submit", class: "button primary" }, t("continue"));
-    // Who came by a code of their own has begun nothing under a recruiter's id.
-    const anew = why === "code_needed" ? button(t("code_anew"), () => claim({ anew: true }), "quiet") : null;
-    const form = h(
-      "form",
-      { onsubmit: enter },
-      h("p", { class: "field" }, h("label", { for: input.id }, t("code_label")), input),
-      alert,
-      h("footer", { class: "actions" }, go, anew),
-    );
-    showPage(emptied(root), { title: t("code_title"), body: [h("p", {}, t(why)), form] });
-    input.focus();
-  });
 }

@@ -17,7 +17,6 @@ import { answerOf, noAnswer, onlyResponse } from "./answer";
 import { askInOrder, type Rated } from "./scale";
 import { sayAlreadySeen } from "../shared/already-seen";
 import { showOnce, type Shown, waitForStart } from "../shared/showing";
-import { simulatedRating } from "./simulate";
 import { stage, type Stage } from "../shared/stage";
 
 export interface ClipRatingParameters {
@@ -53,7 +52,7 @@ export function clipRating(session: Session): PluginClass<ClipRatingParameters> 
       again: { type: BOOL, description: "true where this was a repetition" },
     },
     show: (display, parameters) => runTrial(session, display, parameters),
-    simulate: (parameters) => simulatedRating(session, parameters),
+    simulate: async (parameters) => (await import("./simulate")).simulatedRating(session, parameters),
     act: (display) => actTrial(display),
   });
 }

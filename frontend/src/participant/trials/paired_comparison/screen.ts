@@ -22,7 +22,6 @@ import { declaredPairs } from "./declared";
 import type { Arrangement, Layout } from "./layout";
 import { preparePair, releasePair, showAll } from "./pair-player";
 import { stageFor } from "./pair-stage";
-import { simulatedComparison } from "./simulate";
 
 export interface ComparisonParameters {
   trial: TrialInfo;
@@ -53,7 +52,7 @@ export function comparison(session: Session): PluginClass<ComparisonParameters> 
       again: { type: BOOL, description: "true where this was a repetition" },
     },
     show: (display, parameters) => runTrial(session, display, parameters),
-    simulate: (parameters) => simulatedComparison(session, parameters),
+    simulate: async (parameters) => (await import("./simulate")).simulatedComparison(session, parameters),
     act: actTrial,
   });
 }

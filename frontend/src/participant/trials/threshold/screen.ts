@@ -23,7 +23,6 @@ import { askResponse, type Response } from "./answers";
 import { awaitChoice } from "./await-choice";
 import { thresholdBody } from "./body";
 import { declaredThreshold } from "./declared";
-import { simulatedThreshold } from "./simulate";
 
 export interface ThresholdParameters {
   trial: TrialInfo;
@@ -58,7 +57,7 @@ export function thresholdTrial(session: Session): PluginClass<ThresholdParameter
       again: { type: BOOL, description: "true where this was a repetition" },
     },
     show: (display, parameters) => runTrial(session, display, parameters),
-    simulate: (parameters) => simulatedThreshold(session, parameters),
+    simulate: async (parameters) => (await import("./simulate")).simulatedThreshold(session, parameters),
     act: actTrial,
   });
 }
