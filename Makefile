@@ -25,7 +25,7 @@ check: setup-test ## lint and type-check everything, import rules, lock files, k
 	@$(BIN)/mypy
 	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools
 	@$(BIN)/lint-imports
-	@cd frontend && npm run --silent typecheck && npm run --silent lint && npm run --silent api -- --check
+	@cd frontend && npm run --silent typecheck && npm run --silent lint && npm run --silent api -- --check && npm run --silent size
 	@$(BIN)/python tools/check_lock_files.py
 	@$(BIN)/python tools/audit.py
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import (
     MISSING_MARKS,
     TextTable,
@@ -18,6 +19,8 @@ from analysis.read.text_table import (
 from experiments.errors import InputError
 
 LEFT, RIGHT, TIE = 0, 1, 2
+EXPORTED_SIDES = {"kind", "left_cell", "right_cell"}
+"""Columns by which the server's export is known."""
 Codes = NDArray[np.int64]
 
 
@@ -58,6 +61,8 @@ def read_comparisons(
 ) -> Comparisons:
     """Read one row a comparison.
 
+    Of the server's export only main trials count, without failed plays and runs excluded by hand.
+
     Parameters
     ----------
     path : Path
@@ -76,12 +81,17 @@ def read_comparisons(
     """
     roles = [left, right, winner, *([participant] if participant else [])]
     refuse_shared_roles(roles)
-    table = read_text_table(path, roles, ("synthetic",))
+    table = read_text_table(path, roles, EXPORT_COLUMNS)
     for name in (left, right, *([participant] if participant else [])):
         texts_required(table, name)
     columns = {name: table.columns[name].astype(str).to_numpy() for name in roles}
     _refuse_same(table, columns[left], columns[right])
     outcome, judged = _outcomes(table, columns[left], columns[right], columns[winner], winner, tie)
+    if set(table.header) >= EXPORTED_SIDES:
+        judged, left_out = rows_that_count(table.columns, judged)
+        table.decisions.extend(left_out)
+        if not judged.any():
+            raise InputError(f"{path.name}: no comparison counts; {', '.join(left_out)}")
     items = tuple(sorted({*columns[left][judged], *columns[right][judged]}))
     people: tuple[str, ...] = ()
     codes = None

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import TextTable, numbers, read_text_table, texts_required, unusual_numbers
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
-
-EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
 
 
 @dataclass(frozen=True)
@@ -58,16 +57,9 @@ def read_model_input(
     rows = table.columns.assign(**{rating: values})
     keep = ~np.isnan(values)
     decisions = list(table.decisions)
-    for column, good, why in (
-        ("kind", ("main", ""), "practice and attention trials"),
-        ("verdict", ("good", "flagged", ""), "failed plays"),
-        ("excluded", ("0", "False", "false", ""), "rows of runs excluded by hand"),
-    ):
-        if exported and column in rows.columns:
-            out = keep & ~rows[column].astype(str).isin(good).to_numpy()
-            if out.any():
-                decisions.append(f"{out.sum()} {why} left out")
-            keep &= ~out
+    if exported:
+        keep, left_out = rows_that_count(rows, keep)
+        decisions += left_out
     if np.isnan(values).any():
         decisions.append(f"{np.isnan(values).sum()} rows without a rating left out")
     if not keep.any():

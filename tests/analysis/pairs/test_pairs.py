@@ -164,3 +164,24 @@ def test_the_command_writes_what_it_promises(tmp_path: Path) -> None:
 def test_bad_tables_are_one_line(tmp_path: Path, rows: list[Row], told: str) -> None:
     with pytest.raises(InputError, match=told):
         fitted(table(tmp_path, rows))
+
+
+def test_of_an_export_only_answers_that_count_are_compared(tmp_path: Path) -> None:
+    rows = [
+        ("main", "good", "0", "a", "b", "left"),
+        ("main", "flagged", "0", "b", "c", "right"),
+        ("main", "uncertain", "0", "a", "c", "left"),
+        ("practice", "good", "0", "a", "c", "right"),
+        ("main", "failed", "0", "a", "c", "right"),
+        ("main", "good", "1", "a", "c", "right"),
+    ]
+    names = ("kind", "verdict", "excluded", "left_cell", "right_cell", "winner")
+    table = tmp_path / "comparisons.csv"
+    table.write_text("\n".join(",".join(row) for row in (names, *rows)) + "\n")
+    comparisons = read_comparisons(table, "left_cell", "right_cell", "winner")
+    assert comparisons.outcome.tolist() == [0, 1, 0]
+    assert "1 practice and attention trials left out" in comparisons.decisions
+    assert "1 failed plays left out" in comparisons.decisions
+    # The same columns in somebody else's table mean nothing to us.
+    table.write_text(table.read_text().replace("left_cell", "one").replace("right_cell", "two"))
+    assert len(read_comparisons(table, "one", "two", "winner").outcome) == 6

@@ -48,14 +48,14 @@ export function choicePlot({ pairs }: Data, labels: Map<string, string>): Plot.P
     marginBottom: 100,
     x: { domain: names, label: "over", tickRotate: -30, tickFormat: short },
     y: { domain: names, label: null, tickFormat: short },
-    color: { scheme: "PuOr", domain: [0, 1], legend: true, label: "share chosen", tickFormat: ".0%" },
+    color: { type: "linear", scheme: "PuOr", domain: [0, 1], legend: true, label: "share chosen", tickFormat: ".0%" },
     marks: [
       Plot.cell(rows, { x: "over", y: "chosen", fill: "share", inset: 0.5, tip: true, channels: { comparisons: "n" } }),
       Plot.text(rows, {
         x: "over",
         y: "chosen",
         text: (row: { share: number }) => `${Math.round(100 * row.share)}%`,
-        fill: (row: { share: number }) => (Math.abs(row.share - 0.5) > 0.3 ? "white" : "black"),
+        fill: (row: { share: number }) => (Math.abs(row.share - 0.5) > 0.35 ? "white" : "black"),
         fontSize: 11,
       }),
     ],
