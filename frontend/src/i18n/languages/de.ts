@@ -192,6 +192,7 @@ export const messages: Messages = {
   code_label: "Code zum Weitermachen",
   code_wrong: "Kein Besuch hat diesen Code. Bitte vergleichen Sie ihn mit Ihrer Notiz.",
   code_wait: "Zu viele Versuche. Bitte warten Sie eine Minute.",
+  code_back: "Zurück",
   code_anew: "Ich habe keinen Code: neu beginnen",
 
   gate_title: "Die Studie kann hier nicht gezeigt werden",

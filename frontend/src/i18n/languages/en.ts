@@ -189,6 +189,7 @@ export const messages = {
   code_label: "Resume code",
   code_wrong: "No visit has this code. Please compare it with what you noted.",
   code_wait: "Too many tries. Please wait a minute.",
+  code_back: "Back",
   code_anew: "I have no code: begin anew",
 
   gate_title: "The study cannot be shown here",

@@ -49,12 +49,13 @@ export function codePage(root: HTMLElement, t: Translate, why: MessageKey, ident
     const go = h("button", { type: "submit", class: "button primary" }, t("continue"));
     // Who came by a code of their own has begun nothing under a recruiter's id.
     const anew = why === "code_needed" ? button(t("code_anew"), () => claim({ anew: true }), "quiet") : null;
+    const back = why === "code_enter" ? button(t("code_back"), () => location.reload(), "quiet") : null;
     const form = h(
       "form",
       { onsubmit: enter },
       h("p", { class: "field" }, h("label", { for: input.id }, t("code_label")), input),
       alert,
-      h("footer", { class: "actions" }, go, anew),
+      h("footer", { class: "actions" }, go, anew, back),
     );
     showPage(emptied(root), { title: t("code_title"), body: [h("p", {}, t(why)), form] });
     input.focus();
