@@ -14,7 +14,7 @@ const NAMED: readonly Section[] = [
     id: "study",
     label: "Study",
     about: "What the study is called, where it comes from, and in which languages people may take part.",
-    keys: ["name", "title", "source", "version", "participants", "languages"],
+    keys: ["name", "title", "participant_title", "source", "version", "participants", "languages"],
   },
   {
     id: "factors",
