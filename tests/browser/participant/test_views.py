@@ -14,6 +14,8 @@ from tests.browser.visit import Visit, axe_violations
 
 pytestmark = pytest.mark.browser
 FRAMES = 60
+LONG = 150
+"""Frames of clips in the midst of which something happens: five seconds, for slow machines."""
 RATED = (
     "SELECT trial_index, play, response, views, view_outcomes, disturbances, verdict, verdict_rule, rt "
     "FROM ratings WHERE kind = 'main' ORDER BY time_elapsed, play"
@@ -25,10 +27,10 @@ VIEWS = (
 
 
 def in_front_of_a_trial(
-    server: ServerProcess, folder: Path, page: Page, kind: str = "general", declared: str = PLAIN
+    server: ServerProcess, folder: Path, page: Page, kind: str = "general", frames: int = FRAMES
 ) -> tuple[Visit, str]:
-    """A visit in front of its first main trial, with clips of two seconds."""
-    study = server.add_study(folder, declared, frames=FRAMES)
+    """A visit in front of its first main trial, with clips of so many frames."""
+    study = server.add_study(folder, PLAIN, frames=frames)
     server.start()
     link = study.link_token if kind == "general" else server.link(study, "personal")
     visit = Visit(page, server.address).open(link).begin().instructions().practice()
@@ -95,7 +97,7 @@ def test_a_reload_on_the_scale_returns_to_the_scale(
 def test_a_reload_in_mid_clip_ends_the_view_and_the_trial_comes_again(
     server: ServerProcess, tmp_path: Path, page: Page
 ) -> None:
-    visit, _ = in_front_of_a_trial(server, tmp_path / "clips", page)
+    visit, _ = in_front_of_a_trial(server, tmp_path / "clips", page, frames=LONG)
     start_clip(page)
     page.wait_for_timeout(400)
     page.reload()
@@ -193,7 +195,7 @@ def test_what_disturbs_a_view_is_recorded_and_flags_it(
     declared = PLAIN.replace("[display]", rules)
     if display:
         declared = declared.replace("full_screen = false", display)
-    study = server.add_study(tmp_path / "clips", declared, frames=FRAMES)
+    study = server.add_study(tmp_path / "clips", declared, frames=LONG)
     server.start()
     # A screen larger than the window: else the window counts as full screen already.
     context = chromium.new_context(
