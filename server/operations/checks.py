@@ -187,7 +187,8 @@ def people(services: Services) -> Iterator[Finding]:
         without = session.scalar(query.where(Account.totp_confirmed_at.is_(None))) or 0
         studies = session.scalar(select(func.count()).select_from(Study)) or 0
     advice = "" if owners else "run: server admin link, and open the address it prints"
-    yield Finding("accounts", "ok" if owners else "warning", f"{owners} owner{'' if owners == 1 else 's'}", advice)
+    counted = "1 owner" if owners == 1 else f"{owners} owners"
+    yield Finding("accounts", "ok" if owners else "warning", counted, advice)
     if without:
         advice = "ask them to set it up under their account"
         yield Finding("second factor", "warning", f"{without} accounts without", advice)

@@ -13,12 +13,12 @@ from tools.build_addon import build
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 BLENDER_PYTHON = ROOT / ".venv-bake" / "bin" / "python"
+if not BLENDER_PYTHON.is_file():
+    pytest.skip("Blender as a module (bpy) is not installed in .venv-bake", allow_module_level=True)
 
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    if not BLENDER_PYTHON.is_file():
-        pytest.skip("Blender as a module (bpy) is not installed in .venv-bake")
     folder = tmp_path_factory.mktemp("addon")
     script = Path(__file__).with_name("in_blender.py")
     ran = subprocess.run(
