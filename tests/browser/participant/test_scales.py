@@ -1,4 +1,4 @@
-"""Several scales on one screen: points, a slider and an answer beside it, by touch on small screens."""
+"""Several scales on one screen: points, a slider and an answer beside it, by keys, mouse and touch."""
 
 import json
 import re
@@ -36,9 +36,12 @@ STUDY = re.sub(
 )
 
 
-def at_the_scales(page: Page) -> None:
+def at_the_scales(page: Page, press_start: bool = True) -> None:
     page.wait_for_selector(".ready")
-    page.tap(".below .primary")
+    if press_start:
+        page.keyboard.press(" ")
+    else:
+        page.tap(".below .primary")
     page.wait_for_selector(".scales")
 
 
@@ -46,6 +49,37 @@ def slider_at(page: Page, share: float) -> tuple[float, float]:
     box = page.locator(".slider").bounding_box()
     assert box is not None
     return box["x"] + share * box["width"], box["y"] + box["height"] / 2
+
+
+def test_keys_and_mouse_answer_points_and_sliders(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", STUDY)
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin().instructions()
+    at_the_scales(page)
+    assert page.locator(".slider.untouched").count() == 1, "a slider has no handle before the first touch"
+    assert page.locator(".scales ~ .actions .primary").is_disabled()
+    assert axe_violations(page) == []
+    page.keyboard.press("3")
+    page.keyboard.press("ArrowRight")  # the slider has the focus by now
+    assert page.locator(".slider.untouched").count() == 0
+    page.keyboard.press("Enter")
+    at_the_scales(page)
+    page.locator(".key").nth(1).click()
+    page.mouse.click(*slider_at(page, 0.95))
+    page.locator(".scales ~ .actions .primary").click()
+    at_the_scales(page)
+    page.locator(".key").first.click()
+    page.locator(".beside").click()
+    assert page.locator(".slider.untouched").count() == 1
+    page.locator(".scales ~ .actions .primary").click()
+    page.wait_for_selector(".ready, .break")
+    rows = server.rows_soon("SELECT payload FROM trial_ratings ORDER BY time_elapsed", 3)
+    first, second, third = (json.loads(row["payload"])["answers"] for row in rows)
+    assert (first["natural"]["response"], first["eerie"]["response"]) == (3, 51)
+    assert second["natural"]["response"] == 2
+    assert 90 <= second["eerie"]["response"] <= 100
+    assert (third["eerie"]["response"], third["eerie"]["not_applicable"]) == (None, True)
+    assert visit.problems == []
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (720, 450)], ids=["phone", "200% zoom"])
@@ -59,8 +93,7 @@ def test_touch_on_a_small_screen(
     )
     page = context.new_page()
     Visit(page, server.address).open(study.link_token).begin().instructions()
-    at_the_scales(page)
-    assert page.locator(".slider.untouched").count() == 1, "a slider has no handle before the first touch"
+    at_the_scales(page, press_start=False)
     assert axe_violations(page) == []
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page scrolls sideways"
     page.locator(".key").nth(1).tap()

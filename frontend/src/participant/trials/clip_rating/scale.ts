@@ -97,7 +97,7 @@ class ScalesView {
     place.replaceChildren(...this.layout());
     listenKeys((event) => this.pressed(event), signal);
     // The scale has the focus, so that Tab and screen readers go on from here, yet no key looks chosen.
-    this.blocks[0]?.group.focus({ preventScroll: true });
+    if (this.blocks[0]) this.goTo(this.blocks[0]);
   }
 
   private block(scale: Scale, number: number): Block {
@@ -166,11 +166,15 @@ class ScalesView {
     this.confirm.disabled = this.blocks.some((one) => !one.chosen);
   }
 
+  /** All answers where there are all; else the first scale without one has the focus. */
   private finish(): void {
+    const open = this.blocks.find(({ chosen }) => !chosen);
+    if (open) return this.goTo(open);
+    if (this.over) return;
     const answers: Answers = {};
     const at_ms: Record<string, number> = {};
     for (const { scale, chosen } of this.blocks) {
-      if (!chosen || this.over) return;
+      if (!chosen) return;
       answers[scale.name] = { response: chosen.value, not_applicable: chosen.value === null };
       at_ms[scale.name] = chosen.at_ms;
     }

@@ -9,7 +9,7 @@ export function widget({ scale, question, language, t, meant, choose, enter }: A
   const { minimum, maximum, step, low, high, show_value } = scale;
   const input = h("input", { type: "range", class: "slider", min: minimum, max: maximum, step, "aria-labelledby": question });
   const ends = [pick(low, language), pick(high, language)];
-  const number = h("output", { class: "slider-value", "aria-hidden": "true" });
+  const number = h("b", { class: "slider-value" });
 
   function show(value: number | null): void {
     input.classList.toggle("untouched", value === null);
@@ -21,13 +21,15 @@ export function widget({ scale, question, language, t, meant, choose, enter }: A
   }
   const moved = (event: Event): void => choose(input.valueAsNumber, event.timeStamp);
   input.addEventListener("input", moved);
+  // Without the press the browser does not move the handle; its release, wherever it is by then, answers nothing either.
+  let refused = false;
+  input.addEventListener("pointerdown", (event) => {
+    refused = !meant.allows(event);
+    if (refused) event.preventDefault();
+  });
   // A press exactly where the hidden handle lies moves nothing, yet is an answer.
   input.addEventListener("click", (event) => {
-    if (meant.allows(event)) moved(event);
-  });
-  // Without the press the browser does not move the handle.
-  input.addEventListener("pointerdown", (event) => {
-    if (!meant.allows(event)) event.preventDefault();
+    if (!refused) moved(event);
   });
   input.addEventListener("keydown", (event) => {
     if (event.key === "Enter") enter();
@@ -35,8 +37,8 @@ export function widget({ scale, question, language, t, meant, choose, enter }: A
   show(null);
   return {
     parts: [
-      h("div", { class: "slider-line" }, input, show_value ? number : null),
-      h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, ends[0]), h("span", {}, ends[1])),
+      input,
+      h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, ends[0]), show_value ? number : null, h("span", {}, ends[1])),
     ],
     settles: false,
     show,
