@@ -24,13 +24,13 @@ from server.operations import endpoints as operations
 from server.operations.observer import Observer
 from server.participants import endpoints as participants
 from server.participants import rating_endpoints as trials
+from server.participants import view_endpoints as views
 from server.reports import endpoints as reports
 from server.results import endpoints as results
 from server.runs import endpoints as runs
 from server.settings import Settings
 from server.studies import endpoints as studies
 from server.studies import link_endpoints as links
-from server.views import endpoints as views
 
 
 def _routers() -> tuple[APIRouter, ...]:

@@ -6,7 +6,6 @@ from sqlalchemy.orm import Session
 
 from server.errors import Conflict
 from server.models import StudyRun, View, ViewClip
-from server.participants.lookup import find_run
 from server.trials.refusals import ConsentMissing
 from server.trials.service import TrialNotInRun
 from server.views import repository
@@ -20,9 +19,11 @@ class ViewDiffers(Conflict):
     code = "view_differs"
 
 
-def save_views(session: Session, token: str, sent: ViewsIn, moment: datetime) -> ViewsSaved:
-    """Begin and complete views, all of them or none; also after the run's end, since the page sends late."""
-    run = find_run(session, token, lock=True)
+def save_views(session: Session, run: StudyRun, sent: ViewsIn, moment: datetime) -> ViewsSaved:
+    """Begin and complete views of a locked run, all of them or none.
+
+    Also after the run's end, since the page sends late.
+    """
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
     trials = {view.trial_index for view in sent.views}

@@ -18,16 +18,16 @@ EXP1 = locate("exp1").read_text(encoding="utf-8")
 @pytest.mark.parametrize(
     ("old", "new", "line", "message"),
     [
-        ("per_cell", "per_cel", 66, "unknown key 'per_cel'; did you mean 'per_cell'?"),
-        ("motion_blur = false", "motion_blr = false", 49, "did you mean 'motion_blur'?"),
-        ('rule = "incomplete"', 'rule = "incomplet"', 98, "did you mean 'incomplete'?"),
-        ("more_than = 0.2", "mor_than = 0.2", 102, "did you mean 'more_than'?"),
-        ("expected_seconds = 7.3", "expected_seconds = -1", 79, "greater than 0, got -1"),
-        ("maximum = 120", "maximun = 120", 126, "did you mean 'maximum'?"),
+        ("per_cell", "per_cel", 67, "unknown key 'per_cel'; did you mean 'per_cell'?"),
+        ("motion_blur = false", "motion_blr = false", 50, "did you mean 'motion_blur'?"),
+        ('rule = "incomplete"', 'rule = "incomplet"', 99, "did you mean 'incomplete'?"),
+        ("more_than = 0.2", "mor_than = 0.2", 103, "did you mean 'more_than'?"),
+        ("expected_seconds = 7.3", "expected_seconds = -1", 80, "greater than 0, got -1"),
+        ("maximum = 120", "maximun = 120", 127, "did you mean 'maximum'?"),
         (
             'own_per = ["profile"]',
             'own_per = ["profil"]',
-            67,
+            68,
             "no factor is called 'profil'; did you mean 'profile'?",
         ),
         ("title =", "title ", 3, "not valid TOML"),

@@ -219,7 +219,8 @@ def test_a_draft_is_rehearsed_and_no_count_of_people_knows(
         assert [run.origin for run in session.query(StudyRun)] == ["simulated"] * 2
         assert session.query(Study).one().status == "draft"
         pools = (
-            Pool(study_id=1, origin=origin, series=1) for origin in ("participant", "pilot", "simulated")
+            Pool(study_id=1, origin=origin, series=1, scale=SCALE_NAME)
+            for origin in ("participant", "pilot", "simulated")
         )
         counts = [pooled(session, pool.runs(), SCALE_NAME, ()).answers.total() for pool in pools]
     assert counts[:2] == [0, 0]

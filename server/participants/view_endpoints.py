@@ -7,6 +7,7 @@ from sqlalchemy.orm import Session
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.participants.endpoints import RunToken
+from server.participants.lookup import find_run
 from server.views import service
 from server.views.schemas import ViewsIn, ViewsSaved
 
@@ -21,7 +22,7 @@ async def post_views(services: ServicesDep, request: Request, token: RunToken, b
 
     def save(connection: Connection) -> ViewsSaved:
         with Session(connection, expire_on_commit=False) as session:
-            saved = service.save_views(session, token, body, received_at)
+            saved = service.save_views(session, find_run(session, token, lock=True), body, received_at)
             session.flush()
         return saved
 
