@@ -48,7 +48,7 @@ def test_three_participants_rate_every_trial(
         runs = session.query(StudyRun).all()
         assert [run.trials_answered for run in runs] == [trials + study.experiment.practice.trials] * PEOPLE
         rows = session.execute(text("SELECT * FROM ratings ORDER BY run, trial_index, play")).mappings().all()
-        exported = b"".join(ratings_csv(session, session.query(Study).one(), "participant")).decode("utf-8")
+        exported = b"".join(ratings_csv(session, session.query(Study).one(), "simulated")).decode("utf-8")
     assert len(rows) == sum(sent)
     assert tuple(rows[0]) == RATINGS.names
     assert all(row["synthetic"] for row in rows)
