@@ -10,7 +10,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError, did_you_mean
-from experiments.load import locate, parse_experiment
+from experiments.load import locate
 from experiments.manifest import Manifest, read_manifest
 from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
@@ -31,6 +31,7 @@ from server.studies.links import (
     prepared_links,
 )
 from server.studies.lookup import active_definition, active_version, find_study
+from server.studies.planned import planned_experiment
 
 study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
 link_app = typer.Typer(help="Links for participants.", no_args_is_help=True)
@@ -59,7 +60,7 @@ def add(
     Example: server study add exp3 --clips out/exp3 --open
     """
     text = locate(experiment).read_text(encoding="utf-8")
-    declared = parse_experiment(text, locate(experiment).name)
+    declared = planned_experiment(text, locate(experiment).name)
     manifest = read_manifest(clips)
     if manifest.experiment != declared.name:
         raise InputError(

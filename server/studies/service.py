@@ -26,6 +26,7 @@ from server.models import Study, StudyRun, StudyVersion
 from server.studies import own_clips
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
 from server.studies.lookup import active_version, find_study
+from server.studies.planned import planned_experiment
 from server.studies.schemas import (
     BlockOut,
     ChangeSettings,
@@ -97,14 +98,10 @@ def _notes(experiment: Experiment) -> list[str]:
 def check(text: str) -> Checked:
     """Every problem of a definition with its line, or what it expands to."""
     try:
-        experiment = parse_experiment(text)
+        experiment = planned_experiment(text)
     except DefinitionError as error:
         problems = [ProblemOut(line=p.line, path=p.path, message=p.message) for p in error.problems]
         return Checked(problems=problems, design=None)
-    try:
-        KINDS[experiment.trial.kind].plan(experiment)
-    except InputError as error:
-        return Checked(problems=[ProblemOut(line=None, path="trial", message=str(error))], design=None)
     return Checked(problems=[], design=design_out(experiment))
 
 
@@ -121,7 +118,7 @@ def edit(wanted: EditDefinition) -> EditedDefinition:
 
 def judge_edit(session: Session, name: str, text: str) -> JudgedEdit:
     """What saving this definition would do to stored answers; DefinitionError where it cannot be used."""
-    return judged(session, find_study(session, name), parse_experiment(text))
+    return judged(session, find_study(session, name), planned_experiment(text))
 
 
 def shipped(services: Services) -> list[ShippedExperiment]:
@@ -155,7 +152,7 @@ def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, M
             )
         text = wanted.toml or locate(wanted.shipped).read_text(encoding="utf-8")
         folder = services.settings.stimuli_folder / wanted.shipped
-        return text, parse_experiment(text), read_manifest(folder), folder
+        return text, planned_experiment(text), read_manifest(folder), folder
     if wanted.upload is None:
         raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
     folder = upload_folder(services.settings.upload_folder, wanted.upload)
@@ -164,7 +161,7 @@ def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, M
             raise Invalid(
                 "The upload has a manifest; give the definition (TOML) its clips were built from too."
             )
-        return wanted.toml, parse_experiment(wanted.toml), read_manifest(folder), folder
+        return wanted.toml, planned_experiment(wanted.toml), read_manifest(folder), folder
     return _own(wanted, folder)
 
 
@@ -176,7 +173,7 @@ def _own(wanted: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Pat
     text = wanted.toml
     if text is None and wanted.own_clips is not None:
         text = own_clips.definition_text(wanted.name, placed, wanted.own_clips)
-    experiment = parse_experiment(text or "")
+    experiment = planned_experiment(text or "")
     return text or "", experiment, own_clips.manifest_of(experiment, placed, folder), folder
 
 
@@ -202,7 +199,7 @@ def _for_edit(session: Session, name: str, revision: int) -> Study:
 
 def add_definition(services: Services, name: str, wanted: NewVersion, who: Identity) -> None:
     """Store a changed definition as a new version, with the clips there are and those of an upload."""
-    experiment = parse_experiment(wanted.toml)
+    experiment = planned_experiment(wanted.toml)
     added = _added_clips(services, wanted, experiment)
     with services.database.write() as session:
         study = _for_edit(session, name, wanted.revision)

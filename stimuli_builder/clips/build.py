@@ -10,6 +10,7 @@ from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest, read_manifest
 from experiments.schema.canonical import definition_sha256
+from experiments.trials import KINDS
 from stimuli_builder.characters.writing import write_bytes
 from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips
 from stimuli_builder.clips.manifest_file import assemble, manifest_text
@@ -57,10 +58,11 @@ def build(
     Raises
     ------
     InputError
-        The design cannot be rendered, the folder belongs to another experiment or cannot be written,
-        or the build was interrupted; what is built by then is kept and used by the next run.
+        The design cannot be analysed or rendered, the folder belongs to another experiment or cannot be
+        written, or the build was interrupted; what is built by then is kept and used by the next run.
     """
     options, machines = options or Options(), machines or Machines()
+    KINDS[experiment.trial.kind].plan(experiment)
     former = _former_manifest(experiment, folder)
     planned = planned_clips(experiment, options)
     state = BuildState.read(folder, former)

@@ -329,6 +329,38 @@ def test_a_changed_design_that_its_clips_do_not_fit_is_refused(
     assert "4 are missing from the manifest" in answer.json()["error"]["message"]
 
 
+PAIRS = """kind = "paired_comparison"
+question = { en = "Which?", de = "Welcher?" }
+presentation = { arrangement = "side_by_side", gap_mm = 8.0, if_too_narrow = "stack" }
+pairs = { among = "declared", cells = [{ cell = "a/slow", other = "a/fast" }, CELLS] }
+"""
+NEVER_COMPARED = SHORT.replace(
+    SHORT[SHORT.index('kind = "clip') : SHORT.index("[[exclusions]]")],
+    PAIRS.replace("CELLS", '{ cell = "b/slow", other = "b/fast" }'),
+).replace('split_by = "character"\norder = "alternating"', "")
+
+
+def test_a_design_whose_clips_are_never_compared_is_not_saved(
+    experimenter: Admin, study: StudyInDatabase, tmp_path: Path
+) -> None:
+    make_clip_folder(parse_experiment(NEVER_COMPARED), tmp_path / "built")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "built").iterdir()}
+    uploaded = upload(experimenter, "built.zip", zipped(files)).json()["id"]
+    answers = [
+        experimenter.send("POST", "/studies", {"name": "p", "upload": uploaded, "toml": NEVER_COMPARED}),
+        experimenter.send("POST", "/studies/short/versions/check", {"toml": NEVER_COMPARED}),
+        experimenter.send("POST", "/studies/short/versions", {"revision": 1, "toml": NEVER_COMPARED}),
+    ]
+    for answer in answers:
+        assert answer.status_code == 422, answer.text
+        assert answer.json()["error"]["message"].startswith(
+            "definition: line 31: trial: expected pairs that connect all items, got 2 groups never compared "
+            "with one another: {a/fast, a/slow} and {b/fast, b/slow}; declare a pair between them"
+        )
+    [summary] = experimenter.get("/studies").json()
+    assert (summary["name"], summary["version"]) == ("short", 1)
+
+
 def test_a_closed_study_takes_nobody(
     experimenter: Admin, study: StudyInDatabase, participant: Participant
 ) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
+from experiments.load import FOLDER, load_experiment
 from experiments.manifest import MANIFEST_NAME, check_files, file_sha256, read_manifest
 from stimuli_builder.clips import build as build_module
 from stimuli_builder.clips.build import Machines, build
@@ -267,3 +268,12 @@ def test_a_missing_or_damaged_level_is_named(small_text: str, tmp_path: Path, da
     with pytest.raises(InputError, match=r"level_0\.50\.webp"):
         wrong.build(tmp_path / "clips")
     assert not (tmp_path / "clips" / MANIFEST_NAME).exists()
+
+
+def test_a_design_that_cannot_be_analysed_is_refused_before_a_clip_is_rendered(tmp_path: Path) -> None:
+    declared = load_experiment(str(FOLDER / "pairs-demo.toml"))
+    alone = declared.model_copy(update={"participants": 1})
+    few = alone.model_copy(update={"trial": declared.trial.model_copy(update={"pairs_per_person": 1})})
+    with pytest.raises(InputError, match="groups never compared with one another"):
+        build(few, tmp_path / "clips")
+    assert not (tmp_path / "clips").exists()
