@@ -27,6 +27,10 @@ EVIDENCE_COLUMNS = (
     _share("same_answer", "Share of the most frequent answer."),
     _share("cycle", "Share of answers equal to the one two to four trials before, at the best distance."),
     _share("checks", "Share of attention checks answered as asked."),
+    _share("motion_checks", "Share of motion checks answered rightly, of those that tell something."),
+    _amount("motion_checks_asked", "Motion checks that tell something."),
+    _share("motion_checks_guessed", "How likely guesses are right in as many of the motion checks."),
+    _amount("motion_checks_other_way", "Motion checks answered the other way that the study offers."),
 )
 """One column a signal, named as `Signals` of the server names it."""
 

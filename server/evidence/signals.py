@@ -12,14 +12,18 @@ from operator import eq
 LONGEST_CYCLE = 4
 MIN_FOR_SPREAD = 8
 """Answers from which on a spread or a pattern is told."""
+GUESSED_BY_CHANCE = 0.01
+"""Motion checks are passed where guesses would be right as often with less than this probability."""
 
 
 @dataclass(frozen=True)
 class JudgedAnswer:
     """One answer with its evidence, as far as it brought any.
 
-    part: practice, main or attention. expected: what an attention check asked for. needs_digest: it rated a
-    clip. issued_at: of its ticket, None where it had none. press_ms: median length of its presses.
+    part: practice, main, attention or check. expected: what an attention check asked for, or what a motion
+    check's clip shows. choices: how many answers a motion check offered; 0 where it tells nothing, since its
+    play failed. other_way: it was answered the way offered to those who cannot see it. needs_digest: it
+    rated a clip. issued_at: of its ticket, None where it had none. press_ms: median length of its presses.
     """
 
     trial_index: int
@@ -37,6 +41,8 @@ class JudgedAnswer:
     presses: int | None = None
     trusted: int | None = None
     press_ms: float | None = None
+    choices: int = 0
+    other_way: bool = False
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,10 @@ class Signals:
     rt_median, rt_spread: median response time, standard deviation of its natural logarithm.
     same_answer: share of the most frequent answer. cycle: share of answers equal to the one some trials
     before, at the best distance from two to four. checks: share of attention checks answered as asked.
+    motion_checks: share of motion checks answered rightly, of the `motion_checks_asked` that tell something.
+    motion_checks_guessed: how likely guesses are right as often as that; None where too few were asked for
+    guesses to be unlikely to get all of them right.
+    motion_checks_other_way: how many were answered the other way that the study offers.
     """
 
     tickets: float | None = None
@@ -69,6 +79,10 @@ class Signals:
     same_answer: float | None = None
     cycle: float | None = None
     checks: float | None = None
+    motion_checks: float | None = None
+    motion_checks_asked: float | None = None
+    motion_checks_guessed: float | None = None
+    motion_checks_other_way: float | None = None
 
 
 SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
@@ -84,6 +98,9 @@ def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
     times = [one.rt for one in main if one.rt is not None and one.rt > 0]
     lengths = [one.press_ms for one in answers if one.press_ms is not None]
     checks = [one for one in answers if one.part == "attention"]
+    offered = [one for one in answers if one.part == "check"]
+    motion = [one for one in offered if one.choices and not one.other_way]
+    right = [one.response == one.expected for one in motion]
     clips = [one for one in answers if one.needs_digest]
     presses = sum(one.presses or 0 for one in answers)
     spread = len(times) >= MIN_FOR_SPREAD
@@ -102,7 +119,27 @@ def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
         same_answer=_same(responses) if len(responses) >= MIN_FOR_SPREAD else None,
         cycle=_cycle(responses) if len(responses) >= 2 * MIN_FOR_SPREAD else None,
         checks=_share([one.response == one.expected for one in checks]),
+        motion_checks=_share(right),
+        motion_checks_asked=len(motion) or None,
+        motion_checks_guessed=guessed(sum(right), [one.choices for one in motion]),
+        motion_checks_other_way=sum(one.other_way for one in offered) if offered else None,
     )
+
+
+def guessed(right: int, choices: Sequence[int]) -> float | None:
+    """How likely somebody who guesses is right at least `right` times; None where too few were asked.
+
+    The number of right guesses is Poisson-binomial: check i is guessed with 1 / choices[i]. Too few are those
+    that guesses get all right with at least `GUESSED_BY_CHANCE`.
+    """
+    if math.prod(1 / number for number in choices) >= GUESSED_BY_CHANCE:
+        return None
+    chances = [1.0]
+    for number in choices:
+        hit = 1 / number
+        missed, taken = [*chances, 0.0], [0.0, *chances]
+        chances = [(1 - hit) * a + hit * b for a, b in zip(missed, taken, strict=True)]
+    return min(1.0, sum(chances[right:]))
 
 
 def _share(facts: Sequence[bool]) -> float | None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from server.evidence.signals import JudgedAnswer, Signals, signals_of
+from server.evidence.signals import GUESSED_BY_CHANCE, JudgedAnswer, Signals, signals_of
 
 Verdict = Literal["likely", "unclear", "unlikely", "not_judged"]
 VERDICTS: tuple[Verdict, ...] = ("likely", "unclear", "unlikely", "not_judged")
@@ -41,8 +41,11 @@ BANDS: dict[str, tuple[Band, ...]] = {
     "same_answer": (Band(0.95, INFINITE, -1.5),),
     "cycle": (Band(0.9, INFINITE, -2),),
     "checks": (Band(0, 0.5, -2), Band(1, INFINITE, 1)),
+    "motion_checks_guessed": (Band(0, GUESSED_BY_CHANCE, 1), Band(GUESSED_BY_CHANCE, INFINITE, -4)),
 }
-"""Points of each signal; a value in none of its bands adds nothing. `late` is shown and adds nothing."""
+"""Points of each signal; a value in none of its bands adds nothing. `late` is shown and adds nothing, as are
+`motion_checks` and its numbers: the same share says more or less by how many checks and choices there were,
+which `motion_checks_guessed` weighs."""
 REFUSED_POINTS = -4.0
 """Points where answers of the run were refused for their evidence."""
 WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -1}
@@ -72,6 +75,7 @@ def judge(answers: Sequence[JudgedAnswer], *, refused: bool = False) -> Judgemen
     """The verdict on a run whose page was asked for evidence.
 
     refused: answers of the run were refused for their evidence, which happens to no page of this program.
+    Where a motion check was answered the other way that the study offers, the verdict is at most unclear.
     """
     signals = signals_of(answers)
     points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
@@ -79,4 +83,6 @@ def judge(answers: Sequence[JudgedAnswer], *, refused: bool = False) -> Judgemen
         few: Verdict = "unlikely" if refused else "unclear" if answers else "not_judged"
         return Judgement(few, points, signals)
     verdict: Verdict = "likely" if points >= LIKELY else "unlikely" if points <= UNLIKELY else "unclear"
+    if verdict == "likely" and signals.motion_checks_other_way:
+        verdict = "unclear"
     return Judgement(verdict, points, signals)

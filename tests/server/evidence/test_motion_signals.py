@@ -1,0 +1,76 @@
+"""What motion checks add to the verdict on a run."""
+
+import random
+from collections import Counter
+from dataclasses import replace
+from math import comb
+
+import pytest
+
+from server.evidence.signals import JudgedAnswer, guessed, signals_of
+from server.evidence.verdict import judge
+from tests.server.evidence.test_verdicts import gamma_person
+
+CHECKS, CHOICES, RUNS = 10, 4, 1000
+
+
+def with_checks(answers: list[JudgedAnswer], rng: random.Random, right: float) -> list[JudgedAnswer]:
+    """A run with ten of its trials turned into motion checks, answered rightly with this probability."""
+    made = list(answers)
+    for index in range(0, 50, 5):
+        shown = rng.randint(1, CHOICES)
+        wrong = rng.choice([one for one in range(1, CHOICES + 1) if one != shown])
+        given = shown if rng.random() < right else wrong
+        made[index] = replace(made[index], part="check", choices=CHOICES, expected=shown, response=given)
+    return made
+
+
+def test_guesses_are_counted_as_the_binomial_distribution_has_them() -> None:
+    expected = sum(comb(10, k) * 0.25**k * 0.75 ** (10 - k) for k in range(6, 11))
+    assert guessed(6, [4] * 10) == pytest.approx(expected)
+    assert guessed(0, [4] * 10) == pytest.approx(1)
+    assert guessed(3, [2, 4, 25]) == pytest.approx(1 / 200)
+
+
+def test_too_few_checks_say_nothing() -> None:
+    assert guessed(0, []) is None
+    assert guessed(0, [2] * 6) is None
+    assert guessed(7, [2] * 7) == pytest.approx(2**-7)
+
+
+@pytest.mark.parametrize("choices", [2, 4, 9])
+def test_guessing_passes_ten_checks_less_than_once_in_a_hundred_runs(choices: int) -> None:
+    """By the distribution itself: the chance to reach the least number of right answers that passes."""
+    passes = next(n for n in range(CHECKS + 1) if (guessed(n, [choices] * CHECKS) or 0) < 0.01)
+    chance = guessed(passes, [choices] * CHECKS)
+    assert chance is not None
+    assert chance < 0.01
+
+
+def test_somebody_who_guesses_is_not_likely_a_person_and_somebody_who_sees_stays_one() -> None:
+    rng = random.Random(14)
+    guesses, seeing = Counter[str](), Counter[str]()
+    for seed in range(RUNS):
+        person = gamma_person(seed)
+        guesses[judge(with_checks(person, rng, 1 / CHOICES)).verdict] += 1
+        seeing[judge(with_checks(person, rng, 0.95)).verdict] += 1
+    assert guesses["likely"] < RUNS / 100
+    assert seeing["likely"] > 0.99 * RUNS
+    assert guesses["unlikely"] == 0, "checks alone never make a run unlikely"
+
+
+def test_the_other_way_caps_the_verdict_at_unclear() -> None:
+    checked = with_checks(gamma_person(3), random.Random(1), 1.0)
+    assert judge(checked).verdict == "likely"
+    declined = [replace(one, other_way=one.part == "check", response=None) for one in checked]
+    judged = judge(declined)
+    assert judged.verdict == "unclear"
+    assert (judged.signals.motion_checks, judged.signals.motion_checks_other_way) == (None, CHECKS)
+
+
+def test_checks_whose_play_failed_say_nothing() -> None:
+    checked = with_checks(gamma_person(3), random.Random(1), 0.0)
+    failed = [replace(one, choices=0) if one.part == "check" else one for one in checked]
+    signals = signals_of(failed)
+    assert signals.motion_checks is None
+    assert signals.motion_checks_guessed is None
