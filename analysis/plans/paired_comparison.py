@@ -14,6 +14,7 @@ from analysis.plans.prepare import Prepared, refuse_unknown
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from experiments import design
+from experiments.assignment.groups import groups
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.paired_comparison.answer import CODES
@@ -54,7 +55,11 @@ def cells_of(experiment: Experiment) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def analyse(prepared: Prepared) -> Contents:
-    """Abilities of the cells and all that goes with them."""
+    """Abilities of the cells and all that goes with them, in each group where groups see different cells."""
+    if len(groups(prepared.experiment)) > 1:
+        from analysis.plans.pairs_in_groups import contents_of_groups
+
+        return contents_of_groups(prepared, analyse)
     from analysis.report.pairs_contents import contents_of
 
     comparisons = comparisons_of(prepared)

@@ -12,7 +12,7 @@ from analysis.plans.clip_rating import analyse, on_scale
 from analysis.plans.prepare import Prepared
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
-from analysis.report.contents import Contents, Part, Picture, Progress, Section
+from analysis.report.contents import Contents, Part, Progress, Section
 from analysis.report.formats import Table
 from analysis.report.json_output import as_data, exclusions_data
 from analysis.report.left_out import left_out
@@ -68,15 +68,8 @@ def _of_scale(prepared: Prepared, scale: RatedScale) -> Analysis:
 
 
 def _part(scale: RatedScale, analysis: Analysis) -> Part:
-    made = part_of(
-        analysis, partial(_more, analysis), f"{scale.name}{' (reverse-keyed)' if scale.reverse else ''}"
-    )
-
-    def draw() -> tuple[Picture, ...]:
-        return tuple(replace(one, key=f"{scale.name}-{one.key}") for one in made.draw())
-
-    tables = tuple(replace(table, key=f"{scale.name}-{table.key}") for table in made.tables)
-    return replace(made, tables=tables, draw=draw)
+    title = f"{scale.name}{' (reverse-keyed)' if scale.reverse else ''}"
+    return part_of(analysis, partial(_more, analysis), title).under(scale.name, title)
 
 
 def _more(analysis: Analysis, progress: Progress) -> tuple[Section, ...]:

@@ -2,7 +2,7 @@
 
 from base64 import b64encode
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from analysis.report.formats import Table
@@ -59,6 +59,15 @@ class Part:
     title: str = ""
     draw: Callable[[], tuple[Picture, ...]] = _no_pictures
     more: Callable[[Progress], tuple[Section, ...]] = _no_sections
+
+    def under(self, key: str, title: str) -> "Part":
+        """The same as one of several parts: titled, its tables and figures in files that begin with `key`."""
+        tables = tuple(replace(table, key=f"{key}-{table.key}") for table in self.tables)
+
+        def draw() -> tuple[Picture, ...]:
+            return tuple(replace(one, key=f"{key}-{one.key}") for one in self.draw())
+
+        return replace(self, title=title, tables=tables, draw=draw)
 
 
 @dataclass(frozen=True)

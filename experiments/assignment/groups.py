@@ -40,6 +40,18 @@ def place_of(experiment: "Experiment", slot: int) -> Place:
     return Place(every[slot % len(every)], slot // len(every))
 
 
+def of_group(experiment: "Experiment", levels: Iterable[tuple[str, str]]) -> "Experiment":
+    """The experiment as one group sees it: factors between participants have the group's level alone."""
+    mine = dict(levels)
+    if not mine:
+        return experiment
+    factors = []
+    for factor in experiment.factors:
+        kept = tuple(level for level in factor.levels if mine.get(factor.name, level.name) == level.name)
+        factors.append(factor.model_copy(update={"levels": kept}))
+    return experiment.model_copy(update={"factors": tuple(factors)})
+
+
 def cells_of(experiment: "Experiment", place: Place) -> list[tuple[tuple[str, str], ...]]:
     """The cells that the group sees, in the order of the design."""
     return [cell for cell in design.cells(experiment) if set(place.levels) <= set(cell)]

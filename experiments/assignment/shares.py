@@ -45,7 +45,7 @@ def expected_counts(experiment: "Experiment", slots: Iterable[int]) -> dict[Clip
 def lines(experiment: "Experiment") -> tuple[str, ...]:
     """What a plan says of it; nothing where everybody sees every clip."""
     every, slots = groups(experiment), expected_slots(experiment)
-    said: list[str] = [_said_of_groups(experiment)] if len(every) > 1 else []
+    said: list[str] = [said_of_groups(experiment)] if len(every) > 1 else []
     if len(every) > 1 or experiment.assignment != type(experiment.assignment)():
         counts = expected_counts(experiment, slots)
         low, high = min(counts.values()), max(counts.values())
@@ -56,7 +56,8 @@ def lines(experiment: "Experiment") -> tuple[str, ...]:
     return tuple(said)
 
 
-def _said_of_groups(experiment: "Experiment") -> str:
+def said_of_groups(experiment: "Experiment") -> str:
+    """The groups, how participants come into them, and their sizes, in one line of a plan."""
     declared, named = experiment.groups, names(experiment)
     ways = {"turn": "in turn", "link": "by link"}
     way = ways.get(declared.by) or f"by the answer to '{declared.question}'"

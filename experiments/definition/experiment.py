@@ -120,11 +120,13 @@ class Experiment(Declaration):
 
     @model_validator(mode="after")
     def _assignment_fits(self) -> Self:
-        if not KINDS[self.trial.kind].shares_clips:
-            between = next((factor.name for factor in self.factors if factor.between), None)
-            if between or self.assignment != Assignment():
-                key = f"factors: '{between}' is between participants; " if between else "assignment: "
-                raise ValueError(f"{key}trials of the kind {self.trial.kind} are dealt by their own design")
+        kind = KINDS[self.trial.kind]
+        dealt = f"trials of the kind {kind.name} are dealt by their own design"
+        between = next((factor.name for factor in self.factors if factor.between), None)
+        if between and not kind.groups:
+            raise ValueError(f"factors: '{between}' is between participants; {dealt}")
+        if self.assignment != Assignment() and not kind.shares_clips:
+            raise ValueError(f"assignment: {dealt}")
         if fault := shares.fault(self) or grouping.fault(self):
             raise ValueError(fault)
         return self

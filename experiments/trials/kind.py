@@ -85,7 +85,8 @@ class Kind:
     block_size: trials of one participant in a block, attention checks not counted.
     example: a [trial] as TOML, for the reference; it is what a newcomer copies.
     further_examples: of keys that exclude one another, so that the reference shows each.
-    shares_clips: whether it follows [assignment] and factors between participants; else they are refused.
+    shares_clips: whether it follows [assignment]; else that is refused.
+    groups: whether it follows factors between participants; else they are refused.
     plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
     adapts: whether answers decide what is shown next: the server then follows its series.
     chooses: whether a run's trials are chosen by the comparisons stored before it. assign_by: then does so.
@@ -106,6 +107,7 @@ class Kind:
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     shares_clips: bool = False
+    groups: bool = False
     adapts: bool = False
     chooses: "Callable[[Experiment], bool]" = never
     assign_by: "Callable[[Experiment, int, int, Sequence[Compared]], list[Trial]] | None" = None

@@ -83,6 +83,7 @@ CLIP_RATING = Kind(
     block_size=block_size,
     plan=plan,
     shares_clips=True,
+    groups=True,
     example=EXAMPLE,
     further_examples=FURTHER_EXAMPLES,
     check_response=check_response,

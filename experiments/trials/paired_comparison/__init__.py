@@ -68,6 +68,7 @@ PAIRED_COMPARISON = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     check_response=check_response,
+    groups=True,
     chooses=chooses,
     assign_by=assign,
 )

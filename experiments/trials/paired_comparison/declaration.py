@@ -132,7 +132,8 @@ class Reference(Declaration):
     """A clip shown before each pair, as in degradation category rating: the cell, the pair's exemplar."""
 
     cell: str
-    """Label of its cell; the exemplar is that of the pair."""
+    """Label of its cell; the exemplar is that of the pair, and levels between participants are the
+    participant's own."""
     label: Translated
     """What the page says below it while it runs, in every language."""
     gap_ms: Annotated[int, Field(ge=0, le=10_000)] = 500

@@ -10,11 +10,14 @@ from itertools import combinations, islice, starmap
 from typing import TYPE_CHECKING, NamedTuple
 
 from experiments import design
+from experiments.assignment.groups import groups as groups_of
+from experiments.assignment.groups import of_group
 from experiments.assignment.incomplete_blocks import balanced_blocks, near_sizes
 from experiments.design import ClipSpec
 from experiments.errors import InputError, did_you_mean
 from experiments.trials.paired_comparison.declaration import (
     AllPairs,
+    DeclaredPairs,
     IncompleteBlocks,
     PairedComparison,
     WithinFactor,
@@ -45,10 +48,8 @@ def fault(experiment: "Experiment", trial: PairedComparison) -> str | None:
     cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
     named: list[tuple[str, str]] = []
     if isinstance(trial.pairs, WithinFactor):
-        names = experiment.factor_names
-        if trial.pairs.factor not in names:
-            near = did_you_mean(trial.pairs.factor, names)
-            return f"trial.pairs.factor: no factor is called '{trial.pairs.factor}'{near}"
+        if wrong := _fault_of_factor(experiment, trial.pairs.factor):
+            return wrong
     elif not isinstance(trial.pairs, AllPairs):
         named = [
             ("trial.pairs.cells", cell) for pair in trial.pairs.cells for cell in (pair.cell, pair.other)
@@ -61,7 +62,36 @@ def fault(experiment: "Experiment", trial: PairedComparison) -> str | None:
     unknown = next(((path, cell) for path, cell in named if cell not in cells), None)
     if unknown:
         return f"{unknown[0]}: no cell is called '{unknown[1]}'{did_you_mean(unknown[1], cells)}"
-    return _no_pairs_or_split(experiment) or _fault_of_blocks(experiment, trial)
+    across = _across_groups(experiment, trial)
+    if across:
+        return across
+    designs = [of_group(experiment, levels) for levels in groups_of(experiment)]
+    every = (_no_pairs_or_split(one) or _fault_of_blocks(one, trial) for one in designs)
+    return next((wrong for wrong in every if wrong), None)
+
+
+def _fault_of_factor(experiment: "Experiment", name: str) -> str | None:
+    names = experiment.factor_names
+    if name not in names:
+        return f"trial.pairs.factor: no factor is called '{name}'{did_you_mean(name, names)}"
+    if experiment.factor(name).between:
+        return f"trial.pairs.factor: '{name}' is between participants, so nobody sees two of its levels"
+    return None
+
+
+def _across_groups(experiment: "Experiment", trial: PairedComparison) -> str | None:
+    """A declared pair whose cells no participant sees both of; None where there is none."""
+    if not isinstance(trial.pairs, DeclaredPairs):
+        return None
+    between = [place for place, factor in enumerate(experiment.factors) if factor.between]
+    for pair in trial.pairs.cells:
+        one, other = pair.cell.split("/"), pair.other.split("/")
+        if any(one[place] != other[place] for place in between):
+            return (
+                f"trial.pairs.cells: '{pair.cell}' and '{pair.other}' are seen by different groups, so "
+                "nobody can compare them; pair cells of one group"
+            )
+    return None
 
 
 def _fault_of_blocks(experiment: "Experiment", trial: PairedComparison) -> str | None:
@@ -124,7 +154,10 @@ def _every(experiment: "Experiment") -> Iterator[Pair]:
     else:
         at = {(clip.cell, clip.exemplar): clip for clip in clips}
         numbers = range(1, experiment.exemplars.per_cell + 1)
+        mine = {cell for cell, _ in at}
         for cells in declared.cells:
+            if cells.cell not in mine:
+                continue
             yield from (Pair(at[cells.cell, number], at[cells.other, number]) for number in numbers)
 
 

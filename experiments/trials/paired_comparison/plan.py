@@ -7,7 +7,9 @@ from math import gcd
 from typing import TYPE_CHECKING, Literal
 
 from experiments.assignment.compared import Compared
+from experiments.assignment.groups import groups, name_of, of_group, place_of
 from experiments.assignment.order import ordered_blocks, with_attention
+from experiments.assignment.shares import expected_slots, said_of_groups
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec, ClipSpec
 from experiments.errors import InputError
@@ -25,17 +27,26 @@ def assign(experiment: "Experiment", seed: int, slot: int, compared: Iterable[Co
 
     Parameters
     ----------
-    seed: of the order of trials and of practice. slot: place in the counterbalancing, which deals the pairs
-    and their sides. compared: what is stored, where pairs are chosen by it.
+    seed: of the order of trials and of practice. slot: place in the counterbalancing, which deals the group,
+    the pairs and their sides. compared: what is stored, where pairs are chosen by it.
     """
+    place = place_of(experiment, slot)
+    return _of_group(of_group(experiment, place.levels), seed, place.number, compared)
+
+
+def _of_group(
+    experiment: "Experiment", seed: int, number_in_group: int, compared: Iterable[Compared]
+) -> list[Trial]:
     rng = random.Random(seed)
     trials = _practice(experiment, rng)
     dealt = (
-        chosen_pairs(experiment, seed, compared) if chooses(experiment) else deal(experiment).of_slot(slot)
+        chosen_pairs(experiment, seed, compared)
+        if chooses(experiment)
+        else deal(experiment).of_slot(number_in_group)
     )
     times = Counter[str]()
     choices = 3 if paired_comparison_of(experiment).ties else 2
-    for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
+    for number, block in enumerate(ordered_blocks(experiment, rng, number_in_group), start=1):
         members = set(block.clips)
         pairs = [pair for pair in dealt if pair.left in members]
         if times[block.label] % 2:
@@ -62,8 +73,9 @@ def _trial(
     declared = paired_comparison_of(experiment)
     shown = [Shown(role, clip) for role, clip in zip(declared.roles, pair, strict=True)]
     if declared.reference:
-        levels = zip(experiment.factor_names, declared.reference.cell.split("/"), strict=True)
-        shown.append(Shown("reference", ClipSpec(tuple(levels), pair.left.exemplar)))
+        levels = dict(zip(experiment.factor_names, declared.reference.cell.split("/"), strict=True))
+        levels |= {factor.name: factor.levels[0].name for factor in experiment.factors if factor.between}
+        shown.append(Shown("reference", ClipSpec(tuple(levels.items()), pair.left.exemplar)))
     return Trial(kind, block, label, tuple(shown))
 
 
@@ -79,14 +91,38 @@ def deal(experiment: "Experiment") -> Deal:
 
 
 def block_size(experiment: "Experiment", block: BlockSpec) -> int:
-    """Pairs that the first slot compares in a block; other slots have as many, or one more or less."""
+    """Pairs that a group's first place compares in a block; other places have as many, or one more or less.
+
+    Where groups differ, the most.
+    """
     members = set(block.clips)
-    first = chosen_pairs(experiment, 0, ()) if chooses(experiment) else deal(experiment).of_slot(0)
-    return sum(pair.left in members for pair in first)
+    counts = []
+    for levels in groups(experiment):
+        of = of_group(experiment, levels)
+        first = chosen_pairs(of, 0, ()) if chooses(of) else deal(of).of_slot(0)
+        counts.append(sum(pair.left in members for pair in first))
+    return max(counts)
 
 
 def plan(experiment: "Experiment") -> tuple[str, ...]:
     """Counts over the declared participants, in words; InputError where the pairs do not hang together."""
+    every = groups(experiment)
+    if len(every) == 1:
+        return _plan_of_group(experiment)
+    sizes = Counter(place_of(experiment, slot).levels for slot in expected_slots(experiment))
+    said = [said_of_groups(experiment)]
+    for levels in every:
+        if not sizes[levels]:
+            raise InputError(
+                f"'{experiment.name}': expected participants in every group, got none in "
+                f"'{name_of(levels)}'; declare more participants"
+            )
+        of = of_group(experiment, levels).model_copy(update={"participants": sizes[levels]})
+        said += [f"{name_of(levels)}: {line}" for line in _plan_of_group(of)]
+    return tuple(said)
+
+
+def _plan_of_group(experiment: "Experiment") -> tuple[str, ...]:
     return _plan_of_choice(experiment) if chooses(experiment) else _plan_of_deal(experiment)
 
 

@@ -4471,7 +4471,8 @@ export interface components {
         Reference: {
             /**
              * Cell
-             * @description Label of its cell; the exemplar is that of the pair.
+             * @description Label of its cell; the exemplar is that of the pair, and levels between participants are the
+             *     participant's own.
              */
             cell: string;
             /**

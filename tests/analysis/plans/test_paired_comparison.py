@@ -192,3 +192,47 @@ def test_the_same_comparisons_give_the_same_report(tmp_path, rows) -> None:
     one, two = (report(tmp_path, rows).parts[0] for _ in range(2))
     assert dataclasses.replace(one, draw=two.draw, more=two.more) == two
     assert [picture.svg for picture in one.draw()] == [picture.svg for picture in two.draw()]
+
+
+GROUPED = DEMO.model_copy(
+    update={
+        "factors": (DEMO.factors[0].model_copy(update={"between": True}), DEMO.factors[1]),
+    }
+)
+
+
+@pytest.mark.parametrize(("cartoon", "agree"), [(0.9, True), (-1.8, False)])
+def test_groups_are_analysed_for_themselves_and_compared(tmp_path, cartoon, agree) -> None:
+    abilities = ABILITIES | {"photorealistic/model": 0.9, "cartoon/model": cartoon, "cartoon/textbook": 0.0}
+    found = report(tmp_path, compare(GROUPED, abilities, 80, nu=0.5), GROUPED)
+    drawn, baked = found.numbers["groups"][1], found.numbers["groups"][0]
+    assert (baked["group"], drawn["group"]) == ("photorealistic", "cartoon")
+    assert [item["name"] for item in baked["abilities"]["items"]] == [
+        "photorealistic/model",
+        "photorealistic/textbook",
+    ]
+    assert (baked["n_participants"], drawn["n_participants"], found.n_participants) == (40, 40, 80)
+    assert [part.title for part in found.parts] == [
+        "Character: Photorealistic",
+        "Character: Cartoon",
+        "Agreement of the groups",
+    ]
+    assert len({table.key for part in found.parts for table in part.tables}) == sum(
+        len(part.tables) for part in found.parts
+    )
+    # One ability and one for ties a group; two groups.
+    assert found.numbers["agreement"]["df"] == 2
+    assert (found.numbers["agreement"]["p"] > 0.05) == agree
+
+
+def test_the_agreement_of_groups_is_the_deviance_between_two_logistic_regressions(tmp_path) -> None:
+    abilities = ABILITIES | {"cartoon/model": -0.2, "cartoon/textbook": 0.0}
+    rows = compare(GROUPED, abilities, 60)
+    found = report(tmp_path, rows, GROUPED)
+    side = np.array([1.0 if row["left_cell"].endswith("/model") else -1.0 for row in rows])
+    drawn = np.array([row["left_cell"].startswith("cartoon/") for row in rows], dtype=float)
+    left = [row["winner"] == "left" for row in rows]
+    both = sm.Logit(left, np.column_stack([side, side * drawn])).fit(disp=0)
+    one = sm.Logit(left, side[:, None]).fit(disp=0)
+    assert found.numbers["agreement"]["chi2"] == pytest.approx(2 * (both.llf - one.llf), abs=1e-6)
+    assert found.numbers["agreement"]["df"] == 1

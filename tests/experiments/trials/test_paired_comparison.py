@@ -158,3 +158,77 @@ def test_neither_arrangement_is_chosen_silently() -> None:
 def test_the_demonstration_loads_and_hangs_together() -> None:
     demonstration = load_experiment(str(FOLDER / "pairs-demo.toml"))
     assert plan(demonstration)[0] == "12 pairs; each participant makes 12 comparisons"
+
+
+def grouped(pairs: str = '{ among = "all" }', rest: str = "") -> Experiment:
+    """The demonstration with its characters between participants."""
+    text = (FOLDER / "pairs-demo.toml").read_text(encoding="utf-8")
+    text = text.replace('label = "Character"\n', 'label = "Character"\nbetween = true\n', 1)
+    return parse_experiment(
+        text.replace('pairs = { among = "all", exemplars = "matched" }', f"pairs = {pairs}\n{rest}")
+    )
+
+
+def seen_by(experiment: Experiment, slot: int) -> set[str]:
+    trials = assign(experiment, 1, slot)
+    return {shown.clip.level("character") for trial in trials for shown in trial.shown}
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        "",
+        "pairs_per_person = 1",
+        'dealing = { by = "active" }\npairs_per_person = 2',
+        'dealing = { by = "bibd", clips_per_block = 2 }',
+    ],
+)
+def test_a_group_compares_its_own_clips_only(rest: str) -> None:
+    experiment = grouped(rest=rest)
+    seen = [seen_by(experiment, slot) for slot in range(6)]
+    assert seen == [{"photorealistic"}, {"cartoon"}] * 3
+
+
+def test_pairs_are_dealt_evenly_within_each_group() -> None:
+    experiment = grouped(rest="pairs_per_person = 1")
+    sides = Counter[object]()
+    for slot in range(8):
+        sides.update(
+            tuple(shown.clip for shown in trial.shown)
+            for trial in assign(experiment, slot, slot)
+            if trial.kind == "main"
+        )
+    # Two groups of two pairs (one an exemplar), each with both sides.
+    assert len(sides) == 8
+    assert set(sides.values()) == {1}
+
+
+def test_the_plan_counts_each_group_and_asks_for_connection_within_it_only() -> None:
+    said = plan(grouped())
+    assert said[0] == "2 groups of participants in turn: photorealistic (6), cartoon (6)"
+    assert said[1] == "photorealistic: 2 pairs; each participant makes 2 comparisons"
+    assert said[3].startswith("cartoon: 2 pairs")
+    with pytest.raises(InputError, match="expected participants in every group, got none in 'cartoon'"):
+        plan(grouped().model_copy(update={"participants": 1}))
+
+
+@pytest.mark.parametrize(
+    ("pairs", "told"),
+    [
+        ('{ among = "within", factor = "character" }', "nobody sees two of its levels"),
+        (
+            '{ among = "declared", cells = [{ cell = "cartoon/model", other = "photorealistic/model" }] }',
+            "are seen by different groups",
+        ),
+    ],
+)
+def test_pairs_across_groups_are_refused(pairs: str, told: str) -> None:
+    with pytest.raises(DefinitionError, match=told):
+        grouped(pairs)
+
+
+def test_a_reference_has_the_level_of_the_participants_group() -> None:
+    experiment = grouped(rest='reference = { cell = "cartoon/model", label = { en = "R", de = "R" } }')
+    for slot, character in enumerate(("photorealistic", "cartoon")):
+        shown = assign(experiment, 1, slot)[-1].shown[-1]
+        assert (shown.role, shown.clip.cell) == ("reference", f"{character}/model")

@@ -14,6 +14,7 @@ from server.models import RunTally, Study
 from server.simulation.person import Person, Rater
 from server.tallies.recount import Recount
 from server.tallies.tally import tally_of, unpacked
+from tests.helpers.admins import Admin
 from tests.helpers.comparisons import comparisons
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 
@@ -219,3 +220,29 @@ def test_a_comparison_is_counted_by_its_two_clips(judge: Participant, services: 
         for trial, value in zip(trials, (1, 2, 3), strict=False)
     ]
     assert tally.cells == {}
+
+
+IN_GROUPS = PAIRS.replace('label = "Character"', 'label = "Character"\nbetween = true').replace(
+    'factor = "character"', 'factor = "speed"'
+)
+
+
+def test_people_of_two_groups_compare_the_clips_of_their_own(
+    services: Services, client: TestClient, viewer: Admin, tmp_path: Path
+) -> None:
+    study = add_study(services, tmp_path / "clips", IN_GROUPS)
+    for _ in range(2):
+        person = Participant(client, study.link_token).agree()
+        for trial in mains(person):
+            assert compare(person, trial, "left").status_code == 201
+    with services.database.read() as session:
+        rows = [row for row in comparisons(session) if row["kind"] == "main"]
+    cells: dict[str, set[str]] = {}
+    for row in rows:
+        cells.setdefault(row["run"], set()).update((row["left_cell"], row["right_cell"]))
+    assert sorted(map(sorted, cells.values())) == [["a/fast", "a/slow"], ["b/fast", "b/slow"]]
+    shown = viewer.get("/studies/short/results").json()
+    assert [(pair["first"], pair["second"]) for pair in shown["pairs"]] == [
+        ("a/slow", "a/fast"),
+        ("b/slow", "b/fast"),
+    ]
