@@ -32,7 +32,8 @@ class StudyRun(Base):
 
     participant: the study's pseudonym of the person, see `server.participants.identities`.
     slot: place in the counterbalancing, held while the run is complete, or active and seen within the lease;
-    NO_SLOT while an answer of a form is still to decide the group. group_name: empty without groups.
+    NO_SLOT while an answer of a form is still to decide the group, and once a run that one decided is erased.
+    group_name: empty without groups, and in such an erased run.
     origin: where its answers come from, given at its start; the database refuses to change it.
     seed: of the trial order. trials_answered: trials that need no further play, practice and checks included.
     elapsed_ms: latest `time_elapsed`, from which the clock goes on after a reload.

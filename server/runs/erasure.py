@@ -5,15 +5,17 @@ import secrets
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from experiments.assignment.grouping import deciding
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
 from server.errors import Conflict, Invalid
-from server.models import AuditEntry, Study, StudyRun
+from server.models import NO_SLOT, AuditEntry, Study, StudyRun
 from server.operations import erasures
 from server.runs import repository
 from server.runs.schemas import Erased, HeldReport
 from server.settings import Settings
+from server.studies.lookup import definition_of
 
 
 def erase(
@@ -60,6 +62,9 @@ def forget(session: Session, run: StudyRun) -> int:
     run.participant, run.device = "erased", {}
     run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
     run.completion_code = ""
+    if deciding(definition_of(run.version)) is not None:
+        # The group, and the slot that it follows from, say what was answered.
+        run.group_name, run.slot = "", NO_SLOT
     if run.link.kind == "personal":
         run.link.label = "erased"
     _forget_in_audit(session, run.public_id)

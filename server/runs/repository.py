@@ -19,6 +19,7 @@ from server.models import (
     RunTally,
     SeriesAnswer,
     SeriesOffer,
+    SeriesTrial,
     Study,
     StudyRun,
     StudyVersion,
@@ -149,6 +150,8 @@ def delete_personal_rows(session: Session, run: StudyRun) -> int:
     """Delete everything a person left in a run; return how many ratings that were."""
     ratings = session.scalar(select(func.count()).select_from(Rating).where(Rating.study_run_id == run.id))
     personal = (AnswerEvidence, View, RunEvent, FormAnswer, Calibration, RecruiterIdentity)
-    for table in (Rating, RunTally, SeriesAnswer, SeriesOffer, *personal):
+    # Which clips were shown follows from the group, and in a series from the answers.
+    shown = (SeriesAnswer, SeriesOffer, SeriesTrial, TrialClip)
+    for table in (Rating, RunTally, *personal, *shown):
         session.execute(delete(table).where(table.study_run_id == run.id))
     return int(ratings or 0)

@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.models import NO_SLOT, RunEvent, StudyRun
+from server.models import NO_SLOT, RunEvent, StudyRun, TrialClip
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, add_study
 
@@ -39,6 +39,9 @@ answers = { left = "slow", right = "fast" }
 [texts.en]
 """
 BY_FORM = BETWEEN.replace("[texts.en]\n", QUESTION, 1)
+
+
+TOLD = ("group_name", "slot", "status", "trials_total")
 
 
 def declared(groups: str) -> str:
@@ -144,6 +147,28 @@ def test_an_answer_decides_the_group_and_with_it_the_trials(
     person.rate_all()
     assert person.request("POST", "/complete").json()["status"] == "complete"
     assert groups_of(services) == [("fast", "complete")]
+
+
+def test_erasing_leaves_nothing_of_the_answer_that_decided_the_group(
+    client: TestClient, services: Services, experimenter: Admin, tmp_path: Path
+) -> None:
+    study = add_study(services, tmp_path / "clips", BY_FORM)
+    people = []
+    for hand in ("left", "right"):
+        people.append(Participant(client, study.link_token).agree())
+        people[-1].request("PUT", "/forms/about", answers(hand))
+        people[-1].rate_all()
+        people[-1].request("POST", "/complete")
+        path = f"/studies/short/runs/{people[-1].run_id}/erase"
+        assert experimenter.send("POST", path, {"confirm": people[-1].run_id}).status_code == 200
+    with services.database.read() as session:
+        left, right = ({name: getattr(run, name) for name in TOLD} for run in session.query(StudyRun))
+        assert left == right == {"group_name": "", "slot": NO_SLOT, "status": "complete", "trials_total": 8}
+        assert session.query(TrialClip).count() == 0
+    # The place is free again.
+    late = Participant(client, study.link_token).agree()
+    late.request("PUT", "/forms/about", answers("left"))
+    assert groups_of(services)[-1] == ("slow", "active")
 
 
 def test_who_answers_into_a_full_group_is_screened_out_right_after_the_form(
