@@ -16,6 +16,7 @@ from experiments.definition.groups import Groups
 from experiments.definition.names import refuse_repeats, refuse_reserved
 from experiments.definition.session import Session
 from experiments.definition.texts import Texts
+from experiments.definition.warnings import Warnings
 from experiments.errors import did_you_mean
 from experiments.rendering import RenderSettings
 from experiments.rules import (
@@ -76,6 +77,8 @@ class Experiment(Declaration):
     """Attention checks between the trials."""
     screening: tuple[ScreeningRule, ...] = ()
     """Rules that end a run while it goes on. The participant is told so, and the place is free again."""
+    warnings: Warnings = Warnings()
+    """Kind words to who answers without care, and when the run then ends."""
     exclusions: tuple[ExclusionRule, ...] = ()
     """Rules, fixed before the data, that leave out runs or trials when the study is analysed."""
     forms: tuple[Form, ...] = ()

@@ -1,8 +1,9 @@
-"""Rules declared before the data, one file a rule: playback, attention checks, screening, exclusions.
+"""Rules declared before the data, one file a rule: playback, attention checks, screening, warnings,
+exclusions.
 
-A new rule is its file and its place in a union below. An exclusion rule judges by a method of its own; every
-use of screening rules matches the union to its end (`assert_never`). Type-checking names a rule that nothing
-applies.
+A new rule is its file and its place in a union below. Exclusion rules and warnings judge by a method of their
+own; every use of screening rules matches the union to its end (`assert_never`). Type-checking names a rule
+that nothing applies.
 """
 
 from typing import Annotated
@@ -21,9 +22,15 @@ from experiments.rules.playback import PlaybackRules
 from experiments.rules.screen_attention import ScreenAttention
 from experiments.rules.screen_device import ScreenDevice
 from experiments.rules.screen_form_answer import ScreenFormAnswer
+from experiments.rules.warn_fast import WarnFast
+from experiments.rules.warn_pattern import WarnPattern
+from experiments.rules.warn_same_answer import WarnSameAnswer
 
 ScreeningRule = Annotated[ScreenFormAnswer | ScreenAttention | ScreenDevice, Field(discriminator="rule")]
 """Ends a run while it goes on."""
+
+WarningRule = Annotated[WarnSameAnswer | WarnPattern | WarnFast, Field(discriminator="rule")]
+"""Sees a lapse of care in the last answers of a run that goes on."""
 
 ExclusionRule = Annotated[
     ExcludeIncomplete
@@ -52,4 +59,8 @@ __all__ = [
     "ScreenDevice",
     "ScreenFormAnswer",
     "ScreeningRule",
+    "WarnFast",
+    "WarnPattern",
+    "WarnSameAnswer",
+    "WarningRule",
 ]

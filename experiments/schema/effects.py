@@ -53,6 +53,7 @@ EFFECTS: Mapping[str, Effect] = {
     "attention": "wording",
     # Who takes part and whose answers count: both are applied to the whole series, and reported with it.
     "screening": "wording",
+    "warnings": "wording",
     "exclusions": "wording",
     "forms.name": "measured",
     "forms.when": "wording",

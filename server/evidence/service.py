@@ -1,13 +1,10 @@
 """The judgement on a stored run."""
 
-import json
-from collections.abc import Mapping
-from typing import Any
-
 from sqlalchemy.orm import Session
 
 from experiments.trials import KINDS
 from server.evidence import repository
+from server.evidence.comparable import comparable
 from server.evidence.signals import JudgedAnswer
 from server.evidence.verdict import NOT_JUDGED, Judgement, judge
 from server.models import StudyRun
@@ -23,7 +20,7 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
 
 def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
     evidence, trial = row.evidence, row.trial
-    response = _response(row.rating.payload)
+    response = comparable(row.rating.payload)
     if trial.kind == "attention":
         response = KINDS[row.rating.kind].check_response(row.rating.payload)
     given = (evidence.interaction if evidence else None) or {}
@@ -45,21 +42,3 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
         trusted=given.get("trusted"),
         press_ms=given.get("press_ms"),
     )
-
-
-def _response(payload: Mapping[str, Any]) -> int | str | None:
-    """An answer of any kind as one value that can be compared; None where nothing was answered."""
-    said = {name: _without_time(value) for name, value in payload.items() if value is not None}
-    if said.keys() == {"response"}:
-        return said["response"] if isinstance(said["response"], int) else str(said["response"])
-    scales = payload.get("answers", {}).values()
-    if scales and all(one["response"] is None and not one.get("not_applicable") for one in scales):
-        return None
-    return json.dumps(said, sort_keys=True) if said else None
-
-
-def _without_time(value: Any) -> Any:
-    """An answer on several scales without the times that each took: equal answers must be equal."""
-    if not isinstance(value, dict):
-        return value
-    return {name: {**one, "rt": None} if isinstance(one, dict) else one for name, one in value.items()}

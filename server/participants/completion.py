@@ -17,8 +17,9 @@ from server.participants.refusals import FormsMissing, RatingsMissing
 from server.participants.schemas import Completion
 from server.participants.trial_list import trial_list
 from server.text import visible
-from server.trials.attention import failed_checks
+from server.trials.attention import EVENT, failed_checks
 from server.trials.refusals import RunClosed
+from server.trials.warnings import RULE, in_language
 from server.versions import LoadedVersion
 
 
@@ -35,7 +36,7 @@ def complete_run(services: Services, session: Session, token: str) -> Completion
         run.evidence_verdict = judge_run(session, run).verdict
         _close_when_full(session, study, run)
     if run.status == "screened_out":
-        return _screened_out(session, run)
+        return _screened_out(session, run, loaded.experiment)
     if run.status != "complete":
         raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")
     code = completion_code(session, run, loaded)
@@ -70,12 +71,18 @@ def completion_code(session: Session, run: StudyRun, loaded: LoadedVersion) -> s
     return recruiter_of(run.link).code(outcome, run.completion_code)
 
 
-def _screened_out(session: Session, run: StudyRun) -> Completion:
+def _screened_out(session: Session, run: StudyRun, experiment: Experiment) -> Completion:
     recruiter = recruiter_of(run.link)
     parameters = visible(repository.parameters(session, run))
-    address = recruiter.redirect_screened_out_to(run.public_id, parameters)
-    code = recruiter.code_screened_out or None
-    return Completion(status="screened_out", completion_code=code, redirect_url=address)
+    declared, careless = experiment.warnings, repository.ended_by(session, run, EVENT) == RULE
+    if careless and declared.code == "failed_check" and recruiter.code_failed_check:
+        code: str | None = recruiter.code_failed_check
+        address = recruiter.redirect(recruiter.code_failed_check, run.public_id, parameters)
+    else:
+        code = recruiter.code_screened_out or None
+        address = recruiter.redirect_screened_out_to(run.public_id, parameters)
+    why = in_language(declared.end_text, run.language, experiment.languages) if careless else None
+    return Completion(status="screened_out", completion_code=code, redirect_url=address, reason=why)
 
 
 def _close_when_full(session: Session, study: Study | None, run: StudyRun) -> None:

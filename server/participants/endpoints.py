@@ -141,10 +141,11 @@ def put_language(services: ServicesDep, token: RunToken, change: LanguageChange)
 
 
 @router.post("/run/events")
-def post_events(database: DatabaseDep, token: RunToken, events: Events) -> Received:
+def post_events(services: ServicesDep, request: Request, token: RunToken, events: Events) -> Received:
     """Tell what happened; an event with a known id is left as it is."""
-    with database.write() as session:
-        return Received(received=runs.save_events(session, token, events.events))
+    moment = services.time_of(request)
+    with services.database.write() as session:
+        return Received(received=runs.save_events(session, token, events.events, moment))
 
 
 @router.post("/run/complete")

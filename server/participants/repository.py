@@ -242,6 +242,13 @@ def calibrations(session: Session, run: StudyRun) -> int:
     return session.scalar(query) or 0
 
 
+def ended_by(session: Session, run: StudyRun, event: str) -> str | None:
+    """The rule by which a run was ended, as the event of this type says; None where it does not."""
+    query = select(RunEvent.data).where(RunEvent.study_run_id == run.id, RunEvent.type == event)
+    data = session.scalar(query.order_by(RunEvent.id.desc()).limit(1))
+    return data.get("rule") if data else None
+
+
 def events(session: Session, run: StudyRun) -> int:
     """How many events a run has."""
     query = select(func.count()).select_from(RunEvent).where(RunEvent.study_run_id == run.id)

@@ -38,6 +38,7 @@ from server.participants.schemas import (
 from server.participants.trial_list import trial_list
 from server.tokens import new_public_id
 from server.trials.refusals import ConsentMissing
+from server.trials.warnings import waiting
 
 BEFORE_CONSENT = ("consent",)
 
@@ -88,6 +89,7 @@ def state_of(services: Services, session: Session, run: StudyRun, moment: dateti
         resume_code=shown_code(services.settings.key, experiment, run),
         server_time=moment,
         tickets=_tickets(services, run, experiment, moment),
+        warning=waiting(session.connection(), run.id, experiment) if run.status == "active" else None,
     )
 
 
@@ -172,10 +174,10 @@ def need_consent(run: StudyRun) -> None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
 
 
-def save_events(session: Session, token: str, events: list[Event]) -> int:
+def save_events(session: Session, token: str, events: list[Event], moment: datetime) -> int:
     """Store events, each once; also after the run's end."""
     run = find_run(session, token, lock=True)
-    run.last_seen_at = now()
+    run.last_seen_at = moment
     bounds.check_events([event.data for event in events], repository.events(session, run))
     rows = [
         {

@@ -12,7 +12,7 @@ from experiments.rules import PlaybackRules
 from experiments.trials.union import AnyPage
 from server.evidence.schemas import Tickets
 from server.models import STAGES
-from server.trials.schemas import RunStatus, TrialInfo
+from server.trials.schemas import RunStatus, TrialInfo, WarningShown
 
 Stage = Literal[
     "consent",
@@ -150,6 +150,7 @@ class RunState(BaseModel):
     )
     server_time: datetime
     tickets: Tickets | None = Field(description="Leave to answer, a ticket for each play of each trial.")
+    warning: WarningShown | None = Field(default=None, description="One that no page has shown yet.")
 
 
 class Consent(BaseModel):
@@ -237,6 +238,7 @@ class Completion(BaseModel):
     status: Literal["complete", "screened_out"]
     completion_code: str | None
     redirect_url: str | None
+    reason: str | None = Field(default=None, description="Why the run ended, where the page must tell.")
 
 
 class Received(BaseModel):

@@ -30,6 +30,8 @@ class Actor(Person):
         self.moment: datetime = now()
         self.clock_off = timedelta()
         self.refused: list[str] = []
+        self.warned: list[str] = []
+        self.ended = False
         self.run_id = ""
         self.tickets: dict[str, Any] | None = None
         self._held: list[dict[str, Any]] = []
@@ -47,16 +49,20 @@ class Actor(Person):
             state, self.tickets = self.placed, self.placed["tickets"]
         for _ in range(MAX_ROUNDS):
             due = [trial for trial in state["trials"] if not trial["answered"]]
-            if not due or self.refused:
+            if not due or self._is_over():
                 break
             for trial in due:
-                self.rate(trial, state["trial"])
+                if not self._is_over():
+                    self.rate(trial, state["trial"])
             self._deliver()
             state = self._state()
-        if self.refused or not self._forms(state, "after"):
+        if self._is_over() or not self._forms(state, "after"):
             return None
         self.client.put("/api/run/stage", {"stage": "debrief"})
         return str(self.client.post("/api/run/complete")["completion_code"])
+
+    def _is_over(self) -> bool:
+        return bool(self.refused) or self.ended
 
     def _state(self) -> dict[str, Any]:
         self._tell_time()
@@ -138,11 +144,22 @@ class Actor(Person):
         self._tell_time()
         held, self._held = self._held, []
         for body in held:
+            if self.ended:
+                return
             try:
-                self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)
+                saved = self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)
                 self.ratings += 1
+                self._heed(saved["receipt"])
             except Refused as error:
                 self.refused.append(error.code)
+
+    def _heed(self, receipt: dict[str, Any]) -> None:
+        """Read a warning, as the page shows it before the next trial, and see whether the run is over."""
+        self.ended = receipt["status"] != "active"
+        if receipt.get("warning") and not self.ended:
+            self.warned.append(receipt["warning"]["rule"])
+            event = {"id": str(uuid.uuid4()), "type": "warning_shown"}
+            self.client.post("/api/run/events", {"events": [event]})
 
     def _tell_time(self) -> None:
         if self.manner.waits:

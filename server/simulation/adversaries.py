@@ -67,6 +67,8 @@ def _record(services: Services, actor: Actor) -> dict[str, Any]:
         "points": judged.points,
         "signals": asdict(judged.signals),
         "answers": actor.ratings,
+        "warned": dict(Counter(actor.warned)),
+        "ended": actor.ended,
         "refused": dict(Counter(actor.refused)),
     }
 
@@ -79,8 +81,11 @@ def write(path: Path, study: str, name: str, runs: list[dict[str, Any]]) -> None
 
 
 def summary(runs: list[dict[str, Any]]) -> str:
-    """How many runs got each verdict, and how many answers were refused."""
+    """How many runs got each verdict, how many answers were refused, how many people were warned."""
     counts = Counter(run["verdict"] for run in runs)
     said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
     refused = sum(sum(run["refused"].values()) for run in runs)
-    return f"{said}; {refused} answers refused" if refused else said
+    warned = sum(bool(run["warned"]) for run in runs)
+    ended = sum(run["ended"] for run in runs)
+    said += f"; {refused} answers refused" if refused else ""
+    return said + (f"; {warned} warned, {ended} of them ended" if warned else "")

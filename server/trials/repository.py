@@ -1,5 +1,6 @@
 """Reads and writes of one rating, in as few statements as it takes."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, NamedTuple, cast
 
@@ -67,6 +68,12 @@ _CHECKS = (
     select(_ratings.c.payload, _trials.c.expected_response)
     .select_from(_ratings.join(_trials))
     .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "attention")
+)
+_LATEST = (
+    select(_ratings.c.payload, _ratings.c.rt, _ratings.c.saved_at)
+    .select_from(_ratings.join(_trials))
+    .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "main")
+    .order_by(_ratings.c.id.desc())
 )
 _ADD_TALLY = insert(_tallies).inline()
 _SET_TALLY = (
@@ -138,6 +145,29 @@ def mark_seen(connection: Connection, run: int, seen: datetime, elapsed_ms: floa
 def checks(connection: Connection, run: int) -> list[tuple[dict[str, Any], int | None]]:
     """What was answered to each attention check of a run, and what it asked for."""
     return [(row.payload, row.expected_response) for row in connection.execute(_CHECKS, {"run": run})]
+
+
+def latest_answers(connection: Connection, run: int, number: int) -> list[Any]:
+    """Payload, response time and moment of the latest answers to main trials, the latest first."""
+    return list(connection.execute(_LATEST.limit(number), {"run": run}))
+
+
+def events_of(connection: Connection, run: int, kinds: Sequence[str]) -> list[Any]:
+    """Type, moment and data of the run's events of these types, in the order they came."""
+    query = select(RunEvent.type, RunEvent.received_at, RunEvent.data)
+    query = query.where(RunEvent.study_run_id == run, RunEvent.type.in_(kinds))
+    return list(connection.execute(query.order_by(RunEvent.id)))
+
+
+def event_data(connection: Connection, run: int, event_id: str) -> dict[str, Any] | None:
+    """What an event says; None where there is no such event."""
+    query = select(RunEvent.data).where(RunEvent.study_run_id == run, RunEvent.event_id == event_id)
+    return connection.scalar(query)
+
+
+def language(connection: Connection, run: int) -> str:
+    """The language that the run's participant reads."""
+    return str(connection.scalar(select(_runs.c.language).where(_runs.c.id == run)))
 
 
 def end_run(connection: Connection, run: int, status: str) -> None:

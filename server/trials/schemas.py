@@ -157,6 +157,15 @@ class TrialInfo(BaseModel):
     series: SeriesPlace | None = Field(default=None, description="Of trials that answers decide on.")
 
 
+class WarningShown(BaseModel):
+    """A kind word to who answers without care; the page shows it before the next trial."""
+
+    rule: str = Field(description="The rule of [[warnings.rules]] that the latest answers break.")
+    number: int = Field(description="Which warning of this run it is, from 1.")
+    maximum: int = Field(description="How many there are.")
+    text: str = Field(description="Markdown, in the participant's language.")
+
+
 class Receipt(BaseModel):
     """The rating is on disk."""
 
@@ -167,6 +176,7 @@ class Receipt(BaseModel):
     again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
     remaining: int = Field(description="Trials of the run that still need an answer.")
     status: RunStatus = Field(description="Of the run: screened_out where this answer ended it.")
+    warning: WarningShown | None = Field(default=None, description="To be shown before the next trial.")
 
 
 class NextTrials(BaseModel):

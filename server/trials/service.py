@@ -11,7 +11,7 @@ from server.errors import Conflict, Invalid, NotFound
 from server.evidence.intake import Answer, Intake
 from server.tallies.tally import Play, Tally
 from server.tokens import hash_token
-from server.trials import repository
+from server.trials import repository, warnings
 from server.trials.attention import by_attention
 from server.trials.kinds import Part, served
 from server.trials.refusals import ConsentMissing, RunClosed, RunUnknown
@@ -70,7 +70,9 @@ def save_rating(
         again = not is_settled(trial.kind, known.play, known.verdict, most)
         left = run.trials_total - run.trials_answered
         ruling = (known.verdict, known.verdict_rule)
-        return _receipt(rating_id, known.saved_at, ruling, again, left, run.status), False
+        receipt = _receipt(rating_id, known.saved_at, ruling, again, left, run.status)
+        receipt.warning = warnings.warning_of(connection, run.id, loaded.experiment, known.rating_id)
+        return receipt, False
     _check(run, loaded.experiment, trial.kind, rating)
     if run.evidence == "asked":
         rated = rating.answer.given
@@ -86,9 +88,22 @@ def save_rating(
     elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)
     repository.mark_seen(connection, run.id, saved_at, elapsed, answered)
     left = run.trials_total - run.trials_answered - answered
-    screened = trial.kind == "attention" and by_attention(connection, run.id, loaded.experiment)
-    status: RunStatus = "screened_out" if screened else run.status
-    return _receipt(rating_id, saved_at, ruling, not settles and not before, left, status), True
+    warning, ended = _consequence(connection, run.id, loaded.experiment, trial.kind, rating_id, saved_at)
+    status: RunStatus = "screened_out" if ended else run.status
+    receipt = _receipt(rating_id, saved_at, ruling, not settles and not before, left, status)
+    receipt.warning = warning
+    return receipt, True
+
+
+def _consequence(
+    connection: Connection, run: int, experiment: Experiment, part: Part, rating_id: str, saved_at: datetime
+) -> warnings.Lapse:
+    """What an answer means for the run beside itself: a failed check may end it, a careless one be told."""
+    if part == "attention":
+        return warnings.Lapse(None, ends=by_attention(connection, run, experiment))
+    if part == "main":
+        return warnings.after_answer(connection, run, experiment, rating_id, saved_at)
+    return warnings.NO_LAPSE
 
 
 def _play(

@@ -50,6 +50,13 @@ PYDANTIC = "from typing import Any\nclass BaseModel: ...\ndef __getattr__(name: 
             'has no attribute "drops"',
         ),
         (
+            "WarningRule = Annotated[",
+            "server/trials/warnings.py",
+            "experiments.rules.warning",
+            "Warns",
+            'has no attribute "lapses"',
+        ),
+        (
             "ScreeningRule = Annotated[",
             "server/participants/screening.py",
             BASE,

@@ -2062,6 +2062,11 @@ export interface components {
             completion_code: string | null;
             /** Redirect Url */
             redirect_url: string | null;
+            /**
+             * Reason
+             * @description Why the run ended, where the page must tell.
+             */
+            reason?: string | null;
         };
         /**
          * ConfirmCode
@@ -2696,6 +2701,20 @@ export interface components {
              * @default []
              */
             screening: (components["schemas"]["ScreenFormAnswer"] | components["schemas"]["ScreenAttention"] | components["schemas"]["ScreenDevice"])[];
+            /**
+             * @description Kind words to who answers without care, and when the run then ends.
+             * @default {
+             *       "rules": [],
+             *       "maximum": 2,
+             *       "then": "end",
+             *       "code": "failed_check",
+             *       "end_text": {
+             *         "de": "Ihre Antworten blieben so, wie wir es angesprochen hatten; deshalb endet die Studie hier. Was Sie geantwortet haben, ist gespeichert.",
+             *         "en": "Your answers went on as we had pointed out to you, so the study ends here. What you have answered is stored."
+             *       }
+             *     }
+             */
+            warnings: components["schemas"]["Warnings"];
             /**
              * Exclusions
              * @description Rules, fixed before the data, that leave out runs or trials when the study is analysed.
@@ -4366,6 +4385,8 @@ export interface components {
              * @enum {string}
              */
             status: "active" | "complete" | "screened_out" | "withdrawn";
+            /** @description To be shown before the next trial. */
+            warning?: components["schemas"]["WarningShown"] | null;
         };
         /**
          * Received
@@ -4895,6 +4916,8 @@ export interface components {
             server_time: string;
             /** @description Leave to answer, a ticket for each play of each trial. */
             tickets: components["schemas"]["Tickets"] | null;
+            /** @description One that no page has shown yet. */
+            warning?: components["schemas"]["WarningShown"] | null;
         };
         /**
          * RunSummary
@@ -6382,6 +6405,157 @@ export interface components {
             saved_at: string;
         };
         /**
+         * WarnFast
+         * @description Warn whose median response time in the last `answers` main trials lies below `below_ms`.
+         */
+        WarnFast: {
+            /**
+             * Answers
+             * @description Answers of which the median is taken.
+             * @default 10
+             */
+            answers: number;
+            /**
+             * Text
+             * @description Markdown of the warning, in every language.
+             */
+            text: {
+                [key: string]: string;
+            };
+            /**
+             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            rule: "fast_answers";
+            /**
+             * Below Ms
+             * @description Median response time, in ms from the clip's end, under which the warning comes.
+             * @default 250
+             */
+            below_ms: number;
+        };
+        /**
+         * WarnPattern
+         * @description Warn whose last `answers` main trials repeat two to `longest` answers over and over.
+         */
+        WarnPattern: {
+            /**
+             * Answers
+             * @description Answers in a row that follow the pattern.
+             * @default 20
+             */
+            answers: number;
+            /**
+             * Text
+             * @description Markdown of the warning, in every language.
+             */
+            text: {
+                [key: string]: string;
+            };
+            /**
+             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            rule: "repeated_pattern";
+            /**
+             * Longest
+             * @description Length of the longest pattern looked for; 1, 2, 3, 1, 2, 3 has length 3.
+             * @default 4
+             */
+            longest: number;
+        };
+        /**
+         * WarnSameAnswer
+         * @description Warn who gives one and the same answer in `answers` main trials in a row.
+         */
+        WarnSameAnswer: {
+            /**
+             * Answers
+             * @description Equal answers in a row. With two answers to choose from, twenty come by chance in 1 of 5,000 visits of
+             *     100 trials.
+             * @default 20
+             */
+            answers: number;
+            /**
+             * Text
+             * @description Markdown of the warning, in every language.
+             */
+            text: {
+                [key: string]: string;
+            };
+            /**
+             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            rule: "same_answer";
+        };
+        /**
+         * WarningShown
+         * @description A kind word to who answers without care; the page shows it before the next trial.
+         */
+        WarningShown: {
+            /**
+             * Rule
+             * @description The rule of [[warnings.rules]] that the latest answers break.
+             */
+            rule: string;
+            /**
+             * Number
+             * @description Which warning of this run it is, from 1.
+             */
+            number: number;
+            /**
+             * Maximum
+             * @description How many there are.
+             */
+            maximum: number;
+            /**
+             * Text
+             * @description Markdown, in the participant's language.
+             */
+            text: string;
+        };
+        /**
+         * Warnings
+         * @description Warnings while the run goes on. After a warning was shown, only answers after it count for another.
+         */
+        Warnings: {
+            /**
+             * Rules
+             * @description What is warned of; without rules nobody is warned.
+             * @default []
+             */
+            rules: (components["schemas"]["WarnSameAnswer"] | components["schemas"]["WarnPattern"] | components["schemas"]["WarnFast"])[];
+            /**
+             * Maximum
+             * @description Warnings that a participant gets.
+             * @default 2
+             */
+            maximum: number;
+            /**
+             * Then
+             * @description What a lapse after the last warning does: it ends the run as screened out, or nothing more happens.
+             * @default end
+             * @enum {string}
+             */
+            then: "end" | "go_on";
+            /**
+             * Code
+             * @description Which of the recruiter's codes a run gets that ended so; that of screened out where there is no other.
+             *     Never the code of a complete run.
+             * @default failed_check
+             * @enum {string}
+             */
+            code: "failed_check" | "screened_out";
+            /**
+             * End Text
+             * @description What stands above the last page of a run that ended so, in every language.
+             */
+            end_text: {
+                [key: string]: string;
+            };
+        };
+        /**
          * WithinFactor
          * @description Clips that differ in the level of one factor only: other factors and the exemplar are the same.
          */
@@ -6629,6 +6803,11 @@ export type ViewShowing = components['schemas']['ViewShowing'];
 export type ViewState = components['schemas']['ViewState'];
 export type ViewsIn = components['schemas']['ViewsIn'];
 export type ViewsSaved = components['schemas']['ViewsSaved'];
+export type WarnFast = components['schemas']['WarnFast'];
+export type WarnPattern = components['schemas']['WarnPattern'];
+export type WarnSameAnswer = components['schemas']['WarnSameAnswer'];
+export type WarningShown = components['schemas']['WarningShown'];
+export type Warnings = components['schemas']['Warnings'];
 export type WithinFactor = components['schemas']['WithinFactor'];
 export type YesNo = components['schemas']['YesNo'];
 export type $defs = Record<string, never>;

@@ -1,5 +1,5 @@
 /** All that the screens of one visit share. */
-import type { CalibrationState, Completion, LinkState, Receipt, RunState, StageChange, TrialInfo } from "../api/schema";
+import type { CalibrationState, Completion, LinkState, Receipt, RunState, StageChange, TrialInfo, WarningShown } from "../api/schema";
 import type { Translate } from "../i18n";
 import type { InteractionLog } from "./evidence/interaction";
 import type { EventLog } from "./outbox/events";
@@ -29,6 +29,8 @@ export interface Session {
   interaction: InteractionLog;
   /** The screens of the declared kind of trial. */
   kind: TrialKind;
+  /** Warnings of the server that wait to be shown, before the next trial. */
+  warnings: WarningShown[];
   /** Aborted when this page must do nothing more: another tab took over, or the participant stopped. */
   over: AbortController;
   api: RunApi;

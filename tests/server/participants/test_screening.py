@@ -139,7 +139,12 @@ def test_code_and_way_back_of_who_is_screened_out(
     participant.request("PUT", "/consent", {"agreed": True})
     participant.request("PUT", "/forms/about", {"answers": {"age": 90}})
     answers = [participant.request("POST", "/complete").json() for _ in range(2)]
-    expected = {"status": "screened_out", "completion_code": code, "redirect_url": address}
+    expected = {
+        "status": "screened_out",
+        "completion_code": code,
+        "redirect_url": address,
+        "reason": None,
+    }
     assert answers == [expected, expected]
 
 

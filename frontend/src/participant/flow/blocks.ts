@@ -87,9 +87,9 @@ function trialNodes(session: Session, trials: TrialInfo[]): Node[] {
   });
 }
 
-/** Before a trial: full screen, room and size as they were, or put right first. */
+/** Before a trial: full screen, room and size as they were, or put right first; then a word of warning that waits. */
 function checks(session: Session): Node[] {
-  const { screen, api, run } = session;
+  const { screen, api, run, warnings, events } = session;
   const setup: Node = {
     timeline: [trial(screenSetup(session), { eyebrow: "", again: true })],
     conditional_function: () => needsScreenSetup(session),
@@ -103,7 +103,15 @@ function checks(session: Session): Node[] {
       return run.display.calibrate !== "off" && change === "screen";
     },
   };
-  return [setup, measure];
+  const read: Node = { timeline: [], on_timeline_start: () => events.add("warning_shown", { rule: warnings.shift()?.rule }) };
+  const warned: Node = {
+    timeline: [
+      trial(textPage(session), { eyebrow: "", text: () => warnings[0]?.text ?? "", action: session.t("continue"), remarks: "" }),
+      read,
+    ],
+    conditional_function: () => warnings.length > 0,
+  };
+  return [setup, measure, warned];
 }
 
 function repetitions(session: Session, block: number): Node[] {

@@ -56,6 +56,7 @@ export function openSession({ root, link, run, kind, player, outbox, unsent }: O
     player,
     clock: new RunClock(run.elapsed_ms_before),
     replays: new Replays(),
+    warnings: run.warning ? [run.warning] : [],
     kind,
     interaction: new InteractionLog(window, over.signal),
     over,

@@ -14,7 +14,8 @@ export type EventType =
   | "online"
   | "stage"
   | "clock_changed"
-  | "second_tab";
+  | "second_tab"
+  | "warning_shown";
 
 export class EventLog {
   constructor(private readonly outbox: Outbox) {}

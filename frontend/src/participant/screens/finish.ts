@@ -91,7 +91,7 @@ export function showCompletion(
   const prose = h("div", { class: "prose" }, ...markdown(text));
   showPage(display, {
     body: [
-      why && h("p", { role: "alert" }, why),
+      (done.reason || why) && h("p", { role: "alert" }, done.reason || why),
       prose,
       code,
       h("p", { class: "status", role: "status" }, t(out ? "close" : "done_close")),

@@ -19,7 +19,9 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
   if (shift_ms !== 0) session.events.add("clock_changed", { shift_ms });
   const handled = receipt.then((outcome) => {
     takeNext(session, outcome);
-    if (receiptOf(outcome)?.again) session.replays.add(trial, body.play + 1);
+    const { again, warning } = receiptOf(outcome) ?? {};
+    if (again) session.replays.add(trial, body.play + 1);
+    if (warning) session.warnings.push(warning);
     if (!outcome.accepted && outcome.refused.code === "rating_differs") session.root.dispatchEvent(new CustomEvent("taken-over"));
   });
   if (!session.outbox.durable) await handled;
