@@ -1,5 +1,6 @@
 """A pair in a real Chromium: both clips by one clock, answered by keyboard, stored with both logs."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,10 +10,9 @@ from playwright.sync_api import Page
 from server.cli_common import migrated_services
 from server.models import View, ViewClip
 from server.views.frame_log import unpacked
-from tests.browser.server_process import ServerProcess
+from tests.browser.served import Served, go_back, reload_in_next_clip, serve, start_clip
 from tests.browser.studies import PLAIN
-from tests.browser.visit import Visit, axe_violations
-from tests.helpers.comparisons import comparisons
+from tests.browser.visit import axe_violations
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -33,41 +33,115 @@ ties = { label = { en = "No difference", de = "Kein Unterschied" } }
 )
 
 
-@pytest.fixture
-def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
+IN_TURN = PAIRS.replace(
+    'arrangement = "side_by_side", if_too_narrow = "stack"',
+    'arrangement = "one_after_the_other", gap_ms = 100',
+)
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[Served]:
     """A server that refuses answers whose clips were not there."""
-    process = ServerProcess(tmp_path / "data", evidence="refuse")
-    yield process
-    process.stop()
+    made = {"pairs": (PAIRS, 8), "long_pairs": (PAIRS, 60), "in_turn": (IN_TURN, 8)}
+    with serve(tmp_path_factory.mktemp("pairs"), made, evidence="refuse") as served:
+        yield served
 
 
-def test_pairs_by_keyboard(strict: ServerProcess, tmp_path: Path, page: Page) -> None:
-    link = strict.add_study(tmp_path / "clips", PAIRS).link_token
-    strict.start()
-    visit = Visit(page, strict.address).open(link).begin().instructions()
+def stored(studies: Served, count: int = 0) -> list[dict[str, object]]:
+    return studies.rows_of_latest("comparisons", "time_elapsed, play", count)
+
+
+def show(page: Page) -> None:
+    page.wait_for_selector(".ready")
+    page.keyboard.press(" ")
+    page.wait_for_selector(".pair-answers")
+
+
+def answer(page: Page, key: str) -> None:
+    page.keyboard.press(key)
+    page.wait_for_selector(".pair-answers", state="detached")
+
+
+def test_pairs_by_keyboard(studies: Served, page: Page) -> None:
+    visit = studies.visit("pairs", page)
     for key in ("ArrowRight", "3"):
-        page.wait_for_selector(".ready")
-        page.keyboard.press(" ")
-        page.wait_for_selector(".pair-answers")
+        show(page)
         assert axe_violations(page) == []
-        page.keyboard.press(key)
-        page.wait_for_selector(".pair-answers", state="detached")
+        answer(page, key)
     visit.trials()
     assert visit.problems == []
-    with migrated_services(strict.settings) as services, services.database.read() as session:
-        rows = comparisons(session)
-        views = session.query(View).order_by(View.trial_index).all()
+    rows = stored(studies)
+    ids = [view["id"] for view in studies.views()]
+    with migrated_services(studies.server.settings) as services, services.database.read() as session:
+        views = session.query(View).where(View.id.in_(ids)).order_by(View.trial_index).all()
         logs = {view.trial_index: [] for view in views}
         for view in views:
             assert view.completed
             clips = session.query(ViewClip).filter_by(view=view.id).order_by(ViewClip.role)
             logs[view.trial_index] = [(clip.role, unpacked(clip.frame_log)) for clip in clips]
     assert [row["winner"] for row in rows] == ["right", "tie"]
-    digests = strict.rows("SELECT digest_right FROM answer_evidence WHERE clip_ms > 0")
-    assert [row["digest_right"] for row in digests] == [1, 1]
+    digests = studies.server.rows("SELECT digest_right FROM answer_evidence WHERE clip_ms > 0")
+    assert [row["digest_right"] for row in digests][:2] == [1, 1]
     assert [row["arrangement"] for row in rows] == ["side_by_side"] * 2
     assert {row["verdict"] for row in rows} <= {"good", "uncertain", "flagged"}
     for (left, one), (right, other) in logs.values():
         assert (left, right) == ("left", "right")
         assert one == other
         assert len(one) > 0
+
+
+@pytest.mark.parametrize(
+    ("study", "key", "winner"), [("pairs", "ArrowLeft", "left"), ("in_turn", "2", "right")]
+)
+def test_a_reload_on_the_question_returns_to_it(
+    studies: Served, page: Page, study: str, key: str, winner: str
+) -> None:
+    studies.visit(study, page)
+    show(page)
+    page.reload()
+    go_back(page)
+    page.wait_for_selector(".pair-answers")
+    assert "already seen" in page.inner_text(".above")
+    answer(page, key)
+    page.wait_for_selector(".ready")
+    [row] = stored(studies, 1)
+    assert (row["winner"], row["views"], row["view_outcomes"], row["rt"]) == (winner, 1, "shown", None)
+    assert json.loads(str(row["disturbances"]))["scale_reloaded"] == 1
+    assert row["verdict"] == "flagged"
+    assert [view["outcome"] for view in studies.views()] == ["shown"]
+
+
+def test_a_reload_in_the_midst_of_a_pair_ends_its_view_and_it_comes_again(
+    studies: Served, page: Page
+) -> None:
+    visit = studies.visit("long_pairs", page)
+    reload_in_next_clip(page)
+    page.keyboard.press(" ")
+    go_back(page)
+    for _ in range(2):
+        show(page)
+        answer(page, "ArrowRight")
+    visit.trials()
+    first, other, again = stored(studies)
+    assert (first["play"], first["winner"], first["verdict_rule"]) == (1, None, "interrupted")
+    assert (again["trial_index"], again["play"]) == (first["trial_index"], 2), "at the end of its block"
+    assert (again["winner"], again["views"], other["views"]) == ("right", 2, 1)
+    outcomes = {(view["trial_index"], view["number"]): view["outcome"] for view in studies.views()}
+    assert outcomes == {
+        (first["trial_index"], 1): "interrupted",
+        (other["trial_index"], 1): "shown",
+        (first["trial_index"], 2): "shown",
+    }
+
+
+def test_stop_stands_beside_the_question_and_not_beside_clips(studies: Served, page: Page) -> None:
+    studies.visit("long_pairs", page)
+    assert page.is_visible("text=Stop")
+    start_clip(page)
+    assert not page.is_visible("text=Stop")
+    page.wait_for_selector(".pair-answers")
+    page.click("text=Stop")
+    page.keyboard.press("1")
+    page.click("text=Pause")
+    page.wait_for_selector("text=See you later")
+    assert stored(studies) == []

@@ -1,16 +1,16 @@
 """Adaptive series in a real Chromium: by keyboard and mouse, on without connection, then waiting for it."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page
 
-from server.cli_common import migrated_services
-from tests.browser.server_process import ServerProcess
+from tests.browser.served import Served, go_back, reload_in_next_clip, serve, start_clip
 from tests.browser.studies import PLAIN
-from tests.browser.visit import Visit, axe_violations
-from tests.helpers.thresholds import FACTORS, TWO_INTERVAL, YES_NO, thresholds
+from tests.browser.visit import axe_violations
+from tests.helpers.thresholds import FACTORS, TWO_INTERVAL, YES_NO
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -21,12 +21,29 @@ def declared(trial: str) -> str:
     return PLAIN[: PLAIN.index("[[factors]]")] + FACTORS + between + trial + PLAIN[PLAIN.index("[[forms]]") :]
 
 
-@pytest.fixture
-def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
+OFFLINE = declared(
+    YES_NO.replace("trials = 8", "trials = 4").replace("ahead = 2", "ahead = 1\npointer_delay_ms = 0")
+)
+
+
+IN_TURN = declared(TWO_INTERVAL.replace("trials = 6", "trials = 2"))
+ONE_SERIES = "\n".join(line for line in IN_TURN.splitlines() if '"cartoon"' not in line)
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[Served]:
     """A server that refuses answers whose clips were not there."""
-    process = ServerProcess(tmp_path / "data", evidence="refuse")
-    yield process
-    process.stop()
+    made = {
+        "yes_no": (OFFLINE, 8),
+        "in_turn": (IN_TURN, 8),
+        "long_in_turn": (ONE_SERIES, 30),
+    }
+    with serve(tmp_path_factory.mktemp("thresholds"), made, evidence="refuse") as served:
+        yield served
+
+
+def stored(studies: Served, count: int = 0) -> list[dict[str, object]]:
+    return studies.rows_of_latest("thresholds", "trial_index, play", count)
 
 
 def show(page: Page) -> None:
@@ -41,18 +58,8 @@ def answer(page: Page, key: str) -> None:
     page.wait_for_selector(".pair-answers", state="detached")
 
 
-def rows_of(server: ServerProcess) -> list[dict[str, object]]:
-    with migrated_services(server.settings) as services, services.database.read() as session:
-        return [dict(row) for row in thresholds(session)]
-
-
-def test_a_series_goes_on_without_connection_as_far_as_declared(
-    strict: ServerProcess, tmp_path: Path, page: Page
-) -> None:
-    trial = YES_NO.replace("trials = 8", "trials = 4").replace("ahead = 2", "ahead = 1\npointer_delay_ms = 0")
-    link = strict.add_study(tmp_path / "clips", declared(trial)).link_token
-    strict.start()
-    visit = Visit(page, strict.address).open(link).begin().instructions()
+def test_a_series_goes_on_without_connection_as_far_as_declared(studies: Served, page: Page) -> None:
+    visit = studies.visit("yes_no", page)
     answer(page, "1")
     show(page)
     assert axe_violations(page) == []
@@ -60,7 +67,7 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(
     page.wait_for_selector(".pair-answers", state="detached")
     page.wait_for_selector(".ready")
     assert axe_violations(page) == []
-    strict.rows_soon("SELECT 1 AS one FROM series_answers WHERE threshold IS NOT NULL", 2)
+    studies.server.rows_soon("SELECT 1 AS one FROM series_answers WHERE threshold IS NOT NULL", 2)
     page.wait_for_load_state("networkidle")
     page.context.set_offline(True)
     for key in ("ArrowLeft", "n", "y", "2"):
@@ -71,7 +78,7 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(
     answer(page, "1")
     answer(page, "2")
     visit.trials()
-    rows = rows_of(strict)
+    rows = stored(studies)
     assert [row["response"] for row in rows] == ["yes", "no", "yes", "no", "yes", "no", "yes", "no"]
     assert {row["verdict"] for row in rows} <= {"good", "uncertain", "flagged"}
     assert [(row["position"], row["known"], row["ahead"]) for row in rows] == [
@@ -83,11 +90,8 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(
     assert all(row["threshold_sd"] for row in rows)
 
 
-def test_two_clips_in_turn(strict: ServerProcess, tmp_path: Path, page: Page) -> None:
-    trial = TWO_INTERVAL.replace("trials = 6", "trials = 2")
-    link = strict.add_study(tmp_path / "clips", declared(trial)).link_token
-    strict.start()
-    visit = Visit(page, strict.address).open(link).begin().instructions()
+def test_two_clips_in_turn(studies: Served, page: Page) -> None:
+    visit = studies.visit("in_turn", page)
     show(page)
     assert axe_violations(page) == []
     page.keyboard.press("1")
@@ -96,7 +100,54 @@ def test_two_clips_in_turn(strict: ServerProcess, tmp_path: Path, page: Page) ->
         answer(page, key)
     visit.trials()
     assert visit.problems == []
-    rows = rows_of(strict)
+    rows = stored(studies)
     assert [row["response"] for row in rows] == ["first", "second", "second", "first"]
     assert all(bool(row["correct"]) == (row["response"] == row["interval"]) for row in rows)
     assert {row["verdict"] for row in rows} <= {"good", "uncertain", "flagged"}
+
+
+@pytest.mark.parametrize(("study", "chosen"), [("yes_no", "yes"), ("in_turn", "first")])
+def test_a_reload_on_the_question_returns_to_it(studies: Served, page: Page, study: str, chosen: str) -> None:
+    studies.visit(study, page)
+    show(page)
+    page.reload()
+    go_back(page)
+    page.wait_for_selector(".pair-answers")
+    assert "already seen" in page.inner_text(".above")
+    page.keyboard.press("1")
+    page.wait_for_selector(".ready")
+    [row] = stored(studies, 1)
+    assert (row["response"], row["views"], row["view_outcomes"], row["rt"]) == (chosen, 1, "shown", None)
+    assert json.loads(str(row["disturbances"]))["scale_reloaded"] == 1
+    assert row["verdict"] == "flagged"
+    assert [view["outcome"] for view in studies.views()] == ["shown"]
+
+
+def test_a_reload_in_mid_clip_ends_the_view_and_the_trial_comes_again(studies: Served, page: Page) -> None:
+    visit = studies.visit("long_in_turn", page)
+    reload_in_next_clip(page)
+    page.keyboard.press(" ")
+    go_back(page)
+    for _ in range(2):
+        answer(page, "2")
+    visit.trials()
+    rows = stored(studies)
+    [broken] = [row for row in rows if row["response"] is None]
+    [again] = [row for row in rows if row["trial_index"] == broken["trial_index"] and row["play"] == 2]
+    assert (broken["play"], broken["verdict_rule"]) == (1, "interrupted")
+    assert (again["response"], again["views"], again["view_outcomes"]) == ("second", 2, "shown")
+    assert len(rows) == 3
+    assert sorted(view["outcome"] for view in studies.views()) == ["interrupted", *["shown"] * 2]
+
+
+def test_stop_stands_beside_the_question_and_not_beside_clips(studies: Served, page: Page) -> None:
+    studies.visit("long_in_turn", page)
+    assert page.is_visible("text=Stop")
+    start_clip(page)
+    assert not page.is_visible("text=Stop")
+    page.wait_for_selector(".pair-answers")
+    page.click("text=Stop")
+    page.keyboard.press("1")
+    page.click("text=Pause")
+    page.wait_for_selector("text=See you later")
+    assert stored(studies) == []

@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
+from tests.browser.served import LATEST_RUN, Served, go_back, reload_in_next_clip, serve, start_clip
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit, axe_violations
@@ -16,13 +16,6 @@ from tests.browser.visit import Visit, axe_violations
 pytestmark = pytest.mark.browser
 SHORT, MIDDLE, LONG = 20, 60, 100
 """Frames of clips, 30 a second: longer ones where something happens while they play."""
-LATEST = "(SELECT max(id) FROM study_runs)"
-RATED = (
-    "SELECT trial_index, play, response, views, view_outcomes, disturbances, verdict, verdict_rule, rt "
-    f"FROM ratings WHERE run = (SELECT public_id FROM study_runs WHERE id = {LATEST}) "
-    "ORDER BY time_elapsed, play"
-)
-VIEWS = f"SELECT * FROM views WHERE study_run_id = {LATEST} ORDER BY id"
 PLAIN_TRIALS = without(
     PLAIN,
     ("trials = 1", "trials = 0"),
@@ -40,47 +33,14 @@ STUDIES = {
 }
 
 
-@dataclass(frozen=True)
-class Studies:
-    """A server for the whole module, and the links to its studies. Queries ask for the latest run alone."""
-
-    server: ServerProcess
-    links: dict[str, str]
-    personal: str
-
-
 @pytest.fixture(scope="module")
-def studies(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[Studies]:
-    folder = tmp_path_factory.mktemp("views")
-    server = ServerProcess(folder / "data")
-    links: dict[str, str] = {}
-    for name, (declared, frames) in STUDIES.items():
-        study = server.add_study(folder / name, declared.replace('"browser"', f'"{name}"', 1), frames)
-        links[name] = study.link_token
-        if name == "short_clips":
-            personal = server.link(study, "personal")
-    server.start()
-    yield Studies(server, links, personal)
-    server.stop()
+def studies(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[Served]:
+    with serve(tmp_path_factory.mktemp("views"), STUDIES) as served:
+        yield served
 
 
-def in_front_of_a_trial(server: ServerProcess, link: str, page: Page) -> Visit:
-    """A visit in front of its first trial."""
-    visit = Visit(page, server.address).open(link).begin().instructions()
-    page.wait_for_selector(".ready")
-    return visit
-
-
-def start_clip(page: Page) -> None:
-    page.wait_for_selector(".ready")
-    page.keyboard.press(" ")
-    page.wait_for_selector(".trial.playing")
-
-
-def go_back(page: Page) -> None:
-    """From the page that says welcome back to the trials."""
-    page.wait_for_selector(".prose h1, .prose h2")
-    page.click(".primary")
+def rated(studies: Served, count: int = 0) -> list[dict[str, Any]]:
+    return studies.rows_of_latest("ratings", "time_elapsed, play", count)
 
 
 def on_line(_page: Page, _server: ServerProcess) -> None:
@@ -103,10 +63,10 @@ def restored(page: Page, server: ServerProcess) -> None:
 
 @pytest.mark.parametrize("away", [on_line, off_line, killed])
 def test_a_reload_on_the_scale_returns_to_the_scale(
-    studies: Studies, page: Page, away: Callable[[Page, ServerProcess], None]
+    studies: Served, page: Page, away: Callable[[Page, ServerProcess], None]
 ) -> None:
     server = studies.server
-    visit = in_front_of_a_trial(server, studies.links["short_clips"], page)
+    visit = studies.visit("short_clips", page)
     page.evaluate("navigator.serviceWorker.ready.then(() => true)")
     away(page, server)
     start_clip(page)
@@ -119,72 +79,68 @@ def test_a_reload_on_the_scale_returns_to_the_scale(
     restored(page, server)
     page.keyboard.press("2")
     page.wait_for_selector(".ready, .break")
-    [row] = server.rows_soon(RATED, 1)
+    [row] = rated(studies, 1)
     assert (row["response"], row["views"], row["view_outcomes"], row["rt"]) == (2, 1, "shown", None)
     assert json.loads(row["disturbances"])["scale_reloaded"] == 1
     assert row["verdict"] == "flagged"
     assert row["verdict_rule"] in ("scale_reloaded", "focus_lost")
-    assert [view["outcome"] for view in server.rows(VIEWS)] == ["shown"]
+    assert [view["outcome"] for view in studies.views()] == ["shown"]
     assert visit.problems == [] or away is not on_line
 
 
-def test_a_reload_in_mid_clip_ends_the_view_and_the_trial_comes_again(studies: Studies, page: Page) -> None:
-    visit = in_front_of_a_trial(studies.server, studies.links["two_trials"], page)
-    # By the page itself: on a slow machine the clip may be over before word of it has come here and back.
-    reload = """() => new MutationObserver(() => {
-        if (document.querySelector(".trial.playing")) setTimeout(() => location.reload(), 300);
-    }).observe(document.body, { subtree: true, attributes: true })"""
-    page.evaluate(reload)
+def test_a_reload_in_mid_clip_ends_the_view_and_the_trial_comes_again(studies: Served, page: Page) -> None:
+    visit = studies.visit("two_trials", page)
+    reload_in_next_clip(page)
     page.keyboard.press(" ")
     go_back(page)
     visit.trials()
-    rows = studies.server.rows(RATED)
+    rows = rated(studies)
     first, other, again = rows
     assert (first["play"], first["response"], first["verdict_rule"]) == (1, None, "interrupted")
     assert (again["trial_index"], again["play"]) == (first["trial_index"], 2), "at the end of its block"
     assert (again["response"], again["views"], again["view_outcomes"]) == (4, 2, "shown")
     assert (other["response"], other["play"], other["views"]) == (4, 1, 1)
-    of_first = [view for view in studies.server.rows(VIEWS) if view["trial_index"] == first["trial_index"]]
+    of_first = [view for view in studies.views() if view["trial_index"] == first["trial_index"]]
     assert [(view["number"], view["outcome"]) for view in of_first] == [(1, "interrupted"), (2, "shown")]
 
 
 def test_another_device_answers_what_the_first_has_shown(
-    studies: Studies, chromium: Browser, page: Page
+    studies: Served, chromium: Browser, page: Page
 ) -> None:
     server = studies.server
-    in_front_of_a_trial(server, studies.personal, page)
+    link = server.link(studies.studies["short_clips"], "personal")
+    studies.visit_by(link, page)
     start_clip(page)
     page.wait_for_selector(".scale")
-    ended = VIEWS.replace("WHERE", "WHERE outcome IS NOT NULL AND")
+    ended = f"SELECT 1 AS one FROM views WHERE study_run_id = {LATEST_RUN} AND outcome = 'shown'"
     assert len(server.rows_soon(ended, 1)) == 1
     other = chromium.new_context(locale="en-GB")
     elsewhere = other.new_page()
-    Visit(elsewhere, server.address).open(studies.personal)
+    Visit(elsewhere, server.address).open(link)
     go_back(elsewhere)
     elsewhere.wait_for_selector(".scale")
     assert axe_violations(elsewhere) == []
     elsewhere.keyboard.press("6")
     elsewhere.wait_for_selector(".ready, .break")
-    [row] = server.rows_soon(RATED, 1)
+    [row] = rated(studies, 1)
     other.close()
     assert (row["response"], row["views"], row["view_outcomes"]) == (6, 1, "shown")
 
 
 def test_a_second_tab_answers_what_the_first_has_shown(
-    studies: Studies, context: BrowserContext, page: Page
+    studies: Served, context: BrowserContext, page: Page
 ) -> None:
-    link = studies.links["short_clips"]
-    in_front_of_a_trial(studies.server, link, page)
+    studies.visit("short_clips", page)
     start_clip(page)
     page.wait_for_selector(".scale")
     second = context.new_page()
-    Visit(second, studies.server.address).open(link)
+    Visit(second, studies.server.address).open(studies.studies["short_clips"].link_token)
     second.click("text=Go on here")
     go_back(second)
     second.wait_for_selector(".scale")
     second.keyboard.press("3")
     second.wait_for_selector(".ready, .break")
-    [row] = studies.server.rows_soon(RATED, 1)
+    [row] = rated(studies, 1)
     assert (row["response"], row["views"], row["view_outcomes"]) == (3, 1, "shown")
 
 
@@ -220,43 +176,41 @@ def as_before(page: Page) -> None:
     page.set_viewport_size({"width": 1280, "height": 800})
 
 
-def disturbed_view(
-    server: ServerProcess, page: Page, disturb: Callable[[Page], object], number: int
-) -> set[str]:
+def disturbed_view(studies: Served, page: Page, disturb: Callable[[Page], object], number: int) -> set[str]:
     """What is stored to have disturbed the view of the run's next trial, of which this happens."""
     start_clip(page)
     disturb(page)
     page.wait_for_selector(".scale")
     as_before(page)
     page.keyboard.press("4")
-    row = server.rows_soon(RATED, number)[-1]
+    row = rated(studies, number)[-1]
     seen: dict[str, Any] = json.loads(row["disturbances"])
     assert row["verdict"] in ("flagged", "failed")
     assert row["verdict_rule"] in {*seen, *UNEVEN}
-    view = server.rows_soon(VIEWS, number)[-1]
+    view = studies.views(number)[-1]
     assert set(seen) == set(json.loads(view["disturbances"]))
     return set(seen)
 
 
-def test_what_disturbs_a_view_is_recorded_and_flags_it(studies: Studies, window: Page) -> None:
-    in_front_of_a_trial(studies.server, studies.links["long_clips"], window)
-    assert "focus_lost" in disturbed_view(studies.server, window, other_tab, 1)
-    assert {"window_too_small", "clip_cut_off"} <= disturbed_view(studies.server, window, smaller, 2)
-    assert "zoomed" in disturbed_view(studies.server, window, zoomed, 3)
+def test_what_disturbs_a_view_is_recorded_and_flags_it(studies: Served, window: Page) -> None:
+    studies.visit("long_clips", window)
+    assert "focus_lost" in disturbed_view(studies, window, other_tab, 1)
+    assert {"window_too_small", "clip_cut_off"} <= disturbed_view(studies, window, smaller, 2)
+    assert "zoomed" in disturbed_view(studies, window, zoomed, 3)
 
 
-def test_full_screen_left_is_recorded_and_flags_the_view(studies: Studies, window: Page) -> None:
-    visit = Visit(window, studies.server.address).open(studies.links["full_screen"]).begin()
+def test_full_screen_left_is_recorded_and_flags_the_view(studies: Served, window: Page) -> None:
+    visit = Visit(window, studies.server.address).open(studies.studies["full_screen"].link_token).begin()
     window.wait_for_selector("text=Go to full screen")
     window.click(".primary")
     visit.instructions()
-    seen = disturbed_view(studies.server, window, lambda page: page.evaluate("document.exitFullscreen()"), 1)
+    seen = disturbed_view(studies, window, lambda page: page.evaluate("document.exitFullscreen()"), 1)
     assert "full_screen_left" in seen
 
 
-def test_an_undisturbed_view_is_recorded_as_one(studies: Studies, page: Page) -> None:
-    visit = in_front_of_a_trial(studies.server, studies.links["short_clips"], page)
+def test_an_undisturbed_view_is_recorded_as_one(studies: Served, page: Page) -> None:
+    visit = studies.visit("short_clips", page)
     visit.rate("4")
-    [row] = studies.server.rows_soon(RATED, 1)
+    [row] = rated(studies, 1)
     assert (row["views"], row["view_outcomes"]) == (1, "shown")
     assert set(json.loads(row["disturbances"])) <= {"refresh_dropped"}

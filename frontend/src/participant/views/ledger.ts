@@ -99,13 +99,14 @@ export function isFromBefore(showings: readonly Pick<Shown, "disturbances">[]): 
 
 function restored(view: ViewState): RolesShown[] {
   const key_at_ms = Date.parse(view.started_at_client);
-  return (view.showings ?? []).map(({ roles, visible_share, refresh_ms, ended_ms, ...measured }) => {
+  return (view.showings ?? []).map(({ roles, visible_share, refresh_ms, ended_ms, ...measured }, number, { length }) => {
     // Of clips at once the longest one's log has every frame that the clock drew.
     const logs = view.clips.filter(({ role }) => roles.includes(role)).map(({ drawn }) => drawn);
     const log = logs.reduce((longest, one) => (one.length > longest.length ? one : longest), []);
     const drawn = log.map(([index, ms]): [number, number] => [index, key_at_ms + ms]);
     const kept = { visible_share: visible_share ?? 1, refresh_ms: refresh_ms ?? null, early_keys: 0 };
-    const disturbances = { ...view.disturbances, [RELOADED]: 1 };
+    // The view's own counts are those of all its showings: they are told once.
+    const disturbances: Record<string, number> = number === length - 1 ? { ...view.disturbances, [RELOADED]: 1 } : {};
     return { roles, showing: { ...measured, ...kept, drawn, key_at_ms, ended_at_ms: key_at_ms + ended_ms, disturbances } };
   });
 }

@@ -6,6 +6,7 @@ import { focusHeading } from "../../../ui/page";
 import { OBJECT, plugin, STRING, type PluginClass } from "../../jspsych";
 import { absoluteNow } from "../../playback/protocol";
 import { playbackRecord } from "../../playback/record";
+import { stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
 import { askResponse, type Response } from "./answers";
@@ -38,6 +39,7 @@ export function thresholdCheck(session: Session): PluginClass<Parameters> {
 async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<Data> {
   const below = h("div", { class: "below" });
   const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
+  section.append(stopButton(session));
   display.replaceChildren(section);
   const title = h("h1", { class: "eyebrow" }, session.t("attention_title"));
   const question = h("div", { class: "question" }, title, ...markdown(trial.prompt ?? ""));

@@ -7,6 +7,7 @@ import { ClipBroken } from "../../playback/player";
 import { playbackRecord } from "../../playback/record";
 import { clipHeight, clipWidth } from "../../screen/size";
 import { sourcesOf } from "../../screens/preload";
+import { stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import type { RatingBody } from "../rating";
 import { saveRating } from "../save-rating";
@@ -91,6 +92,7 @@ function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Sta
   const width = Math.min(wanted, window.innerWidth);
   const name = session.t(trial.clips.length > 1 ? "pair_name" : "clip_name");
   const place = stage(session.player.element, width, clipHeight(trial, width), name);
+  place.element.append(stopButton(session));
   display.replaceChildren(place.element);
   return place;
 }
