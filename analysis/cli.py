@@ -19,6 +19,7 @@ def _gather() -> None:
     from analysis.commands.models import register as register_models
     from analysis.commands.opinion import register as register_opinion
     from analysis.commands.pairs import register as register_pairs
+    from analysis.commands.reshape import register as register_reshape
     from analysis.commands.run import register as register_run
     from analysis.commands.thresholds import register as register_thresholds
 
@@ -29,6 +30,7 @@ def _gather() -> None:
     register_pairs(app)
     register_thresholds(app)
     register_opinion(app)
+    register_reshape(app)
 
 
 _gather()

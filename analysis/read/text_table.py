@@ -1,9 +1,7 @@
-"""Read a long table from CSV as text, with every doubt about it raised as one line."""
+"""Read a long table as text, with every doubt about it raised as one line."""
 
-import csv
 import re
-import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.raggedness import refuse_ragged
+from analysis.read.files.cells import Cells
+from analysis.read.files.open import Reader, reader_of
+from analysis.read.files.programs import program_of, trials_only
+from analysis.read.wide import wide_hint
 from experiments.errors import InputError, did_you_mean
 
 MISSING_MARKS = frozenset({"", "NA", "NaN", "nan", "N/A", "n/a", "."})
@@ -26,12 +27,16 @@ NAMED_ROWS = 5
 
 @dataclass
 class TextTable:
-    """Columns of text (categorical, kept as written, stripped) and what was decided while reading."""
+    """Columns of text (categorical, kept as written, stripped) and what was decided while reading.
+
+    `lines` (rows,) are where the rows stand in the file; `labels` has, of a column, the word for each code.
+    """
 
     columns: pd.DataFrame
     source: str
     header: tuple[str, ...]
-    separator: str
+    lines: NDArray[np.int64] = field(repr=False)
+    labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     decisions: list[str] = field(default_factory=list)
 
     @property
@@ -41,86 +46,53 @@ class TextTable:
 
     def line(self, row: int) -> int:
         """Line of the file on which data row `row` (from 0) stands, where no cell spans lines."""
-        return row + 2
+        return int(self.lines[row])
 
 
 def read_text_table(path: Path, wanted: Sequence[str] | None, optional: Sequence[str] = ()) -> TextTable:
     """Read the `wanted` columns (all must exist; None: every one) and those of `optional` there, as text.
 
-    The separator (comma, semicolon or tab) is taken from the header line. Ids keep their leading zeros,
-    and names like `None` or `NA` stay names.
+    The file may be CSV (comma, semicolon or tab, taken from the header line), an Excel workbook
+    (`book.xlsx#Sheet` names a sheet), SPSS, a JSON list of trials, or a Psych-DS folder. Of data of jsPsych,
+    PsychoPy and Gorilla only rows count that hold every column wanted. Ids keep their leading zeros, and
+    names like `None` or `NA` stay names.
 
     Raises
     ------
     InputError
         No file, no text, no rows, rows of unequal length, a column missing or there twice.
     """
-    header, separator = _header(path)
-    wanted = header if wanted is None else wanted
-    for name in wanted:
-        if name not in header:
-            raise InputError(f"{path.name} has no column '{name}'{did_you_mean(name, header)}")
-    for name in header:
-        if name and header.count(name) > 1 and name in (*wanted, *optional):
-            raise InputError(f"{path.name} has two columns called '{name}'; rename one")
-    names = list(dict.fromkeys([*wanted, *(name for name in optional if name in header)]))
-    frame = _parse(path, separator, [header.index(name) for name in names], len(header))
-    if frame.empty:
-        raise InputError(f"{path.name} has a header but no rows")
-    frame.columns = pd.Index(names)
-    table = TextTable(frame, path.name, tuple(header), separator)
+    reader = reader_of(path)
+    header = reader.header()
+    names = _names_to_read(path.name, header, header if wanted is None else wanted, optional)
+    cells = trials_only(reader.cells(names), list(wanted or ()), _sorts(reader, header))
+    if cells.rows.empty:
+        raise InputError(f"{path.name} has a header but no rows{' that are trials' * bool(cells.decisions)}")
+    table = TextTable(cells.rows, path.name, cells.header, cells.lines, cells.labels)
+    table.decisions.extend(cells.decisions)
     for name in names:
-        frame[name] = _stripped(frame[name])
+        table.columns[name] = _stripped(table.columns[name])
     return table
 
 
-def _header(path: Path) -> tuple[list[str], str]:
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; expected a CSV file")
-    if not path.is_file():
-        raise InputError(f"no file {path}; expected a CSV file with one row a trial")
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as lines:
-            first = lines.readline()
-            separator = max(",;\t", key=first.count)
-            lines.seek(0)
-            rows = csv.reader(lines, delimiter=separator)
-            header = next(rows, [])
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
-    except csv.Error as error:
-        raise InputError(f"{path.name} is not a CSV file: {error}") from error
-    if not any(name.strip() for name in header):
-        raise InputError(f"{path.name} is empty; expected a header line and one row a trial")
-    return [name.strip() for name in header], separator
+def _names_to_read(
+    source: str, header: Sequence[str], wanted: Sequence[str], optional: Sequence[str]
+) -> list[str]:
+    for name in wanted:
+        if name not in header:
+            hint = wide_hint(header) or did_you_mean(name, header)
+            raise InputError(f"{source} has no column '{name}'{hint}")
+    for name in header:
+        if name and header.count(name) > 1 and name in (*wanted, *optional):
+            raise InputError(f"{source} has two columns called '{name}'; rename one")
+    return list(dict.fromkeys([*wanted, *(name for name in optional if name in header)]))
 
 
-def _parse(path: Path, separator: str, positions: list[int], width: int) -> pd.DataFrame:
-    refuse_ragged(path, separator, width)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            frame = pd.read_csv(
-                path,
-                sep=separator,
-                header=None,
-                skiprows=1,
-                names=range(width),
-                usecols=sorted(positions),
-                dtype=str,
-                keep_default_na=False,
-                encoding="utf-8-sig",
-                index_col=False,
-                skip_blank_lines=True,
-            )
-    except pd.errors.EmptyDataError:
-        return pd.DataFrame(columns=positions)
-    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-        text = " ".join(str(error).split())
-        raise InputError(f"{path.name}: not a CSV file ({text})") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
-    return frame[positions].copy()
+def _sorts(reader: Reader, header: Sequence[str]) -> Cells | None:
+    """The column in which a known program says what sort a row is."""
+    program = program_of(list(header))
+    sort = program and program.sort
+    return reader.cells([sort]) if sort and sort in header else None
 
 
 def _stripped(column: "pd.Series[str]") -> "pd.Series[Any]":
@@ -146,7 +118,8 @@ def refuse_shared_roles(names: Sequence[str]) -> None:
 
 
 def texts_required(table: TextTable, name: str) -> None:
-    """Refuse empty cells in a column of names."""
+    """Refuse empty cells in a column of names; codes of an SPSS file take the words the file has for them."""
+    table.columns[name] = _worded(table.columns[name], table.labels.get(name, {}))
     column = table.columns[name]
     if "" in column.cat.categories:
         row = int(np.argmax((column == "").to_numpy()))
@@ -156,6 +129,13 @@ def texts_required(table: TextTable, name: str) -> None:
         other = folded.setdefault(text.casefold(), text)
         if other != text:
             table.decisions.append(f"'{other}' and '{text}' of '{name}' differ in case only; kept apart")
+
+
+def _worded(column: "pd.Series[Any]", words: Mapping[str, str]) -> "pd.Series[Any]":
+    if not words:
+        return column
+    names = [words.get(text, text) for text in column.cat.categories]
+    return pd.Series(categorical(column.cat.codes.to_numpy(), names), index=column.index)
 
 
 def numbers(table: TextTable, name: str) -> NDArray[np.float64]:

@@ -1,0 +1,42 @@
+"""`analysis reshape`: a wide table made long."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="reshape")(reshape)
+
+
+def reshape(
+    file: Annotated[Path, typer.Argument(help="CSV, Excel or SPSS file, one row a person.")],
+    columns: Annotated[
+        str, typer.Option(help="Names of the columns of ratings, each factor in braces: '{face}_{blur}'.")
+    ],
+    out: Annotated[Path, typer.Option(help="CSV file to write.")],
+    rating: Annotated[str, typer.Option(help="Name of the column of ratings in the new file.")] = "rating",
+) -> None:
+    """Make a wide table long: one row a person and cell, as every other command expects.
+
+    Examples:
+
+      analysis reshape wide.xlsx --columns '{face}_{blur}' --out long.csv
+
+      analysis reshape wide.csv --columns 't{time}' --rating score --out long.csv
+    """
+    from analysis.read.wide import lengthen
+    from experiments.files import check_targets, whole_file
+
+    check_targets([out])
+    table = lengthen(file, columns, rating)
+    with whole_file(out) as temporary:
+        table.rows.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+    for factor in table.factors:
+        typer.echo(f"- {factor}: {', '.join(dict.fromkeys(table.rows[factor]))}")
+    typer.echo(
+        f"- {table.n_columns} columns became '{rating}'; beside stay: {', '.join(table.beside) or 'none'}"
+    )
+    typer.echo(f"written: {out} ({len(table.rows)} rows)")

@@ -1,0 +1,56 @@
+"""What every reader of a file gives: a header and cells of text."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date, datetime, time
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The columns asked for as text.
+
+    Attributes
+    ----------
+    rows : columns of text, named; the index counts rows from 0.
+    header : names of all columns of the file.
+    lines : line (or row of the sheet) on which each row stands, (rows,).
+    labels : of a column, the word for each coded value, where the file has such words (SPSS).
+    decisions : what was understood, for the reader of the tables.
+    """
+
+    rows: pd.DataFrame
+    header: tuple[str, ...]
+    lines: NDArray[np.int64] = field(repr=False)
+    labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    decisions: tuple[str, ...] = ()
+
+
+def cell_text(value: Any) -> str:
+    """A value of a sheet as a person would type it: whole numbers without a point, days as 2026-11-22."""
+    if value is None or value is pd.NaT or (isinstance(value, float) and np.isnan(value)):
+        return ""
+    if isinstance(value, bool | np.bool_):
+        return str(bool(value))
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
+    if isinstance(value, datetime):
+        return value.date().isoformat() if value.time() == time() else value.isoformat(" ")
+    return value.isoformat() if isinstance(value, date | time) else str(value)
+
+
+def cells_of(
+    header: list[str], rows: list[list[Any]], names: list[str], first_line: int, **more: Any
+) -> Cells:
+    """Cells of rows of values; rows without any value are left out, as blank lines of CSV are."""
+    texts = [[cell_text(value) for value in row] for row in rows]
+    filled = [i for i, row in enumerate(texts) if any(row)]
+    positions = [header.index(name) for name in names]
+    columns = {name: [texts[i][p] for i in filled] for name, p in zip(names, positions, strict=True)}
+    lines = np.array(filled, dtype=np.int64) + first_line
+    return Cells(pd.DataFrame(columns, dtype=str), tuple(header), lines, **more)

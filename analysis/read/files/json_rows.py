@@ -1,0 +1,37 @@
+"""JSON as programs for experiments write it: a list of objects, one a trial."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from analysis.read.files.cells import Cells, cells_of
+from experiments.errors import InputError
+
+
+def header(path: Path) -> list[str]:
+    """Keys of all objects, in the order of their first appearance."""
+    return list(dict.fromkeys(key for row in _objects(path) for key in row))
+
+
+def cells(path: Path, names: list[str]) -> Cells:
+    """The keys `names` of each object; values that are lists or objects stay JSON. Lines count objects."""
+    objects = _objects(path)
+    keys = list(dict.fromkeys(key for row in objects for key in row))
+    return cells_of(keys, [[_plain(row.get(key)) for key in keys] for row in objects], names, 1)
+
+
+def _objects(path: Path) -> list[dict[str, Any]]:
+    try:
+        read = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{path.name} is not JSON ({error})") from error
+    if isinstance(read, dict) and isinstance(read.get("trials"), list):
+        read = read["trials"]
+    rows = read if isinstance(read, list) else []
+    if not rows or not all(isinstance(row, dict) for row in rows):
+        raise InputError(f"{path.name}: expected a list of objects, one a trial; save the data as CSV")
+    return rows
+
+
+def _plain(value: Any) -> Any:
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, list | dict) else value

@@ -1,0 +1,50 @@
+"""Exports of programs for experiments: known by their columns, cleared of rows that are no trial.
+
+jsPsych, PsychoPy and Gorilla write a row for everything that happened: a fixation cross, an instruction, the
+end of a task. A row that lacks one of the columns asked for is such a row; how many and of what sort is said.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.read.files.cells import Cells
+
+EMPTY = frozenset({"", "null", "None", "undefined", '""', "NaN"})
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program, the columns only it writes, and the column that says what sort a row is."""
+
+    name: str
+    columns: frozenset[str]
+    sort: str | None
+
+
+PROGRAMS = (
+    Program("jsPsych", frozenset({"trial_type", "trial_index", "time_elapsed"}), "trial_type"),
+    Program("PsychoPy", frozenset({"expName", "psychopyVersion"}), None),
+    Program("Gorilla", frozenset({"Event Index", "Participant Private ID"}), "Zone Type"),
+)
+
+
+def program_of(header: tuple[str, ...] | list[str]) -> Program | None:
+    """The program whose columns the header holds; None for any other table."""
+    return next((program for program in PROGRAMS if program.columns <= set(header)), None)
+
+
+def trials_only(cells: Cells, asked: list[str], sorts: Cells | None) -> Cells:
+    """The rows in which every column `asked` holds something; `sorts` has the program's own column."""
+    program = program_of(cells.header)
+    if program is None or not asked:
+        return cells
+    keep = ~cells.rows[asked].isin(EMPTY).any(axis=1).to_numpy()
+    said = f"read as data of {program.name}"
+    if not keep.all():
+        said += f": {(~keep).sum()} rows without {' and '.join(repr(name) for name in asked)} left out"
+        if sorts is not None:
+            counts = sorts.rows.iloc[np.flatnonzero(~keep), 0].replace("", "no sort").value_counts()
+            said += f" ({', '.join(f'{sort} {count}' for sort, count in counts.items())})"
+    rows = cells.rows[keep].reset_index(drop=True)
+    return replace(cells, rows=rows, lines=cells.lines[keep], decisions=(*cells.decisions, said))

@@ -1,0 +1,73 @@
+"""Wide tables are recognised, and made long without a loss."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis.read.long_csv import read_long_table
+from analysis.read.wide import lengthen, wide_hint
+from experiments.errors import InputError
+
+WIDE = "id,age,sad_sharp,sad_blur,glad_sharp,glad_blur\n01,31,1,2,3,4\n02,40,5,6,,1\n"
+
+
+def wide_file(folder: Path, text: str = WIDE) -> Path:
+    path = folder / "wide.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_every_cell_becomes_a_row_and_the_rest_stays_beside(tmp_path) -> None:
+    table = lengthen(wide_file(tmp_path), "{face}_{blur}", "score")
+    assert table.factors == ("face", "blur")
+    assert table.beside == ("id", "age")
+    assert table.rows.values.tolist() == [
+        ["01", "31", "sad", "sharp", "1"],
+        ["01", "31", "sad", "blur", "2"],
+        ["01", "31", "glad", "sharp", "3"],
+        ["01", "31", "glad", "blur", "4"],
+        ["02", "40", "sad", "sharp", "5"],
+        ["02", "40", "sad", "blur", "6"],
+        ["02", "40", "glad", "sharp", ""],
+        ["02", "40", "glad", "blur", "1"],
+    ]
+
+
+def test_a_long_command_on_a_wide_table_says_the_way_out(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"the table looks wide .*--columns '\{factor1\}_\{factor2\}'"):
+        read_long_table(wide_file(tmp_path), "id", "score", ["face", "blur"])
+
+
+@pytest.mark.parametrize(
+    ("header", "pattern"),
+    [
+        (["id", "t1", "t2", "t3"], "t{factor1}"),
+        (["id", "rate.a", "rate.b", "rate.c"], "rate.{factor1}"),
+        (["id", "face", "blur", "score"], None),
+        (["a_id", "face", "rating_1"], None),
+    ],
+)
+def test_wide_headers_are_told_from_long_ones(header, pattern) -> None:
+    hint = wide_hint(header)
+    assert (f"--columns '{pattern}'" in hint) if pattern else hint == ""
+
+
+@pytest.mark.parametrize(
+    ("pattern", "said"),
+    [
+        ("face_blur", "names no factor"),
+        ("{a}{b}", "must have something between them"),
+        ("{a}_{a}", "names a factor twice"),
+        ("{x}-{y}", "no column of wide.csv fits"),
+        ("{age}_{blur}", "has a column 'age' already"),
+    ],
+)
+def test_patterns_that_cannot_be_used_end_in_one_line(tmp_path, pattern, said) -> None:
+    with pytest.raises(InputError, match=said):
+        lengthen(wide_file(tmp_path), pattern, "score")
+
+
+def test_a_name_that_fits_in_two_ways_is_refused(tmp_path) -> None:
+    path = wide_file(tmp_path, "id,very_sad_blur\n1,2\n")
+    with pytest.raises(InputError, match="in two ways"):
+        lengthen(path, "{face}_{blur}", "score")
