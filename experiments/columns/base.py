@@ -118,7 +118,13 @@ TIMES: tuple[Column, ...] = (
         minimum=0,
         source="t",
     ),
-    Column("comment", "text", "What the participant wrote beside the rating, where asked.", source="t"),
+    Column(
+        "comment",
+        "text",
+        "What the participant wrote beside the rating, where asked.",
+        source="t",
+        identifying=True,
+    ),
 )
 
 PLAYBACK: tuple[Column, ...] = (
@@ -205,7 +211,7 @@ SCREEN: tuple[Column, ...] = (
 
 EXCLUSION: tuple[Column, ...] = (
     Column("excluded", "boolean", "True where an experimenter excluded the run by hand.", source="r"),
-    Column("exclusion_reason", "text", "Why an experimenter excluded the run.", source="r"),
+    Column("exclusion_reason", "text", "Why an experimenter excluded the run.", source="r", identifying=True),
 )
 
 SAVED: tuple[Column, ...] = (

@@ -18,6 +18,8 @@ class Column:
     ----------
     unit: as SI writes it, or the thing counted; None for what has none.
     values: every value there is, for columns of names.
+    labels: what values mean, as pairs of value (as the CSV writes it) and label; not every value needs one.
+    identifying: whether it may tell who a person is: written in their own words, or of their device alone.
     minimum, maximum: the range of numbers, ends included; None where open.
     source: the SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the
     column is of no view. `JOINED` in it is put into the database's own words.
@@ -37,6 +39,8 @@ class Column:
     json: bool = False
     member: str = ""
     otherwise: str = ""
+    labels: tuple[tuple[str, str], ...] = ()
+    identifying: bool = False
 
     @property
     def expression(self) -> str:
@@ -45,9 +49,15 @@ class Column:
 
     @property
     def allowed(self) -> str:
-        """The column's values or range in words, empty where anything may stand."""
+        """The column's values or range in words, with their labels; empty where anything may stand."""
+        labels = dict(self.labels)
         if self.values:
-            return ", ".join(self.values)
+            return ", ".join(f"{one} = {labels[one]}" if one in labels else one for one in self.values)
+        range_, said = self._range, ", ".join(f"{value} = {label}" for value, label in self.labels)
+        return f"{range_} ({said})" if range_ and said else range_ or said
+
+    @property
+    def _range(self) -> str:
         if self.minimum is not None and self.maximum is not None:
             return f"{self.minimum:g} to {self.maximum:g}"
         return f"{self.minimum:g} or more" if self.minimum is not None else ""

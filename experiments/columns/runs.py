@@ -34,6 +34,8 @@ EVIDENCE_COLUMNS = (
 )
 """One column a signal, named as `Signals` of the server names it."""
 
+FORMS = Column("forms", "text", "Answers to questionnaires; the CSV has a column a question instead.")
+
 RUN_COLUMNS: tuple[Column, ...] = (
     Column("study", "text", "Name of the study, unique on this server."),
     Column("run", "text", "Public identifier of the participant's visit (study run)."),
@@ -56,10 +58,10 @@ RUN_COLUMNS: tuple[Column, ...] = (
     Column("completed_at", "time", "End of a complete visit (UTC, ISO 8601)."),
     Column("trials", "integer", "Trials of the run, practice and checks included."),
     Column("excluded", "boolean", "True where an experimenter excluded the run by hand."),
-    Column("exclusion_reason", "text", "Why an experimenter excluded the run."),
+    Column("exclusion_reason", "text", "Why an experimenter excluded the run.", identifying=True),
     Column("erased", "boolean", "True where the person's data were erased on request."),
-    Column("forms", "text", "JSON object of form names and their answers."),
-    Column("device", "text", "JSON object of what the browser said of itself."),
+    FORMS,
+    Column("device", "text", "JSON object of what the browser said of itself.", identifying=True),
     Column("run_origin", "text", "Where the run came from, fixed at its start.", values=ORIGINS),
     Column("data_series", "integer", "Data series of the run's version of the study."),
     Column("group_name", "text", "Group of the participant, levels joined by slashes; empty without groups."),

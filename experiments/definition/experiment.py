@@ -9,6 +9,7 @@ from experiments.base import Declaration, Language, Name, Translated
 from experiments.definition.analysis_plan import AnalysisPlan
 from experiments.definition.assignment import Assignment
 from experiments.definition.blocks import Blocks, Practice
+from experiments.definition.dataset import Dataset
 from experiments.definition.display import Display
 from experiments.definition.factors import Exemplars, Factor
 from experiments.definition.forms import Form
@@ -87,6 +88,8 @@ class Experiment(Declaration):
     """The pages, a table a language: [texts.en]."""
     analysis: AnalysisPlan = AnalysisPlan()
     """The analysis, fixed before the data."""
+    dataset: Dataset = Dataset()
+    """Who made the data and who may use them, for datasets that are handed on."""
 
     @property
     def factor_names(self) -> tuple[str, ...]:

@@ -66,6 +66,7 @@ EFFECTS: Mapping[str, Effect] = {
     "forms.fields.options.label": "wording",
     "texts": "wording",
     "analysis": "wording",
+    "dataset": "wording",
 }
 
 

@@ -9,12 +9,15 @@ from typing import Annotated
 import typer
 from sqlalchemy.exc import SQLAlchemyError
 
+from experiments.definition import Experiment
 from experiments.errors import InputError
 from server.accounts.audit import record
 from server.cli_common import migrated_services, out
-from server.export.formats import FORMATS, Format
+from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed
 from server.export.origins import ExportOrigin, runs_by_origin
-from server.studies.lookup import find_study
+from server.export.scripts import LANGUAGES, script
+from server.studies.lookup import active_definition, find_study
+from server.text import encoded
 
 
 def register(parent: typer.Typer) -> None:
@@ -29,44 +32,73 @@ def export(
         Format,
         typer.Option(
             "--format",
-            help="csv: one row a play; runs: one row a visit; raw: JSON lines with every drawn frame; "
-            "codebook: Markdown; psych-ds: a zip of the dataset folder; identities: recruiters' ids "
-            "beside the pseudonyms, noted in the audit log.",
+            help="csv: one row a play; wide: one row a visit and a column a cell; runs: one row a visit with "
+            "its answers to forms; raw: JSON lines with every drawn frame; codebook: Markdown; psych-ds: a "
+            "zip of the de-identified dataset folder; identities: recruiters' ids beside the pseudonyms, "
+            "noted in the audit log.",
         ),
     ] = "csv",
     origin: Annotated[
         ExportOrigin, typer.Option(help="Whose data: of one origin, or all together.")
     ] = "participant",
+    bom: Annotated[
+        bool, typer.Option("--bom", help="Begin a CSV with a byte order mark, by which Excel knows UTF-8.")
+    ] = False,
+    guard: Annotated[
+        bool,
+        typer.Option(
+            "--guard", help="Put ' before cells of a CSV that a spreadsheet would run: = + - @, not numbers."
+        ),
+    ] = False,
+    scripts: Annotated[
+        bool, typer.Option(help="Beside the long CSV, write scripts that analyse it with R and Python.")
+    ] = True,
 ) -> None:
     """Write a study's data: as csv, the columns of experiments/columns and one column a factor.
 
-    Memory stays constant however many rows there are; the file appears under its name only when complete.
+    Participants have the study's pseudonyms. The file appears under its name only when complete. Beside a CSV
+    with one row a play stand a script for R (afex, emmeans, lme4) and one for Python (pandas, pingouin).
 
     Examples:
 
       server export exp3 --out exp3.csv
 
+      server export exp3 --format wide --bom --guard --out exp3-wide.csv
+
       server export exp3 --format psych-ds --out exp3.zip
 
       server export exp3 --origin simulated --out rehearsal.csv
     """
+    beside = ""
+    if (bom or guard) and form not in CSV_FORMATS:
+        raise InputError(f"--bom and --guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
     with migrated_services() as services, services.database.snapshot() as session:
         if form == "identities":
             with services.database.write() as noted:
                 record(noted, None, "identities downloaded", "study", study, what=form)
         found = find_study(session, study)
         try:
-            size = _write(out_file, FORMATS[form](session, found, origin))
+            size = _write(out_file, proofed(FORMATS[form](session, found, origin), form, bom, guard))
+            if form == "csv" and scripts and str(out_file) != "-":
+                beside = _write_scripts(out_file, active_definition(session, found))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
             ) from error
         there = runs_by_origin(session, found)
     if str(out_file) != "-":
-        out.print(f"{out_file}: {size:,} bytes")
+        out.print(f"{out_file}: {size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
     if form not in ("codebook", "identities") and origin != "all" and origin not in there and there:
         others = ", ".join(f"{number} of origin {name}" for name, number in sorted(there.items()))
         typer.echo(f"no runs of origin {origin}; there are {others} (--origin)", err=True)
+
+
+def _write_scripts(out_file: Path, experiment: Experiment) -> str:
+    """Write the scripts beside the CSV; their names in words."""
+    targets = {language: out_file.with_suffix(f".{language}") for language in LANGUAGES}
+    for language, target in targets.items():
+        _write(target, [encoded(script(experiment, language, out_file.name))])
+    return " or ".join(target.name for target in targets.values())
 
 
 def _write(out_file: Path, pieces: Iterable[bytes]) -> int:

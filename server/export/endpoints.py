@@ -1,19 +1,23 @@
 """Downloads of a study's data, of one origin unless all are asked for; streamed in constant memory."""
 
 from collections.abc import Iterator
+from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
 
 from server.accounts.audit import record
 from server.accounts.identity import Exporter, Identity, Owner, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.export.formats import FORMATS, Format, row_count
+from server.export.formats import FORMATS, Format, proofed, row_count
 from server.export.origins import ExportOrigin
-from server.studies.lookup import find_study
+from server.export.scripts import ScriptLanguage, script
+from server.studies.lookup import active_definition, find_study
+from server.text import encoded
 
 router = APIRouter(prefix="/api/admin/studies/{study}/data", tags=["data"], responses=ERROR_RESPONSES)
+CSV_TYPE = "text/csv; charset=utf-8"
 ROWS_HEADER = "palpebra-rows"
 """How many rows (CSV: below the header; zip: of ratings; JSON lines: runs) a whole download holds."""
 
@@ -26,13 +30,14 @@ def _stream(
     origin: ExportOrigin,
     media_type: str,
     file: str,
+    excel: bool = False,
 ) -> StreamingResponse:
     action = "identities downloaded" if form == "identities" else "data downloaded"
     with services.database.write() as session:
         find_study(session, name)  # an unknown study is refused before the stream begins
         record(session, who, action, "study", name, what=form, origin=origin)
 
-    pieces = _pieces(services, name, form, origin)
+    pieces = _pieces(services, name, form, origin, excel)
     whose = "" if origin == "participant" or form == "identities" else f"{origin}-"
     # The first piece is the number of rows; taking it begins the snapshot that the rest is read from.
     headers = {
@@ -42,28 +47,66 @@ def _stream(
     return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
 
-def _pieces(services: Services, name: str, form: Format, origin: ExportOrigin) -> Iterator[bytes]:
+def _pieces(
+    services: Services, name: str, form: Format, origin: ExportOrigin, excel: bool
+) -> Iterator[bytes]:
     """The number of rows, then the export; what goes wrong ends the connection before the answer's end."""
     with services.database.snapshot() as session:
         study = find_study(session, name)
         yield str(row_count(form, session, study, origin)).encode()
-        yield from FORMATS[form](session, study, origin)
+        yield from proofed(FORMATS[form](session, study, origin), form, bom=excel, guard=excel)
+
+
+Excel = Annotated[
+    bool, Query(description="Begin with a byte order mark, and make cells text that a spreadsheet would run.")
+]
 
 
 @router.get("/ratings.csv", response_class=StreamingResponse)
 def download_ratings(
-    services: ServicesDep, who: Exporter, study: str, origin: ExportOrigin = "participant"
+    services: ServicesDep,
+    who: Exporter,
+    study: str,
+    origin: ExportOrigin = "participant",
+    excel: Excel = False,
 ) -> StreamingResponse:
     """One row a play: the columns of the codebook, one column a factor."""
-    return _stream(services, who, study, "csv", origin, "text/csv; charset=utf-8", "ratings.csv")
+    return _stream(services, who, study, "csv", origin, CSV_TYPE, "ratings.csv", excel)
+
+
+@router.get("/wide.csv", response_class=StreamingResponse)
+def download_wide(
+    services: ServicesDep,
+    who: Exporter,
+    study: str,
+    origin: ExportOrigin = "participant",
+    excel: Excel = False,
+) -> StreamingResponse:
+    """One row a visit: a column a question of the forms, and a column a cell with the mean rating in it."""
+    return _stream(services, who, study, "wide", origin, CSV_TYPE, "wide.csv", excel)
 
 
 @router.get("/runs.csv", response_class=StreamingResponse)
 def download_runs(
-    services: ServicesDep, who: Exporter, study: str, origin: ExportOrigin = "participant"
+    services: ServicesDep,
+    who: Exporter,
+    study: str,
+    origin: ExportOrigin = "participant",
+    excel: Excel = False,
 ) -> StreamingResponse:
-    """One row a visit, forms included."""
-    return _stream(services, who, study, "runs", origin, "text/csv; charset=utf-8", "runs.csv")
+    """One row a visit, a column a question of the forms."""
+    return _stream(services, who, study, "runs", origin, CSV_TYPE, "runs.csv", excel)
+
+
+@router.get("/analysis.{language}", response_class=Response)
+def download_script(services: ServicesDep, _who: Viewer, study: str, language: ScriptLanguage) -> Response:
+    """A script that analyses the long CSV, saved beside it under its own name: for R, or for Python."""
+    with services.database.read() as session:
+        text = script(
+            active_definition(session, find_study(session, study)), language, f"{study}-ratings.csv"
+        )
+    headers = {"content-disposition": f'attachment; filename="{study}.{language}"'}
+    return Response(encoded(text), media_type="text/plain; charset=utf-8", headers=headers)
 
 
 @router.get("/raw.ndjson", response_class=StreamingResponse)
@@ -85,7 +128,7 @@ def download_psych_ds(
 @router.get("/identities.csv", response_class=StreamingResponse)
 def download_identities(services: ServicesDep, who: Owner, study: str) -> StreamingResponse:
     """Recruiters' ids beside the pseudonyms, one row a visit; for owners, and noted in the audit log."""
-    return _stream(services, who, study, "identities", "all", "text/csv; charset=utf-8", "identities.csv")
+    return _stream(services, who, study, "identities", "all", CSV_TYPE, "identities.csv")
 
 
 @router.get("/codebook.md", response_class=Response)

@@ -1,21 +1,24 @@
 """The forms in which a study's data go out, each as pieces of bytes: for downloads and the command line."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Literal
 
 from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.export import codebook, identities, psych_ds, runs
+from server.export.excel import guarded, marked
 from server.export.origins import ExportOrigin
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.ratings_csv import rating_count
+from server.export.tables import runs_table, wide_table
+from server.export.wide import cells_of
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
 from server.text import encoded
 
-Format = Literal["csv", "runs", "raw", "codebook", "psych-ds", "identities"]
+Format = Literal["csv", "wide", "runs", "raw", "codebook", "psych-ds", "identities"]
 Pieces = Callable[[Session, Study, ExportOrigin], Iterator[bytes]]
 
 
@@ -25,9 +28,13 @@ def ratings_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterato
 
 
 def runs_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
-    """One row a visit, forms included."""
-    rows, number = runs.run_rows(session, study, origin), runs.run_count(session, study, origin)
-    yield from csv_pieces(whole(rows, number, extra=1))
+    """One row a visit, a column a question of the forms."""
+    yield from csv_pieces(runs_table(session, study, origin).with_header())
+
+
+def wide_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+    """One row a visit, a column a cell of the design."""
+    yield from csv_pieces(wide_table(session, study, origin).with_header())
 
 
 def raw_json(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
@@ -41,8 +48,8 @@ def raw_json(session: Session, study: Study, origin: ExportOrigin) -> Iterator[b
 def codebook_markdown(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
     """What every column means; the same whatever the origin."""
     del origin
-    columns = codebook.rating_columns(all_definitions(session, study))
-    yield encoded(codebook.markdown(active_definition(session, study), columns))
+    tables = codebook.explained_tables(all_definitions(session, study))
+    yield encoded(codebook.markdown(active_definition(session, study), tables))
 
 
 def psych_ds_zip(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
@@ -59,6 +66,7 @@ def identities_csv(session: Session, study: Study, origin: ExportOrigin) -> Iter
 
 FORMATS: dict[Format, Pieces] = {
     "csv": ratings_csv,
+    "wide": wide_csv,
     "runs": runs_csv,
     "raw": raw_json,
     "codebook": codebook_markdown,
@@ -67,9 +75,22 @@ FORMATS: dict[Format, Pieces] = {
 }
 
 
+CSV_FORMATS: tuple[Format, ...] = ("csv", "wide", "runs", "identities")
+
+
+def proofed(pieces: Iterable[bytes], form: Format, bom: bool, guard: bool) -> Iterator[bytes]:
+    """The pieces as they are; those of a CSV for a spreadsheet where `bom` or `guard` ask for it."""
+    if form in CSV_FORMATS:
+        pieces = guarded(pieces) if guard else pieces
+        pieces = marked(pieces) if bom else pieces
+    yield from pieces
+
+
 def row_count(form: Format, session: Session, study: Study, origin: ExportOrigin) -> int:
     """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
     if form == "identities":
         return identities.identity_count(session, study)
+    if form == "wide":
+        cells_of(active_definition(session, study))  # refuses a kind without ratings before a download begins
     count = rating_count if form in ("csv", "psych-ds") else runs.run_count
     return count(session, study, origin)

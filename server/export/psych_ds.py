@@ -1,110 +1,86 @@
-"""A study as a Psych-DS dataset (psych-ds.github.io): a zip with metadata, data and codebook, streamed."""
+"""A study as a Psych-DS dataset (psych-ds.github.io): metadata, de-identified data, codebook and scripts."""
 
-import io
 import json
-import zipfile
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sqlalchemy.orm import Session
 
-from experiments.columns import RUN_COLUMNS, Column
+from experiments.columns import Column
 from experiments.definition import Experiment
+from experiments.definition.dataset import Creator
 from experiments.trials import KINDS
-from server.export.codebook import (
-    factor_columns,
-    markdown,
-    rating_columns,
-    variables_measured,
-)
+from experiments.trials.scales import scales_of
+from server.export.codebook import markdown, variables_measured
+from server.export.deidentified import MOVED, deidentified, first_start
 from server.export.origins import ExportOrigin
-from server.export.pieces import csv_pieces, rating_table, whole
-from server.export.runs import run_count, run_rows
+from server.export.pieces import csv_pieces
+from server.export.scripts import LANGUAGES, script
+from server.export.tables import ExportTable, answers_table, runs_table, wide_table
+from server.export.wide import beside_runs
+from server.export.zip_stream import zip_pieces
 from server.models import Study
 from server.studies.lookup import active_definition, active_version, all_definitions
 from server.text import encoded
 
-
-class _Sink(io.RawIOBase):
-    """What the zip writer writes to; `take` hands on what has come since."""
-
-    def __init__(self) -> None:
-        self._pieces: list[bytes] = []
-
-    def writable(self) -> bool:
-        """True: this stream only takes."""
-        return True
-
-    def write(self, piece: Any) -> int:
-        """Keep a piece until it is taken."""
-        self._pieces.append(bytes(piece))
-        return len(piece)
-
-    def take(self) -> bytes:
-        """Everything written since the last call."""
-        taken = b"".join(self._pieces)
-        self._pieces.clear()
-        return taken
+Member = tuple[str, Iterable[bytes]]
 
 
-# What factors cannot be called here: a variable has one meaning in the whole folder, so no
-# column of the runs; and the official validator stumbles at the members of its table of columns and at
-# the number it gives each row.
-_STUMBLES_AT = "clear constructor delete entries forEach get has keys row_id set size values"
-_TAKEN = frozenset((*(column.name for column in RUN_COLUMNS), *_STUMBLES_AT.split()))
+@dataclass(frozen=True)
+class Folder:
+    """A dataset's folder.
 
+    Attributes
+    ----------
+    members: path and bytes of each file, tables last; taken once.
+    answers: path of the table of answers. renamed: factors that have another name in this folder.
+    """
 
-def _own_name(column: str) -> str:
-    return f"factor_{column}" if column in _TAKEN else column
+    members: Iterator[Member]
+    answers: str
+    renamed: dict[str, str]
 
 
 def dataset(session: Session, study: Study, made: str, origin: ExportOrigin) -> Iterator[bytes]:
-    """The pieces of the zip: `dataset_description.json`, README, CHANGES, `data/`, codebook, definition."""
-    sink = _Sink()
-    version, definition = active_version(session, study), active_definition(session, study)
-    columns = _columns(all_definitions(session, study))
-    keyword, view = _keyword(study.name), KINDS[definition.trial.kind].view
-    texts = {
-        "dataset_description.json": json.dumps(
-            description(study, definition, columns, made), indent=2, ensure_ascii=False
-        ),
-        "README.md": _readme(study, definition, made, origin, view.name),
-        "CHANGES.md": f"{made} Exported from version {version.number} of the study.\n",
-        "documentation/codebook.md": markdown(definition, columns),
-        f"materials/{definition.name}.toml": version.definition_toml,
-    }
-    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in texts.items():
-            archive.writestr(f"{study.name}/{name}", encoded(text))
-            yield sink.take()
-        tables: tuple[tuple[str, Iterable[Sequence[Any]]], ...] = (
-            (view.name, _with_header(columns, rating_table(session, study, origin))),
-            ("runs", whole(run_rows(session, study, origin), run_count(session, study, origin), extra=1)),
-        )
-        for table, rows in tables:
-            path = f"{study.name}/data/study-{keyword}_description-{table}_data.csv"
-            with archive.open(path, "w", force_zip64=True) as member:
-                for piece in csv_pieces(rows):
-                    member.write(piece)
-                    yield sink.take()
-            yield sink.take()
-    yield sink.take()
+    """The pieces of the zip, in which the dataset is a folder of the study's name."""
+    folder = dataset_folder(session, study, made, origin)
+    return zip_pieces((f"{study.name}/{path}", pieces) for path, pieces in folder.members)
 
 
-def _columns(definitions: list[Experiment]) -> list[Column]:
-    """Columns of the ratings, under the names that they have in this folder."""
-    factors = {column.name for column in factor_columns(definitions)}
-    return [
-        replace(column, name=_own_name(column.name)) if column.name in factors else column
-        for column in rating_columns(definitions)
+def dataset_folder(session: Session, study: Study, made: str, origin: ExportOrigin) -> Folder:
+    """`dataset_description.json`, README, CHANGES, `data/`, codebook, definition and scripts."""
+    definition, definitions = active_definition(session, study), all_definitions(session, study)
+    factors = {factor.name for one in definitions for factor in one.factors}
+    renamed = {name: beside_runs(name) for name in sorted(factors) if beside_runs(name) != name}
+    first = first_start(session, study, origin)
+    answers, *others = [
+        deidentified(table, first) for table in _tables(session, study, origin, bool(scales_of(definition)))
     ]
+    tables = [_renamed(answers, renamed), *others]
+    paths = {
+        table.name: f"data/study-{_keyword(study.name)}_description-{table.name}_data.csv" for table in tables
+    }
+    texts = _texts(session, study, made, origin, tables)
+    for language in LANGUAGES:
+        texts[f"analysis/analysis.{language}"] = script(
+            definition, language, f"../{paths[tables[0].name]}", renamed
+        )
+    members = (
+        *((path, [encoded(text)]) for path, text in texts.items()),
+        *((paths[table.name], csv_pieces(table.with_header())) for table in tables),
+    )
+    return Folder(iter(members), paths[tables[0].name], renamed)
 
 
-def _with_header(columns: list[Column], rows: Iterator[Sequence[Any]]) -> Iterator[Sequence[Any]]:
-    next(rows)
-    yield [column.name for column in columns]
-    yield from rows
+def _tables(session: Session, study: Study, origin: ExportOrigin, wide: bool) -> list[ExportTable]:
+    makers = (answers_table, runs_table, wide_table) if wide else (answers_table, runs_table)
+    return [make(session, study, origin) for make in makers]
+
+
+def _renamed(table: ExportTable, renamed: dict[str, str]) -> ExportTable:
+    columns = [replace(column, name=renamed.get(column.name, column.name)) for column in table.columns]
+    return replace(table, columns=columns)
 
 
 def _keyword(name: str) -> str:
@@ -112,35 +88,77 @@ def _keyword(name: str) -> str:
     return "".join(letter for letter in name if letter.isascii() and letter.isalnum()) or "study"
 
 
+def _texts(
+    session: Session, study: Study, made: str, origin: ExportOrigin, tables: list[ExportTable]
+) -> dict[str, str]:
+    version, definition = active_version(session, study), active_definition(session, study)
+    columns = [column for table in tables for column in table.columns]
+    described = description(study, definition, columns, made)
+    return {
+        "dataset_description.json": json.dumps(described, indent=2, ensure_ascii=False),
+        "README.md": _readme(study, definition, made, origin, [table.name for table in tables]),
+        "CHANGES.md": f"{made} Exported from version {version.number} of the study.\n",
+        "documentation/codebook.md": markdown(
+            definition, [(_title(t, definition), t.columns) for t in tables]
+        ),
+        f"materials/{definition.name}.toml": version.definition_toml,
+    }
+
+
+def _title(table: ExportTable, definition: Experiment) -> str:
+    titles = {
+        "runs": "Runs: one row a visit",
+        "wide": "Wide: one row a visit, a column a cell of the design",
+    }
+    return titles.get(table.name, KINDS[definition.trial.kind].view.title)
+
+
 def description(study: Study, definition: Experiment, columns: list[Column], made: str) -> dict[str, Any]:
     """The metadata file: schema.org JSON-LD with every column of every table."""
-    variables = {column.name: column for column in (*columns, *RUN_COLUMNS)}
-    technique = definition.trial.kind.replace("_", " ")
+    variables = {column.name: column for column in columns}
+    technique, about = definition.trial.kind.replace("_", " "), definition.dataset
     given = KINDS[definition.trial.kind].view.name.capitalize()
-    return {
+    usual = f"{definition.title}. {given} of short clips collected with Palpebra."
+    found: dict[str, Any] = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": study.name,
-        "description": f"{definition.title}. {given} of short clips collected with Palpebra.",
+        "description": about.description or usual,
         "schemaVersion": "Psych-DS 0.4.0",
         "dateModified": made,
         "citation": definition.source or "",
         "measurementTechnique": f"{technique.capitalize()} in a web browser",
-        "keywords": [
-            technique,
-            "video clips",
-            *(factor.label for factor in definition.factors),
-        ],
-        "variableMeasured": variables_measured(list(variables.values())),
+        "keywords": [technique, "video clips", *(f.label for f in definition.factors), *about.keywords],
     }
+    if about.creators:
+        found["creator"] = [_creator(creator) for creator in about.creators]
+    if about.licence_page:
+        found["license"] = about.licence_page
+    return found | {"variableMeasured": variables_measured(list(variables.values()))}
 
 
-def _readme(study: Study, definition: Experiment, made: str, origin: ExportOrigin, table: str) -> str:
+def _creator(creator: Creator) -> dict[str, Any]:
+    person: dict[str, Any] = {"@type": "Person", "name": creator.name}
+    if creator.orcid_page:
+        person["identifier"] = creator.orcid_page
+    if creator.affiliation:
+        person["affiliation"] = {"@type": "Organization", "name": creator.affiliation}
+    return person
+
+
+def _readme(study: Study, definition: Experiment, made: str, origin: ExportOrigin, tables: list[str]) -> str:
     whose = "all origins, told apart by `run_origin`" if origin == "all" else f"the origin `{origin}` alone"
+    licence = definition.dataset.licence_page
+    terms = f"Licence: {licence}." if licence else "No licence is declared: ask before you use the data."
+    wide = " `data/*wide_data.csv` has one row a visit and a column a cell." if "wide" in tables else ""
     return (
         f"# {definition.title}\n\nStudy `{study.name}`, exported {made}; data of {whose}. One row a play in "
-        f"`data/*{table}_data.csv`, one row a visit in `data/*runs_data.csv`; every column is explained in "
-        "`documentation/codebook.md`; the declared experiment is in `materials/`.\n\n"
+        f"`data/*{tables[0]}_data.csv`, one row a visit in `data/*runs_data.csv`;{wide} every column is "
+        "explained in `documentation/codebook.md`; the declared experiment is in `materials/`; scripts for R "
+        f"and Python are in `analysis/`.\n\n{terms}\n\n"
+        "De-identified: participants have pseudonyms, answers in their own words and what their browsers "
+        f"said are left out. {MOVED} Rare combinations of answers may still point to a person: look at them "
+        "before you publish.\n\n"
         "Rows with `synthetic` = 1 were not given by people. Rows with `excluded` = 1 were excluded by an "
-        "experimenter, with the reason beside them.\n"
+        "experimenter.\n"
     )

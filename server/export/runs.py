@@ -1,7 +1,7 @@
 """Runs as CSV rows, and everything stored as JSON lines; one run is in memory at a time."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from experiments.columns import RUN_COLUMNS
+from experiments.columns.form_columns import FormColumn, run_columns
 from server.clock import iso
 from server.evidence.service import judge_run
 from server.export.origins import ExportOrigin, of_origin
@@ -37,18 +37,20 @@ def run_count(session: Session, study: Study, origin: ExportOrigin) -> int:
     return session.scalar(select(func.count()).select_from(StudyRun).where(of_origin(study, origin))) or 0
 
 
-def run_rows(session: Session, study: Study, origin: ExportOrigin) -> Iterator[list[Any]]:
-    """Header and rows of the runs CSV, the columns of `RUN_COLUMNS`."""
-    yield [column.name for column in RUN_COLUMNS]
+def run_rows(
+    session: Session, study: Study, origin: ExportOrigin, forms: Sequence[FormColumn]
+) -> Iterator[list[Any]]:
+    """Rows of the runs CSV in the order the runs began: the columns of `run_columns(forms)`."""
+    names = [column.name for column in run_columns(forms)]
     name = study.name
     for run in each_run(session, study, origin):
-        values = _values(session, run) | {"study": name}
-        yield [values[column.name] for column in RUN_COLUMNS]
+        values = _values(session, run, forms) | {"study": name}
+        yield [values[column] for column in names]
 
 
-def _values(session: Session, run: StudyRun) -> dict[str, Any]:
+def _values(session: Session, run: StudyRun, forms: Sequence[FormColumn]) -> dict[str, Any]:
     query = select(FormAnswer.form, FormAnswer.answers).where(FormAnswer.study_run_id == run.id)
-    answers = session.execute(query)
+    answers: dict[str, dict[str, Any]] = dict(session.execute(query).all())
     return {
         "run": run.public_id,
         "participant": run.participant,
@@ -69,7 +71,7 @@ def _values(session: Session, run: StudyRun) -> dict[str, Any]:
         "excluded": int(run.excluded),
         "exclusion_reason": run.exclusion_reason or "",
         "erased": int(run.erased_at is not None),
-        "forms": _json(dict(answers.all())),
+        **{one.column.name: one.value(answers) for one in forms},
         "device": _json(run.device),
         "run_origin": run.origin,
         "data_series": run.version.series,

@@ -1187,6 +1187,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/data/wide.csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Wide
+         * @description One row a visit: a column a question of the forms, and a column a cell with the mean rating in it.
+         */
+        get: operations["download_wide"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/data/runs.csv": {
         parameters: {
             query?: never;
@@ -1196,9 +1216,29 @@ export interface paths {
         };
         /**
          * Download Runs
-         * @description One row a visit, forms included.
+         * @description One row a visit, a column a question of the forms.
          */
         get: operations["download_runs"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/data/analysis.{language}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Script
+         * @description A script that analyses the long CSV, saved beside it under its own name: for R, or for Python.
+         */
+        get: operations["download_script"];
         put?: never;
         post?: never;
         delete?: never;
@@ -2093,6 +2133,57 @@ export interface components {
             agreed: boolean;
         };
         /**
+         * Creator
+         * @description A person or an institution that made the data.
+         */
+        Creator: {
+            /**
+             * Name
+             * @description Name as it is cited.
+             */
+            name: string;
+            /**
+             * Orcid
+             * @description ORCID of a person, as four groups of four digits.
+             */
+            orcid: string | null;
+            /**
+             * Affiliation
+             * @description Where the person works.
+             * @default
+             */
+            affiliation: string;
+        };
+        /**
+         * Dataset
+         * @description Who made the data and who may do what with them; stands in Psych-DS datasets and capsules.
+         */
+        Dataset: {
+            /**
+             * Creators
+             * @description Who is cited for the data, in order.
+             * @default []
+             */
+            creators: components["schemas"]["Creator"][];
+            /**
+             * Licence
+             * @description Under which licence the data are handed on. Without it nobody else may use them.
+             */
+            licence: string | null;
+            /**
+             * Description
+             * @description What the data are, in some sentences; empty takes the title.
+             * @default
+             */
+            description: string;
+            /**
+             * Keywords
+             * @description Words under which the data should be found, beside the factors' labels.
+             * @default []
+             */
+            keywords: string[];
+        };
+        /**
          * Declaration
          * @description A frozen piece of a declaration; unknown keys are refused by name.
          *
@@ -2745,6 +2836,15 @@ export interface components {
              *     }
              */
             analysis: components["schemas"]["AnalysisPlan"];
+            /**
+             * @description Who made the data and who may use them, for datasets that are handed on.
+             * @default {
+             *       "creators": [],
+             *       "description": "",
+             *       "keywords": []
+             *     }
+             */
+            dataset: components["schemas"]["Dataset"];
         };
         /**
          * Factor
@@ -6641,6 +6741,8 @@ export type Completion = components['schemas']['Completion'];
 export type ConfirmCode = components['schemas']['ConfirmCode'];
 export type ConfirmPassword = components['schemas']['ConfirmPassword'];
 export type Consent = components['schemas']['Consent'];
+export type Creator = components['schemas']['Creator'];
+export type Dataset = components['schemas']['Dataset'];
 export type Declaration = components['schemas']['Declaration'];
 export type DeclaredPairs = components['schemas']['DeclaredPairs'];
 export type DefinitionText = components['schemas']['DefinitionText'];
@@ -9578,6 +9680,50 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
+                excel?: boolean;
+            };
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    download_wide: {
+        parameters: {
+            query?: {
+                origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
+                excel?: boolean;
             };
             header?: never;
             path: {
@@ -9618,10 +9764,51 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
+                excel?: boolean;
             };
             header?: never;
             path: {
                 study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    download_script: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+                language: "R" | "py";
             };
             cookie?: never;
         };

@@ -6,8 +6,8 @@ import zipfile
 import pytest
 from fastapi.testclient import TestClient
 
+from experiments.columns import RUN_COLUMNS
 from experiments.trials.clip_rating.columns import RATINGS
-from server.export.codebook import RUN_COLUMNS
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -28,8 +28,12 @@ def test_the_runs_csv_has_one_row_a_visit_with_its_forms(viewer: Admin, particip
     participant.agree()
     participant.request("PUT", "/forms/about", {"answers": {"age": 33}})
     header, row = table(viewer.get("/studies/short/data/runs.csv").text)
-    assert header == [column.name for column in RUN_COLUMNS]
-    assert json.loads(dict(zip(header, row, strict=True))["forms"]) == {"about": {"age": 33}}
+    names = [column.name for column in RUN_COLUMNS]
+    place = names.index("forms")
+    forms = ["form_about_age", "form_about_glasses_glasses", "form_about_glasses_lenses"]
+    assert header == [*names[:place], *forms, *names[place + 1 :]]
+    cells = dict(zip(header, row, strict=True))
+    assert [cells[name] for name in forms] == ["33", "", ""]
 
 
 ORIGINS = {"participant": 1, "pilot": 2, "simulated": 3}
@@ -80,7 +84,10 @@ def test_raw_data_are_json_lines(viewer: Admin, participant: Participant) -> Non
 
 def test_the_codebook_explains_every_exported_column(viewer: Admin, study: StudyInDatabase) -> None:
     text = viewer.get("/studies/short/data/codebook.md").text
-    for name in [*RATINGS.csv_header(["character", "speed"]), *(column.name for column in RUN_COLUMNS)]:
+    for name in [
+        *RATINGS.csv_header(["character", "speed"]),
+        *(column.name for column in RUN_COLUMNS if column.name != "forms"),
+    ]:
         assert f"| {name} |" in text
 
 

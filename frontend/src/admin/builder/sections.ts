@@ -49,6 +49,12 @@ const NAMED: readonly Section[] = [
     keys: ["attention", "screening", "warnings", "exclusions"],
   },
   { id: "analysis", label: "Analysis", about: "The analysis, fixed before the data.", keys: ["analysis"] },
+  {
+    id: "dataset",
+    label: "Handing on",
+    about: "Who made the data and under which licence others may use them. Stands in Psych-DS datasets and capsules.",
+    keys: ["dataset"],
+  },
 ];
 
 const placed = new Set(NAMED.flatMap((section) => section.keys));

@@ -1,4 +1,4 @@
-import { Anchor, Button, Card, Code, Group, SegmentedControl, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Button, Card, Code, Group, SegmentedControl, SimpleGrid, Stack, Switch, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
@@ -7,8 +7,15 @@ import { type DataOrigin, ORIGINS } from "../results/origins";
 
 const FILES: [file: string, title: string, words: string][] = [
   ["ratings.csv", "Answers", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
-  ["runs.csv", "Runs", "One row a visit: times, version, seed, exclusions, questionnaire."],
-  ["psych-ds.zip", "Psych-DS dataset", "Data, metadata, codebook and definition in the community's standard folder."],
+  ["wide.csv", "Wide table", "One row a visit, as SPSS and JASP want it: a column a cell of the design, with its mean rating."],
+  ["runs.csv", "Runs", "One row a visit: times, version, seed, exclusions, and a column a question of the forms."],
+  ["analysis.R", "Script for R", "Analyses the answers with afex, emmeans and lme4. Save it beside the answers."],
+  ["analysis.py", "Script for Python", "Analyses the answers with pandas and pingouin. Save it beside the answers."],
+  [
+    "psych-ds.zip",
+    "Psych-DS dataset",
+    "De-identified data, metadata, codebook, scripts and definition in the community's standard folder.",
+  ],
   ["codebook.md", "Codebook", "What every column means, with type and unit."],
   ["raw.ndjson", "Raw data", "Everything stored, one JSON object a run: every drawn frame and its time."],
 ];
@@ -28,9 +35,17 @@ export function DataTab() {
   const { study = "" } = useParams({ strict: false });
   const [origin, setOrigin] = useState<ExportOrigin>("participant");
   const detail = useQuery(studyQuery(study)).data;
-  const files = useMay("owner") ? [...FILES, IDENTITIES] : FILES;
+  const [excel, setExcel] = useState(false);
+  const rated = detail?.definition.trial.kind === "clip_rating";
+  const mine = useMay("owner") ? [...FILES, IDENTITIES] : FILES;
+  const files = mine.filter(([file]) => rated || file !== "wide.csv");
   const version = detail?.summary.version ?? 1;
-  const chosen = origin === "participant" ? "" : `?origin=${origin}`;
+  const chosen = (file: string) => {
+    const options = new URLSearchParams();
+    if (origin !== "participant" && !file.startsWith("analysis.")) options.set("origin", origin);
+    if (excel && file.endsWith(".csv") && file !== "identities.csv") options.set("excel", "true");
+    return options.size > 0 ? `?${options.toString()}` : "";
+  };
   const option = origin === "participant" ? "" : ` --origin ${origin}`;
   return (
     <Stack>
@@ -41,6 +56,12 @@ export function DataTab() {
           Excluded runs are in the files, marked in their column; previews and erased people are not.
         </Text>
       </Group>
+      <Switch
+        checked={excel}
+        onChange={(event) => setExcel(event.currentTarget.checked)}
+        label="For Excel"
+        description="CSV files begin with a mark by which Excel knows their letters, and no cell of them can run as a formula. Leave it off for R, Python and analysis run."
+      />
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
         {files.map(([file, title, words]) => (
           <Card withBorder key={file}>
@@ -55,7 +76,7 @@ export function DataTab() {
               variant="default"
               mt="auto"
               style={{ alignSelf: "flex-start" }}
-              href={`/api/admin/studies/${study}/data/${file}${chosen}`}
+              href={`/api/admin/studies/${study}/data/${file}${chosen(file)}`}
               download
             >
               Download {file}

@@ -1,0 +1,54 @@
+"""A table without what may tell who a person is, for datasets that are handed on.
+
+Participants have pseudonyms already. Left out are answers in a person's own words and what the browser said
+of itself; times are moved so that the study's first run starts with the year 2000, which keeps order and
+intervals.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from server.clock import iso
+from server.export.origins import ExportOrigin, of_origin
+from server.export.tables import ExportTable
+from server.models import Study, StudyRun
+
+EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
+MOVED = "All times of the dataset are moved alike, so that its first run starts with the year 2000."
+
+
+def first_start(session: Session, study: Study, origin: ExportOrigin) -> datetime | None:
+    """When the first of these runs started; None where there are none."""
+    return session.scalar(select(func.min(StudyRun.started_at)).where(of_origin(study, origin)))
+
+
+def deidentified(table: ExportTable, first: datetime | None) -> ExportTable:
+    """The table without identifying columns, its times counted from `first`."""
+    kept = [place for place, column in enumerate(table.columns) if not column.identifying]
+    columns = [table.columns[place] for place in kept]
+    times = frozenset(place for place, column in enumerate(columns) if column.type == "time")
+    described = [
+        replace(column, description=f"{column.description} {MOVED}") if place in times else column
+        for place, column in enumerate(columns)
+    ]
+    shift = EPOCH - first.astimezone(UTC) if first else timedelta()
+    return replace(table, columns=described, rows=_moved(table.rows, kept, times, shift))
+
+
+def _moved(
+    rows: Iterator[Sequence[Any]], kept: list[int], times: frozenset[int], shift: timedelta
+) -> Iterator[Sequence[Any]]:
+    for row in rows:
+        cells = [row[place] for place in kept]
+        for place in times:
+            cells[place] = _shifted(cells[place], shift)
+        yield cells
+
+
+def _shifted(moment: Any, shift: timedelta) -> Any:
+    return iso(datetime.fromisoformat(moment) + shift) if moment else moment

@@ -1,0 +1,153 @@
+"""The wide table: one row a run, and a column a cell of the design with the run's mean rating in it."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.columns import RUN_COLUMNS, Column
+from experiments.columns.form_columns import FormColumn, run_columns
+from experiments.columns.names import plain_name, unlike
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.trials.scales import RatedScale, scales_of
+from server.export.origins import ExportOrigin
+from server.export.ratings_csv import factor_names, rating_rows, view_of
+from server.export.runs import run_rows
+from server.models import Study
+
+OF_THE_RUN = (
+    "study", "run", "participant", "synthetic", "status", "language", "version", "started_at",
+    "completed_at", "excluded", "exclusion_reason", "run_origin", "data_series", "group_name",
+    "evidence_verdict",
+)  # fmt: skip
+"""Columns of the runs that the wide table has too, and the answers to forms with them."""
+# The official Psych-DS validator stumbles at the members of its table of columns and at the number of a row.
+_STUMBLES_AT = "clear constructor delete entries forEach get has keys row_id set size values"
+_TAKEN = frozenset((*(column.name for column in RUN_COLUMNS), *_STUMBLES_AT.split()))
+Levels = tuple[str, ...]
+Means = dict[tuple[str, Levels], float]
+
+
+def beside_runs(factor: str) -> str:
+    """What a factor is called where columns of the runs are too: a variable has one meaning in a dataset."""
+    return f"factor_{factor}" if factor in _TAKEN else factor
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A column of means: of one scale and one combination of the levels within participants."""
+
+    scale: str
+    levels: Levels
+    column: Column
+
+
+def cells_of(experiment: Experiment) -> list[Cell]:
+    """The columns of means, scale by scale, cells in declared order."""
+    scales = scales_of(experiment)
+    if not scales:
+        raise InputError(
+            f"the wide table holds mean ratings; '{experiment.name}' has trials of the kind "
+            f"{experiment.trial.kind}: take the long table (answers)"
+        )
+    within = [factor for factor in experiment.factors if not factor.between]
+    cells: list[Cell] = []
+    taken = {name.casefold() for name in _TAKEN}
+    for scale in scales:
+        for levels in product(*(factor.levels for factor in within)):
+            name = unlike("_".join((scale.name, *(plain_name(one.name) for one in levels))), taken)
+            said = ", ".join(f"{f.label}: {one.label}" for f, one in zip(within, levels, strict=True))
+            column = Column(
+                name, "number", _mean_of(scale, said), minimum=scale.minimum, maximum=scale.maximum
+            )
+            cells.append(Cell(scale.name, tuple(one.name for one in levels), column))
+    return cells
+
+
+def _mean_of(scale: RatedScale, cell: str) -> str:
+    of = f" of {cell}" if cell else ""
+    return f"Mean answer on the scale {scale.name}{of}: main trials, the last play of each."
+
+
+def wide_columns(experiment: Experiment, forms: Sequence[FormColumn]) -> list[Column]:
+    """The run, its groups, its answers to forms, how many answers are averaged, and a column a cell."""
+    of_forms = {one.column.name for one in forms}
+    kept = [one for one in run_columns(forms) if one.name in OF_THE_RUN or one.name in of_forms]
+    between = [
+        Column(
+            beside_runs(factor.name),
+            "text",
+            f"Level of the factor {factor.label}, between participants.",
+            values=tuple(level.name for level in factor.levels),
+            labels=tuple((level.name, level.label) for level in factor.levels),
+        )
+        for factor in experiment.factors
+        if factor.between
+    ]
+    number = Column("answers", "integer", "Answers of main trials that the means are of.", minimum=0)
+    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment))]
+
+
+def wide_rows(
+    session: Session,
+    study: Study,
+    origin: ExportOrigin,
+    experiment: Experiment,
+    forms: Sequence[FormColumn],
+) -> Iterator[list[Any]]:
+    """Rows in the order the runs began; a cell is empty where the run has no answer in it."""
+    cells, names = cells_of(experiment), [column.name for column in run_columns(forms)]
+    kept = [
+        names.index(column.name)
+        for column in wide_columns(experiment, forms)
+        if column.name in names and column.name != "answers"
+    ]
+    between = [factor.name for factor in experiment.factors if factor.between]
+    by_run = _by_run(session, study, origin, experiment)
+    at = names.index("run")
+    for row in run_rows(session, study, origin, forms):
+        groups, count, means = by_run.get(row[at], ({}, 0, {}))
+        yield [
+            *(row[place] for place in kept),
+            *(groups.get(name, "") for name in between),
+            count,
+            *(means.get((cell.scale, cell.levels), "") for cell in cells),
+        ]
+
+
+def _by_run(
+    session: Session, study: Study, origin: ExportOrigin, experiment: Experiment
+) -> dict[str, tuple[dict[str, str], int, Means]]:
+    """Of each run with answers: its levels between participants, how many answers, and its cells' means."""
+    factors, view = factor_names(session, study), view_of(session, study)
+    header = view.csv_header(factors)
+    within = [header.index(factor.name) for factor in experiment.factors if not factor.between]
+    between = [factor.name for factor in experiment.factors if factor.between]
+    run, kind, trial, scale, response = (
+        header.index(name) for name in ("run", "kind", "trial_index", "scale", "response")
+    )
+    last: dict[str, dict[tuple[Any, str], tuple[Levels, float]]] = defaultdict(dict)
+    groups: dict[str, dict[str, str]] = {}
+    for stored in rating_rows(session, study, origin):
+        row = view.csv_row(stored, factors)
+        if row[kind] != "main":
+            continue
+        answers = last[row[run]]
+        # Plays come in order: a later one takes the place of an earlier one of its trial.
+        answers.pop((row[trial], row[scale]), None)
+        if row[response] is not None:
+            levels = tuple(str(row[place]) for place in within)
+            answers[row[trial], row[scale]] = (levels, float(row[response]))
+        groups[row[run]] = {name: str(row[header.index(name)]) for name in between}
+    return {name: (groups[name], len(answers), _means(answers)) for name, answers in last.items()}
+
+
+def _means(answers: dict[tuple[Any, str], tuple[Levels, float]]) -> Means:
+    values: dict[tuple[str, Levels], list[float]] = defaultdict(list)
+    for (_, scale), (levels, response) in answers.items():
+        values[scale, levels].append(response)
+    return {cell: round(sum(each) / len(each), 6) for cell, each in values.items()}

@@ -1,0 +1,86 @@
+"""The generated scripts, run for real: R where there is one with its packages, Python with this one."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.definition import Experiment
+from experiments.load import load_experiment
+from server.export.scripts import LANGUAGES, script
+from tests.analysis.ratings_file import rows_of, simulate, write_export
+
+EXP3 = load_experiment("exp3")
+SCALE_AND_PLAY = {"scale": "rating", "synthetic": 1}
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scripts")
+    rows = [row | SCALE_AND_PLAY for row in rows_of(EXP3, simulate(EXP3, 8))]
+    rows = [row | {"clip_sha256": f"{row['stimulus']}"} for row in rows]
+    return write_export(folder / "exp3.csv", EXP3, rows)
+
+
+def run(command: list[str]) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def own_f(answers: Path) -> float:
+    """F of the first effect by this repository's own analysis of the same file."""
+    from analysis.plans.plan import plan_of
+    from analysis.plans.prepare import study_contents
+    from analysis.read.study_answers import load_csv
+
+    contents = study_contents(EXP3, load_csv(answers, EXP3, plan_of("clip_rating").reading))
+    return float(contents.numbers["effects"][0]["univariate"]["f_value"])
+
+
+def test_the_python_script_gives_our_own_f(answers: Path) -> None:
+    target = answers.with_suffix(".py")
+    target.write_text(script(EXP3, "py", answers.name), encoding="utf-8")
+    said = run([sys.executable, "-W", "ignore", str(target)])
+    assert "8 participants" in said
+    line = next(line for line in said.splitlines() if line.startswith("0  lower_lid"))
+    found = float(line.split()[5])
+    assert found == pytest.approx(own_f(answers), abs=5e-4)
+
+
+def test_the_r_script_gives_our_own_f(answers: Path) -> None:
+    if shutil.which("Rscript") is None:
+        pytest.skip("R is not on this machine")
+    needed = 'q(status = !all(sapply(c("afex", "emmeans", "lme4"), requireNamespace, quietly = TRUE)))'
+    if subprocess.run(["Rscript", "-e", needed], capture_output=True, check=False).returncode:
+        pytest.skip("R is here without afex, emmeans or lme4")
+    target = answers.with_suffix(".R")
+    target.write_text(script(EXP3, "R", answers.name), encoding="utf-8")
+    said = run(["Rscript", str(target)])
+    assert "8 participants" in said
+    # 1 lower_lid 2.28, 15.93 0.43 5.52 * .441 .013: the corrected df, the mean square error, F.
+    found = re.search(r"^1 +lower_lid +[\d.]+, +[\d.]+ +[\d.]+ +([\d.]+)", said, re.MULTILINE)
+    assert found is not None, said
+    assert float(found[1]) == pytest.approx(own_f(answers), abs=0.006)
+    assert "contrast" in said
+    assert "Linear mixed model" in said
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("name", ["exp1", "exp2", "pairs-demo", "sliders-demo", "threshold-demo"])
+def test_every_experiment_has_scripts_that_parse(name: str, language: str, tmp_path: Path) -> None:
+    text = script(declared(name), language, "data.csv")  # type: ignore[arg-type]
+    assert "data.csv" in text
+    if language == "py":
+        compile(text, name, "exec")
+    elif shutil.which("Rscript"):
+        (tmp_path / "a.R").write_text(text, encoding="utf-8")
+        run(["Rscript", "-e", f'invisible(parse("{tmp_path}/a.R"))'])
+
+
+def declared(name: str) -> Experiment:
+    folder = Path(load_experiment.__code__.co_filename).parent
+    return load_experiment(str(folder / f"{name}.toml"))

@@ -1,0 +1,106 @@
+import csv
+import io
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from experiments.columns.form_columns import form_columns
+from experiments.load import parse_experiment
+from server.context import Services
+from server.export.excel import guarded_cell
+from tests.helpers.admins import Admin
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+from tests.server.trials.test_comparisons import PAIRS
+
+
+def rows_of(admin: Admin, file: str) -> list[dict[str, Any]]:
+    answer = admin.get(f"/studies/short/data/{file}")
+    assert answer.status_code == 200, answer.text
+    return list(csv.DictReader(io.StringIO(answer.text)))
+
+
+def test_a_row_a_visit_and_the_mean_of_each_cell(viewer: Admin, participant: Participant) -> None:
+    participant.agree()
+    participant.request("PUT", "/forms/about", {"answers": {"age": 33, "glasses": ["lenses"]}})
+    participant.rate_all()
+    [row] = rows_of(viewer, "wide.csv")
+    assert [row["form_about_age"], row["form_about_glasses_glasses"], row["form_about_glasses_lenses"]] == [
+        "33", "0", "1",
+    ]  # fmt: skip
+    main = [one for one in rows_of(viewer, "ratings.csv") if one["kind"] == "main"]
+    assert row["answers"] == "8" == str(len(main))
+    for character in "ab":
+        for speed in ("slow", "fast"):
+            given = [
+                float(one["response"])
+                for one in main
+                if (one["character"], one["speed"]) == (character, speed)
+            ]
+            assert float(row[f"rating_{character}_{speed}"]) == pytest.approx(sum(given) / len(given))
+
+
+def test_a_visit_without_answers_has_empty_cells(viewer: Admin, participant: Participant) -> None:
+    participant.agree()
+    [row] = rows_of(viewer, "wide.csv")
+    assert row["answers"] == "0"
+    assert row["rating_a_slow"] == row["form_about_age"] == ""
+
+
+def test_trials_without_a_scale_are_refused_before_the_download(
+    viewer: Admin, services: Services, tmp_path: Any
+) -> None:
+    add_study(services, tmp_path / "clips", PAIRS)
+    answer = viewer.get("/studies/short/data/wide.csv")
+    assert answer.status_code == 422
+    assert "take the long table" in answer.json()["error"]["message"]
+
+
+def test_a_spreadsheet_gets_a_mark_and_nothing_it_could_run(
+    viewer: Admin, services: Services, client: TestClient, tmp_path: Any
+) -> None:
+    text = SHORT.replace('type = "number"\nname = "age"', 'type = "text"\nname = "age"').replace(
+        "minimum = 18\nmaximum = 120\n", ""
+    )
+    study = add_study(services, tmp_path / "clips", text)
+    person = Participant(client, study.link_token).agree()
+    evil = '=HYPERLINK("http://example.org";"a")'
+    person.request("PUT", "/forms/about", {"answers": {"age": evil}})
+    plain = viewer.get("/studies/short/data/runs.csv").content
+    safe = viewer.get("/studies/short/data/runs.csv?excel=true").content
+    assert not plain.startswith(b"\xef\xbb\xbf")
+    assert safe.startswith(b"\xef\xbb\xbf")
+    [row] = csv.DictReader(io.StringIO(plain.decode()))
+    [guarded] = csv.DictReader(io.StringIO(safe.decode("utf-8-sig")))
+    assert row["form_about_age"] == evil
+    assert guarded["form_about_age"] == f"'{evil}"
+
+
+@pytest.mark.parametrize("cell", ["=1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-", "+fast"])
+def test_what_a_spreadsheet_would_run_is_text(cell: str) -> None:
+    assert guarded_cell(cell) == f"'{cell}"
+
+
+@pytest.mark.parametrize("cell", ["-1.5", "+2", "1e-3", "", "a=b", "'=1"])
+def test_numbers_and_texts_stay(cell: str) -> None:
+    assert guarded_cell(cell) == cell
+
+
+def test_columns_of_forms_never_share_a_name() -> None:
+    text = SHORT.replace('name = "about"', 'name = "a"').replace('name = "age"', 'name = "b_c"')
+    further = (
+        '[[forms]]\nname = "a_b"\ntitle = { en = "More" }\n'
+        '[[forms.fields]]\ntype = "text"\nname = "c"\nlabel = { en = "C" }\n'
+    )
+    columns = form_columns([parse_experiment(text.replace("[texts.en]", further + "\n[texts.en]"))])
+    names = [one.column.name for one in columns]
+    assert names == ["form_a_b_c", "form_a_glasses_glasses", "form_a_glasses_lenses", "form_a_b_c_2"]
+    assert [one.column.identifying for one in columns] == [False, False, False, True]
+
+
+def test_options_of_all_versions_are_in_the_codebook(viewer: Admin, study: StudyInDatabase) -> None:
+    text = viewer.get("/studies/short/data/codebook.md").text
+    assert "| form_about_age | integer |  | Age | 18 to 120 |" in text
+    assert "What do you wear? Whether chosen: Lenses." in text
+    assert "| character | text |  | Level of the factor Character. | a = A, b = B |" in text
+    assert "| rating_a_slow | number |" in text
