@@ -14,6 +14,7 @@ app = typer.Typer(
 
 
 def _gather() -> None:
+    from analysis.commands.agreement import register as register_agreement
     from analysis.commands.anova import register as register_anova
     from analysis.commands.check_paper import register as register_check_paper
     from analysis.commands.models import register as register_models
@@ -30,6 +31,7 @@ def _gather() -> None:
     register_pairs(app)
     register_thresholds(app)
     register_opinion(app)
+    register_agreement(app)
     register_reshape(app)
 
 

@@ -14,6 +14,7 @@ from analysis.commands.output import (
     saying,
     show,
 )
+from analysis.commands.scale_option import scale_bounds
 from experiments.errors import InputError
 
 
@@ -84,7 +85,9 @@ def anova(
     if out is not None:
         check_folder(out)
     with saying("reading ratings"):
-        data = read_long_table(file, participant, rating, factors, trial, _scale(scale), groups, covariates)
+        data = read_long_table(
+            file, participant, rating, factors, trial, scale_bounds(scale), groups, covariates
+        )
         cells = cell_table(data.rows, participant, rating, factors)
         people = cells.participants
         analysis = analyse_cells(
@@ -128,16 +131,3 @@ def _contrast(text: str) -> tuple[str, list[float]]:
         return factor.strip(), [float(weight) for weight in weights.split(",")]
     except ValueError:
         raise InputError(f"--contrast should be like face:1,-1,0, got '{text}'") from None
-
-
-def _scale(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
-    low, _, high = text.partition(":")
-    try:
-        bounds = float(low), float(high)
-    except ValueError:
-        bounds = (1.0, 0.0)
-    if not bounds[0] < bounds[1]:
-        raise InputError(f"--scale should be like 1:7, got '{text}'")
-    return bounds

@@ -1,0 +1,197 @@
+"""Reliability of a scale made of several items: Cronbach's alpha, McDonald's omega, items, scale scores."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.read.text_table import name_lines, numbers, read_text_table, refuse_shared_roles, texts_required
+from experiments.errors import InputError
+
+Floats = NDArray[np.float64]
+
+MIN_CASES = 3
+MIN_OMEGA_ITEMS = 3
+"""One factor of two items is not identified."""
+
+
+@dataclass(frozen=True)
+class ItemAnswers:
+    """Answers to the items of a scale, reverse-keyed ones turned: (cases, items), complete cases alone."""
+
+    answers: Floats = field(repr=False)
+    items: tuple[str, ...]
+    reverse: tuple[str, ...]
+    cases: tuple[str, ...]
+    source: str
+    synthetic: bool
+    decisions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ItemStatistics:
+    """An item beside the others.
+
+    Attributes
+    ----------
+    item_rest_correlation : Pearson's r with the sum of the other items.
+    alpha_without : Cronbach's alpha of the others; None for two items, or others whose sum does not vary.
+    loading : on the one factor, standardised; None where omega is not defined.
+    """
+
+    name: str
+    mean: float
+    sd: float
+    item_rest_correlation: float
+    alpha_without: float | None
+    loading: float | None
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """Alpha with Feldt's 95% interval, omega with the reason where it is not defined, items, scale scores."""
+
+    alpha: float
+    alpha_low: float
+    alpha_high: float
+    omega: float | None
+    omega_reason: str
+    items: tuple[ItemStatistics, ...]
+    scores: tuple[tuple[str, float], ...] = field(repr=False)
+    n_cases: int
+    decisions: tuple[str, ...]
+
+
+def read_items(
+    path: Path,
+    items: Sequence[str],
+    reverse: Sequence[str] = (),
+    scale: tuple[float, float] | None = None,
+    case: str | None = None,
+) -> ItemAnswers:
+    """Read one row a case (a person, or a person's rating of a clip) and one column an item.
+
+    Raises
+    ------
+    InputError
+        Fewer than two items, a reverse-keyed one that is none of them or without the scale's ends, answers
+        outside the scale, fewer than three complete cases, an item that does not vary.
+    """
+    _refuse_items(items, reverse, scale)
+    names = [*items, *([case] if case else [])]
+    refuse_shared_roles(names)
+    table = read_text_table(path, names, ("synthetic",))
+    if case:
+        texts_required(table, case)
+    answers = np.column_stack([numbers(table, name) for name in items])
+    if scale is not None:
+        _refuse_outside(table.source, items, answers, scale, table.lines)
+        turned = [name in reverse for name in items]
+        answers[:, turned] = sum(scale) - answers[:, turned]
+    keep: NDArray[np.bool_] = np.asarray(np.isfinite(answers).all(axis=1))
+    if not keep.all():
+        left_out = int((~keep).sum())
+        said = f"{left_out} case{'s' * (left_out > 1)} without an answer to every item left out"
+        table.decisions.append(f"{said} ({name_lines(table, ~keep)})")
+    if keep.sum() < MIN_CASES:
+        raise InputError(f"{path.name}: expected {MIN_CASES} complete cases or more, got {int(keep.sum())}")
+    for name, column in zip(items, answers[keep].T, strict=True):
+        if np.ptp(column) == 0:
+            raise InputError(f"{path.name}: every answer to '{name}' is {column[0]:g}; leave the item out")
+    if np.ptp(answers[keep].sum(axis=1)) == 0:
+        raise InputError(f"{path.name}: the sum of the items is the same in every case; turn with --reverse")
+    named = table.columns[case].astype(str) if case else pd.Series(table.lines).map("line {}".format)
+    return ItemAnswers(
+        answers[keep],
+        tuple(items),
+        tuple(reverse),
+        tuple(named.to_numpy()[keep]),
+        table.source,
+        table.synthetic,
+        tuple(table.decisions),
+    )
+
+
+def _refuse_items(items: Sequence[str], reverse: Sequence[str], scale: tuple[float, float] | None) -> None:
+    if len(items) < 2:
+        raise InputError(f"expected two items or more, e.g. --items calm,tense,glad; got {len(items)}")
+    for name in reverse:
+        if name not in items:
+            raise InputError(f"--reverse names '{name}', which is none of the items {', '.join(items)}")
+    if reverse and scale is None:
+        raise InputError("--reverse needs the ends of the scale to turn an item: add e.g. --scale 1:7")
+
+
+def _refuse_outside(
+    source: str, items: Sequence[str], answers: Floats, scale: tuple[float, float], lines: NDArray[np.int64]
+) -> None:
+    outside = np.argwhere((answers < scale[0]) | (answers > scale[1]))
+    if len(outside):
+        row, column = outside[0]
+        raise InputError(
+            f"{source}: '{items[column]}' is {answers[row, column]:g} in line {lines[row]}, outside the "
+            f"scale {scale[0]:g} to {scale[1]:g}"
+        )
+
+
+def reliability(data: ItemAnswers) -> Reliability:
+    """Reliability of the items as one scale.
+
+    Alpha and its interval are pingouin's (Feldt, Woodruff & Salih 1987). Omega is McDonald's for one factor,
+
+        omega = (sum lambda_i)^2 / ((sum lambda_i)^2 + sum theta_i),                                   (1)
+
+    where lambda_i is the loading of item i in its own unit and theta_i its variance that the factor does not
+    explain, by maximum likelihood (McDonald 1999, Test Theory, eq. 6.20a).
+    """
+    loadings, reason = _one_factor(data.answers)
+    low, high, alpha = _alpha(data.answers)
+    spread = data.answers.std(axis=0, ddof=1)
+    omega = None
+    if loadings is not None:
+        common = float((loadings * spread).sum()) ** 2
+        omega = common / (common + float(((1 - loadings**2) * spread**2).sum()))
+    own = [None] * len(data.items) if loadings is None else list(map(float, loadings))
+    items = tuple(_item(data, i, loading) for i, loading in enumerate(own))
+    scores = tuple(zip(data.cases, map(float, data.answers.mean(axis=1)), strict=True))
+    return Reliability(alpha, low, high, omega, reason, items, scores, len(data.answers), data.decisions)
+
+
+def _alpha(answers: Floats) -> tuple[float, float, float]:
+    from pingouin import cronbach_alpha
+
+    alpha, (low, high) = cronbach_alpha(data=pd.DataFrame(answers))
+    return float(low), float(high), float(alpha)
+
+
+def _item(data: ItemAnswers, position: int, loading: float | None) -> ItemStatistics:
+    mine, others = data.answers[:, position], np.delete(data.answers, position, axis=1)
+    rest = others.sum(axis=1)
+    correlation = float(np.corrcoef(mine, rest)[0, 1]) if np.ptp(rest) > 0 else float("nan")
+    without = _alpha(others)[2] if others.shape[1] > 1 and np.ptp(rest) > 0 else None
+    return ItemStatistics(
+        data.items[position], float(mine.mean()), float(mine.std(ddof=1)), correlation, without, loading
+    )
+
+
+def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
+    """Standardised loadings on one factor, the sum positive; None with the reason where there are none."""
+    from statsmodels.multivariate.factor import Factor
+
+    n, items = answers.shape
+    if items < MIN_OMEGA_ITEMS:
+        return None, f"omega needs {MIN_OMEGA_ITEMS} items or more"
+    if n <= items:
+        return None, f"omega needs more cases than items, got {n} and {items}"
+    correlations = np.corrcoef(answers, rowvar=False)
+    if np.linalg.cond(correlations) > 1e8:
+        return None, "an item follows from the others, so that omega is not defined"
+    fitted: Any = Factor(corr=correlations, n_factor=1, method="ml", nobs=n).fit(maxiter=500, tol=1e-10)
+    loadings = np.asarray(fitted.loadings, dtype=np.float64)[:, 0]
+    if not np.isfinite(loadings).all() or (np.abs(loadings) > 1 - 1e-6).any():
+        return None, "one factor explains an item wholly (a Heywood case), so that omega is not defined"
+    return loadings * (np.sign(loadings.sum()) or 1.0), ""

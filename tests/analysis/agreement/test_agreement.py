@@ -1,0 +1,143 @@
+"""Reliability and agreement against R (tests/golden/r/agreement.R) and a published example."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from analysis.agreement.raters import LEVELS, agreement
+from analysis.agreement.reliability import read_items, reliability
+from analysis.cli import app
+from analysis.opinion.scores import read_votes
+from experiments.errors import InputError
+
+FOLDER = Path(__file__).parents[2] / "golden/r/agreement"
+REFERENCE: dict[str, Any] = json.loads((FOLDER / "reference.json").read_text(encoding="utf-8"))
+ITEMS = ["calm", "glad", "tense", "awake", "warm"]
+# Krippendorff (2011), example C: four observers, twelve units
+PUBLISHED = """
+1 2 3 3 2 1 4 1 2 . . .
+1 2 3 3 2 2 4 1 2 5 . 3
+. 3 3 3 2 3 4 2 2 5 1 .
+1 2 3 3 2 4 4 1 2 5 1 .
+"""
+
+
+def votes_file(folder: Path, lines: list[str]) -> Path:
+    path = folder / "votes.csv"
+    path.write_text("\n".join(["id,clip,score", *lines]), encoding="utf-8")
+    return path
+
+
+def test_alpha_omega_and_items_equal_r() -> None:
+    result = reliability(read_items(FOLDER / "items.csv", ITEMS, ["tense"], (1, 7), "id"))
+    assert result.alpha == pytest.approx(REFERENCE["alpha"], rel=1e-12)
+    # pingouin rounds the interval to three decimals
+    assert (result.alpha_low, result.alpha_high) == pytest.approx(REFERENCE["feldt"], abs=5e-4)
+    assert result.omega == pytest.approx(REFERENCE["omega"], rel=1e-5)
+    assert [item.loading for item in result.items] == pytest.approx(REFERENCE["loadings"], rel=1e-4)
+    assert [item.item_rest_correlation for item in result.items] == pytest.approx(
+        REFERENCE["rest"], rel=1e-12
+    )
+    assert [item.alpha_without for item in result.items] == pytest.approx(REFERENCE["without"], rel=1e-12)
+
+
+def test_scale_scores_are_means_with_reverse_keyed_items_turned(tmp_path) -> None:
+    path = tmp_path / "items.csv"
+    path.write_text("id,a,b\nx,1,7\ny,4,4\nz,7,2\nw,5,\n", encoding="utf-8")
+    data = read_items(path, ["a", "b"], ["b"], (1, 7), "id")
+    result = reliability(data)
+    assert result.scores == (("x", 1.0), ("y", 4.0), ("z", 6.5))
+    assert result.omega is None
+    assert "needs 3 items" in result.omega_reason
+    assert data.decisions == ("1 case without an answer to every item left out (line 5)",)
+
+
+def test_intraclass_correlations_equal_r() -> None:
+    result = agreement(read_votes(FOLDER / "votes.csv", "clip", "id", "score"))
+    assert {one.form: one.icc for one in result.icc} == pytest.approx(REFERENCE["icc"], rel=1e-10)
+    consistent = next(one for one in result.icc if one.form == "ICC(C,1)")
+    assert (consistent.ci_low, consistent.ci_high) == pytest.approx(REFERENCE["consistency"], rel=1e-9)
+    assert (result.n_items, result.n_complete_items) == (12, 10)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_krippendorffs_alpha_equals_r(level) -> None:
+    result = agreement(read_votes(FOLDER / "votes.csv", "clip", "id", "score"), level)
+    assert result.krippendorff_alpha == pytest.approx(REFERENCE["krippendorff"][level], rel=1e-9)
+    assert result.ci_low < result.krippendorff_alpha < result.ci_high
+
+
+@pytest.mark.parametrize(("level", "alpha"), list(zip(LEVELS, (0.743, 0.815, 0.849, 0.797), strict=True)))
+def test_krippendorffs_own_example(tmp_path, level, alpha) -> None:
+    rows = [row.split() for row in PUBLISHED.strip().splitlines()]
+    lines = [f"o{i},u{k:02d},{v}" for i, row in enumerate(rows) for k, v in enumerate(row)]
+    result = agreement(read_votes(votes_file(tmp_path, lines), "clip", "id", "score"), level)
+    assert round(result.krippendorff_alpha, 3) == alpha
+    # the unit that one observer rated tells nothing of agreement
+    assert any("1 items rated by one person" in decision for decision in result.decisions)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["a,c1,1", "a,c2,2"], "expected two people or more"),
+        (["a,c1,3", "b,c1,3", "a,c2,3", "b,c2,3"], "every rating is 3"),
+    ],
+)
+def test_what_tells_nothing_of_agreement_is_refused(tmp_path, lines, said) -> None:
+    with pytest.raises(InputError, match=said):
+        agreement(read_votes(votes_file(tmp_path, lines), "clip", "id", "score"))
+
+
+@pytest.mark.parametrize(
+    ("items", "reverse", "scale", "said"),
+    [
+        (["calm"], [], None, "two items or more"),
+        (["calm", "glad"], ["warm"], (1, 7), "none of the items calm, glad"),
+        (["calm", "glad"], ["glad"], None, "add e.g. --scale 1:7"),
+        (["calm", "glad"], [], (1, 5), "outside the scale 1 to 5"),
+        (["calm", "happy"], [], None, "no column 'happy'"),
+    ],
+)
+def test_items_that_are_no_scale_are_refused(items, reverse, scale, said) -> None:
+    with pytest.raises(InputError, match=said):
+        read_items(FOLDER / "items.csv", items, reverse, scale)
+
+
+def test_an_item_that_follows_from_another_has_no_omega(tmp_path) -> None:
+    path = tmp_path / "items.csv"
+    random = np.random.default_rng(1)
+    lines = [f"{a},{b},{8 - a}" for a, b in random.integers(1, 8, size=(20, 2))]
+    path.write_text("\n".join(["a,b,c", *lines]), encoding="utf-8")
+    result = reliability(read_items(path, ["a", "b", "c"]))
+    assert result.omega is None
+    assert "follows from the others" in result.omega_reason
+
+
+def test_the_commands_print_and_write(tmp_path) -> None:
+    out, scores = tmp_path / "r.json", tmp_path / "s.csv"
+    call = ["reliability", str(FOLDER / "items.csv"), "--items", ",".join(ITEMS), "--reverse", "tense"]
+    told = CliRunner().invoke(
+        app, [*call, "--scale", "1:7", "--case", "id", "--scores", str(scores), "--json", str(out)]
+    )
+    assert told.exit_code == 0, told.output
+    assert json.loads(out.read_text())["omega"] == pytest.approx(REFERENCE["omega"], rel=1e-5)
+    assert len(scores.read_text().splitlines()) == 61
+    call = [
+        "agreement",
+        str(FOLDER / "votes.csv"),
+        "--item",
+        "clip",
+        "--participant",
+        "id",
+        "--rating",
+        "score",
+    ]
+    told = CliRunner().invoke(app, [*call, "--json", str(out)])
+    assert told.exit_code == 0
+    assert "ICC(A,k)" in told.output
+    assert json.loads(out.read_text())["n_ratings"] == 94
