@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import Field, StringConstraints, ValidationError
 
 from experiments.base import Declaration
+from experiments.checks import CheckName
 from experiments.errors import InputError
 
 MANIFEST_NAME = "manifest.json"
@@ -52,8 +53,34 @@ class Clip(Declaration):
     seed: int | None = None
 
 
+class CheckClip(Declaration):
+    """One clip of a motion check. The file's name says nothing of its answer, and no participant is sent it.
+
+    Attributes
+    ----------
+    check: kind of check. number: of the check, from 1. answer: number of the right choice, from 1.
+    width_mm: shown width at actual size.
+    """
+
+    check: CheckName
+    number: Annotated[int, Field(ge=1)]
+    answer: Annotated[int, Field(ge=1)]
+    file: FileName
+    sha256: Sha256
+    bytes: Annotated[int, Field(gt=0)]
+    fps: Annotated[float, Field(gt=0)]
+    frames: Annotated[int, Field(gt=0)]
+    width_px: Annotated[int, Field(gt=0)]
+    height_px: Annotated[int, Field(gt=0)]
+    width_mm: Annotated[float, Field(gt=0)] | None = None
+    inputs: dict[str, str] = Field(default_factory=dict)
+
+
 class Manifest(Declaration):
-    """All clips of one experiment, and what made them."""
+    """All clips of one experiment, and what made them.
+
+    checks: clips of motion checks. checks_seed: what they were made from; who knows it knows their answers.
+    """
 
     experiment: str
     definition_sha256: Sha256
@@ -62,6 +89,13 @@ class Manifest(Declaration):
     inter_ocular_px: float | None = None
     notes: tuple[str, ...] = ()
     clips: Annotated[tuple[Clip, ...], Field(min_length=1)]
+    checks_seed: int | None = None
+    checks: tuple[CheckClip, ...] = ()
+
+    @property
+    def files(self) -> tuple[Clip | CheckClip, ...]:
+        """Every clip that has a file: those of the design and those of checks."""
+        return (*self.clips, *self.checks)
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -83,18 +117,21 @@ def read_manifest(folder: Path) -> Manifest:
 
 def check_files(manifest: Manifest, folder: Path) -> None:
     """Raise InputError for the first clip that is missing or whose bytes have another hash."""
-    for clip in manifest.clips:
+    for clip in manifest.files:
         path = folder / clip.file
         if not path.is_file():
-            raise InputError(
-                f"clip {clip.file} ({clip.cell}, exemplar {clip.exemplar}) is missing from {folder}"
-            )
+            raise InputError(f"clip {clip.file} ({place_of(clip)}) is missing from {folder}")
         found = file_sha256(path)
         if found != clip.sha256:
             raise InputError(
                 f"clip {clip.file}: expected sha256 {clip.sha256[:12]}..., got {found[:12]}...; "
                 "the file was changed or damaged, build it again"
             )
+
+
+def place_of(clip: Clip | CheckClip) -> str:
+    """Where in the study a clip belongs, in words."""
+    return f"check {clip.number}" if isinstance(clip, CheckClip) else f"{clip.cell}, exemplar {clip.exemplar}"
 
 
 def file_sha256(path: Path) -> str:

@@ -57,6 +57,10 @@ COMMANDS = {
         "stimuli_builder.clips.cli",
         "Build an experiment's clips (H.264 in MP4) and manifest.json.",
     ),
+    "checks": (
+        "stimuli_builder.clips.cli",
+        "Make the clips of a study's motion checks, whose content shows in motion alone.",
+    ),
     "clip": (
         "stimuli_builder.clips.cli",
         "Render one clip from a blink profile and a character.",

@@ -4,6 +4,7 @@ from experiments.definition.analysis_plan import AnalysisPlan
 from experiments.definition.assignment import Assignment
 from experiments.definition.blocks import Blocks, Practice
 from experiments.definition.display import Display
+from experiments.definition.evidence import Evidence
 from experiments.definition.experiment import Experiment
 from experiments.definition.factors import Exemplars, Factor, Level
 from experiments.definition.session import Session
@@ -14,6 +15,7 @@ __all__ = [
     "Assignment",
     "Blocks",
     "Display",
+    "Evidence",
     "Exemplars",
     "Experiment",
     "Factor",

@@ -4,6 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
+from experiments import design
 from experiments.assignment import grouping, shares
 from experiments.base import Declaration, Language, Name, Translated
 from experiments.definition.analysis_plan import AnalysisPlan
@@ -11,6 +12,7 @@ from experiments.definition.assignment import Assignment
 from experiments.definition.blocks import Blocks, Practice
 from experiments.definition.dataset import Dataset
 from experiments.definition.display import Display
+from experiments.definition.evidence import Evidence
 from experiments.definition.factors import Exemplars, Factor
 from experiments.definition.forms import Form
 from experiments.definition.groups import Groups
@@ -76,6 +78,8 @@ class Experiment(Declaration):
     """When a play is flagged or failed."""
     attention: AttentionChecks = AttentionChecks()
     """Attention checks between the trials."""
+    evidence: Evidence = Evidence()
+    """What is asked for to tell people from programs."""
     screening: tuple[ScreeningRule, ...] = ()
     """Rules that end a run while it goes on. The participant is told so, and the place is free again."""
     warnings: Warnings = Warnings()
@@ -135,6 +139,17 @@ class Experiment(Declaration):
             raise ValueError(f"assignment: {dealt}")
         if fault := shares.fault(self) or grouping.fault(self):
             raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
+    def _enough_check_clips(self) -> Self:
+        checks = self.evidence.motion_checks
+        asked = checks.per_block * len(design.blocks(self))
+        if asked > checks.clips:
+            raise ValueError(
+                f"evidence.motion_checks.clips: expected at least the {asked} checks that a participant is "
+                f"asked, got {checks.clips}"
+            )
         return self
 
     @model_validator(mode="after")

@@ -51,6 +51,7 @@ EFFECTS: Mapping[str, Effect] = {
     # A play that counts by the one rule does not by the other.
     "playback": "measured",
     "attention": "wording",
+    "evidence": "wording",
     # Who takes part and whose answers count: both are applied to the whole series, and reported with it.
     "screening": "wording",
     "warnings": "wording",

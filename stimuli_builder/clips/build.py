@@ -2,17 +2,19 @@
 
 import hashlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 from experiments.definition import Experiment
-from experiments.errors import InputError
-from experiments.manifest import MANIFEST_NAME, Clip, Manifest, read_manifest
+from experiments.manifest import MANIFEST_NAME, Manifest
 from experiments.schema.canonical import definition_sha256
 from experiments.trials import KINDS
 from stimuli_builder.characters.writing import write_bytes
+from stimuli_builder.checks import build as checks
+from stimuli_builder.checks.plan import planned_checks
 from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips
+from stimuli_builder.clips.folder import former_manifest, readable_failures, stale
 from stimuli_builder.clips.manifest_file import assemble, manifest_text
 from stimuli_builder.clips.state import BuildState, Built
 from stimuli_builder.clips.workers import available_cores, run_jobs
@@ -53,7 +55,8 @@ def build(
     """Build what is missing or changed of an experiment's clips and write the manifest last.
 
     A clip counts as there when a clip with the same inputs was built before and its file still has the
-    hash it had. Clips of the former manifest that the new one does not name are removed.
+    hash it had. Clips of the former manifest that the new one does not name are removed. Motion checks keep
+    the seed of the former manifest.
 
     Raises
     ------
@@ -63,39 +66,31 @@ def build(
     """
     options, machines = options or Options(), machines or Machines()
     KINDS[experiment.trial.kind].plan(experiment)
-    former = _former_manifest(experiment, folder)
+    former = former_manifest(experiment, folder)
     planned = planned_clips(experiment, options)
+    seed = checks.seed_for(folder, former, options)
+    asked = planned_checks(experiment, seed, options)
     state = BuildState.read(folder, former)
-    missing = _missing(planned, state)
-    progress(0, len(missing))
-    with _readable_failures(folder, state), state.recording():
-        for done, built in enumerate(_rendered(missing, folder, machines), start=1):
+    missing, missing_checks = _missing(planned, state), checks.missing_checks(asked, state)
+    to_build = len(missing) + len(missing_checks)
+    progress(0, to_build)
+    with readable_failures(folder, state), state.recording():
+        if asked:
+            checks.keep_seed(folder, seed)
+        made = chain(_rendered(missing, folder, machines), checks.rendered(missing_checks, folder))
+        for done, built in enumerate(made, start=1):
             state.add(built)
-            progress(done, len(missing))
+            progress(done, to_build)
         manifest = assemble(experiment, definition_sha256(experiment), options, planned, state)
-        removed = _stale(former, manifest)
+        manifest = checks.with_checks(manifest, asked, seed, state)
+        removed = stale(former, manifest)
         if former != manifest:
             write_bytes(folder / MANIFEST_NAME, manifest_text(manifest).encode())
     for name in removed:
         (folder / name).unlink(missing_ok=True)
-    state.finish()
-    return Report(
-        manifest, len(missing), len({clip.job.input_hash for clip in planned}) - len(missing), removed
-    )
-
-
-def _former_manifest(experiment: Experiment, folder: Path) -> Manifest | None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: expected a folder for the clips, this is a file; choose another name")
-    if not (folder / MANIFEST_NAME).exists():
-        return None
-    former = read_manifest(folder)
-    if former.experiment != experiment.name:
-        raise InputError(
-            f"{folder} holds the clips of '{former.experiment}', not of '{experiment.name}'; "
-            "choose another folder"
-        )
-    return former
+    checks.finish(folder, state)
+    inputs = {clip.job.input_hash for clip in planned} | {one.job.input_hash for one in asked}
+    return Report(manifest, to_build, len(inputs) - to_build, removed)
 
 
 def _missing(planned: list[PlannedClip], state: BuildState) -> list[PlannedClip]:
@@ -112,30 +107,3 @@ def _rendered(missing: list[PlannedClip], folder: Path, machines: Machines) -> I
         name = f"{sha256}.mp4"
         write_bytes(folder / name, content)
         yield Built(jobs[index].input_hash, name, sha256, len(content), jobs[index].frames)
-
-
-def _stale(former: Manifest | None, manifest: Manifest) -> tuple[str, ...]:
-    if former is None:
-        return ()
-    current = {clip.file for clip in manifest.clips}
-    return tuple(sorted({clip.file for clip in former.clips if _is_ours(clip)} - current))
-
-
-def _is_ours(clip: Clip) -> bool:
-    return clip.file == f"{clip.sha256}.mp4"
-
-
-@contextmanager
-def _readable_failures(folder: Path, state: BuildState) -> Iterator[None]:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        yield
-    except KeyboardInterrupt as error:
-        raise InputError(
-            f"interrupted; {state.count} clips are finished in {folder}, the same command goes on from there"
-        ) from error
-    except OSError as error:
-        raise InputError(
-            f"{folder} cannot be written ({error.strerror or error}); {state.count} clips are finished, "
-            "make room and run the same command again"
-        ) from error

@@ -57,12 +57,14 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the commands of the clip builder to `app`."""
+    from stimuli_builder.clips.cli_checks import CHECKS_HELP, checks_command
     from stimuli_builder.clips.cli_clip import CLIP_HELP, clip_command
     from stimuli_builder.clips.cli_manifest import MANIFEST_HELP, manifest_command
     from stimuli_builder.clips.cli_strips import STRIPS_HELP, strips_command
 
     app.command("plan", help=PLAN_HELP)(plan_command)
     app.command("build", help=BUILD_HELP)(build_command)
+    app.command("checks", help=CHECKS_HELP)(checks_command)
     app.command("clip", help=CLIP_HELP)(clip_command)
     app.command("manifest", help=MANIFEST_HELP)(manifest_command)
     app.command("strips", help=STRIPS_HELP)(strips_command)
@@ -122,10 +124,11 @@ def build_command(
 
 def _print_report(report: "Report", out: Path) -> None:
     clips, manifest = len(report.manifest.clips), report.manifest
-    size_mb = sum({clip.file: clip.bytes for clip in manifest.clips}.values()) / 1e6
+    size_mb = sum({clip.file: clip.bytes for clip in manifest.files}.values()) / 1e6
+    checks = f" and {len(manifest.checks)} of checks" if manifest.checks else ""
     removed = f", {len(report.removed)} old ones removed" if report.removed else ""
     print(
-        f"{manifest.experiment}: {clips} clips in {out} ({size_mb:.1f} MB); "
+        f"{manifest.experiment}: {clips} clips{checks} in {out} ({size_mb:.1f} MB); "
         f"{report.built} built, {report.reused} already there{removed}"
     )
     for note in manifest.notes:

@@ -33,6 +33,7 @@ class Options:
     """What a build may choose beside the declaration: see `stimuli build --help`."""
 
     seed: int | None = None
+    checks_seed: int | None = None
     barcode: bool = False
     beside: Path | None = None
 

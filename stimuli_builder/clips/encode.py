@@ -19,18 +19,32 @@ X264 = (
     "colorprim=bt709:transfer=bt709:colormatrix=bt709:range=tv:log-level=error"
 )
 BT709, LIMITED_RANGE = 1, 1
+_ALONE = f"{X264.replace('keyint=infinite', 'keyint=1')}:aq-mode=0:mbtree=0"
 
 
-def encoder_signature() -> str:
-    """Everything of the encoder that decides a clip's bytes."""
+def encoder_signature(alone_qp: int | None = None) -> str:
+    """Everything of the encoder that decides a clip's bytes; alone_qp as for `encode_clip`."""
     codec = ".".join(str(part) for part in av.library_versions["libavcodec"])
-    return f"libx264 via libavcodec {codec}; crf {CRF}; preset {PRESET}; {X264}"
+    settings = f"crf {CRF}; preset {PRESET}; {X264}" if alone_qp is None else f"{PRESET}; {_alone(alone_qp)}"
+    return f"libx264 via libavcodec {codec}; {settings}"
 
 
-def encode_clip(frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], fps: float) -> bytes:
+def _alone(qp: int) -> str:
+    return f"{_ALONE}:qp={qp}"
+
+
+def encode_clip(
+    frames: Iterable[NDArray[np.uint8]],
+    size_px: tuple[int, int],
+    fps: float,
+    *,
+    alone_qp: int | None = None,
+) -> bytes:
     """Encode 4:2:0 planes, each (height * 3 / 2, width), as an MP4 file.
 
-    One GOP, no B-frames, constant rate, index in front of the data (fast start), BT.709 limited range.
+    One GOP, no B-frames, constant rate, index in front of the data (fast start), BT.709 limited range. With
+    `alone_qp` every picture is coded by itself at this quantiser: it is decoded the same whatever the others
+    are, so that what coding leaves in it says nothing of them.
 
     Raises
     ------
@@ -41,7 +55,7 @@ def encode_clip(frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], f
     try:
         with tempfile.TemporaryDirectory(prefix="palpebra-clip-") as folder:
             path = Path(folder) / "clip.mp4"
-            _write(path, frames, size_px, fps)
+            _write(path, frames, size_px, fps, alone_qp)
             return path.read_bytes()
     except OSError as error:
         raise InputError(
@@ -50,14 +64,22 @@ def encode_clip(frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], f
         ) from error
 
 
-def _write(path: Path, frames: Iterable[NDArray[np.uint8]], size_px: tuple[int, int], fps: float) -> None:
+def _write(
+    path: Path,
+    frames: Iterable[NDArray[np.uint8]],
+    size_px: tuple[int, int],
+    fps: float,
+    alone_qp: int | None,
+) -> None:
     rate = Fraction(fps).limit_denominator(1001)
     container_options = {"movflags": "+faststart", "fflags": "+bitexact"}
     with av.open(str(path), "w", format="mp4", options=container_options) as container:
         stream: Any = container.add_stream("libx264", rate=rate)
         stream.width, stream.height = size_px
         stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": str(CRF), "preset": PRESET, "profile": "high", "x264-params": X264}
+        usual = {"crf": str(CRF), "x264-params": X264}
+        rated = usual if alone_qp is None else {"x264-params": _alone(alone_qp)}
+        stream.options = {"preset": PRESET, "profile": "high", **rated}
         context = stream.codec_context
         context.thread_count = 1
         context.time_base = 1 / rate

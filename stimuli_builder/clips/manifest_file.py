@@ -3,6 +3,7 @@
 import json
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from experiments.definition import Experiment
 from experiments.manifest import Clip, Manifest
@@ -63,10 +64,16 @@ def repetition_notes(planned: list[PlannedClip]) -> tuple[str, ...]:
 def manifest_text(manifest: Manifest) -> str:
     """JSON with one line a clip; equal manifests give equal text."""
     content = manifest.model_dump(mode="json")
-    clips = content.pop("clips")
+    listed = {name: content.pop(name) for name in ("clips", "checks")}
+    if not listed["checks"]:
+        del listed["checks"], content["checks_seed"]
     head = json.dumps(content, indent=1, ensure_ascii=False)
-    lines = ",\n  ".join(json.dumps(clip, ensure_ascii=False, separators=(",", ":")) for clip in clips)
-    return f'{head[:-2]},\n "clips": [\n  {lines}\n ]\n}}\n'
+    lists = (f' "{name}": [\n  {_lines(clips)}\n ]' for name, clips in listed.items())
+    return f"{head[:-2]},\n" + ",\n".join(lists) + "\n}\n"
+
+
+def _lines(clips: list[dict[str, Any]]) -> str:
+    return ",\n  ".join(json.dumps(clip, ensure_ascii=False, separators=(",", ":")) for clip in clips)
 
 
 def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:

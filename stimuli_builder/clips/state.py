@@ -38,7 +38,7 @@ class BuildState:
     def read(cls, folder: Path, manifest: Manifest | None) -> Self:
         """What a manifest and an unfinished build left."""
         state = cls(folder)
-        for clip in manifest.clips if manifest else ():
+        for clip in manifest.files if manifest else ():
             key = clip.inputs.get(RENDER_KEY)
             if key:
                 state._built[key] = Built(key, clip.file, clip.sha256, clip.bytes, clip.frames)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from experiments.manifest import MANIFEST_NAME, Clip, file_sha256, read_manifest
+from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, file_sha256, place_of, read_manifest
 from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
 from stimuli_builder.clips.levels import kept_levels
@@ -24,11 +24,11 @@ TOLERANCE_MM = 0.3
 class Finding:
     """Something wrong with a clip."""
 
-    clip: Clip
+    clip: Clip | CheckClip
     problem: str
 
     def __str__(self) -> str:
-        return f"{self.clip.file[:12]}... ({self.clip.cell}, exemplar {self.clip.exemplar}): {self.problem}"
+        return f"{self.clip.file[:12]}... ({place_of(self.clip)}): {self.problem}"
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def verify(folder: Path, beside: Path | None = None, progress: Progress = silent
         There is no manifest that can be read.
     """
     manifest = read_manifest(folder)
-    clips = sorted(manifest.clips, key=lambda clip: (clip.inputs.get("character", ""), clip.width_px))
+    clips = sorted(manifest.files, key=lambda clip: (clip.inputs.get("character", ""), clip.width_px))
     meters = _Meters(beside)
     findings: list[Finding] = []
     checked, worst = 0, 0.0
@@ -68,7 +68,7 @@ def verify(folder: Path, beside: Path | None = None, progress: Progress = silent
     return Verdict(len(clips), tuple(findings), checked, worst)
 
 
-def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], float | None]:
+def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[list[str], float | None]:
     path = folder / clip.file
     if not path.is_file():
         return [f"missing from {folder}"], None
@@ -78,7 +78,7 @@ def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], floa
         pictures, problems = _decoded(path, clip)
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
-    if problems or not clip.closure or (meter := meters.of(clip)) is None:
+    if problems or isinstance(clip, CheckClip) or not clip.closure or (meter := meters.of(clip)) is None:
         return problems, None
     try:
         promised = meter.promised_mm(clip)
@@ -95,7 +95,7 @@ def _check(clip: Clip, folder: Path, meters: "_Meters") -> tuple[list[str], floa
     return problems, worst
 
 
-def _decoded(path: Path, clip: Clip) -> tuple[NDArray[np.uint8], list[str]]:
+def _decoded(path: Path, clip: Clip | CheckClip) -> tuple[NDArray[np.uint8], list[str]]:
     """Luma of every frame, and what is wrong with number, size and timing."""
     with av.open(str(path)) as container:
         stream: Any = container.streams.video[0]
@@ -107,7 +107,7 @@ def _decoded(path: Path, clip: Clip) -> tuple[NDArray[np.uint8], list[str]]:
     return np.stack(luma), problems
 
 
-def _timing_problems(stream: Any, frames: list[Any], clip: Clip) -> Iterator[str]:
+def _timing_problems(stream: Any, frames: list[Any], clip: Clip | CheckClip) -> Iterator[str]:
     if len(frames) != clip.frames:
         yield f"expected {clip.frames} frames, got {len(frames)}"
     if (stream.width, stream.height) != (clip.width_px, clip.height_px):

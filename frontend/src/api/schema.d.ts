@@ -1890,6 +1890,32 @@ export interface components {
             status: "draft" | "pilot" | "live" | "closed";
         };
         /**
+         * CheckWording
+         * @description The words of one kind of check, for a study in other languages than English and German.
+         */
+        CheckWording: {
+            /**
+             * Check
+             * @description The kind of check.
+             * @enum {string}
+             */
+            check: "digit" | "direction" | "shape" | "first_blink" | "first_eye";
+            /**
+             * Question
+             * @description What is asked after the clip.
+             */
+            question: {
+                [key: string]: string;
+            };
+            /**
+             * Choices
+             * @description The answers in the order of the kind's own.
+             */
+            choices: {
+                [key: string]: string;
+            }[];
+        };
+        /**
          * Checked
          * @description Whether a definition can be used, and what it expands to.
          */
@@ -2508,6 +2534,27 @@ export interface components {
             events: components["schemas"]["Event"][];
         };
         /**
+         * Evidence
+         * @description What is asked for to tell people from programs, beside what every page brings (docs/evidence.md).
+         */
+        Evidence: {
+            /**
+             * @description Checks that show their content by motion alone.
+             * @default {
+             *       "per_block": 0,
+             *       "kinds": [
+             *         "digit"
+             *       ],
+             *       "difficulty": 0.3,
+             *       "contrast": 0.6,
+             *       "seconds": 2.4,
+             *       "clips": 24,
+             *       "wording": []
+             *     }
+             */
+            motion_checks: components["schemas"]["MotionChecks"];
+        };
+        /**
          * Exclude
          * @description Why a run is excluded; kept with the data.
          */
@@ -2786,6 +2833,23 @@ export interface components {
              *     }
              */
             attention: components["schemas"]["AttentionChecks"];
+            /**
+             * @description What is asked for to tell people from programs.
+             * @default {
+             *       "motion_checks": {
+             *         "clips": 24,
+             *         "contrast": 0.6,
+             *         "difficulty": 0.3,
+             *         "kinds": [
+             *           "digit"
+             *         ],
+             *         "per_block": 0,
+             *         "seconds": 2.4,
+             *         "wording": []
+             *       }
+             *     }
+             */
+            evidence: components["schemas"]["Evidence"];
             /**
              * Screening
              * @description Rules that end a run while it goes on. The participant is told so, and the place is free again.
@@ -3578,6 +3642,63 @@ export interface components {
             heat: string;
         };
         /**
+         * MotionChecks
+         * @description Short clips between the trials in which a digit, a direction or a shape is defined by motion alone.
+         *
+         *     Each is asked as a trial of its own, stored with kind `check` and never analysed.
+         */
+        MotionChecks: {
+            /**
+             * Per Block
+             * @description Checks in each block, at random places but never first.
+             * @default 0
+             */
+            per_block: number;
+            /**
+             * Kinds
+             * @description Kinds of check: `digit`, `direction` and `shape` of random dots; `first_blink` (a full blink and a half
+             *     one) and `first_eye` in the study's own look, which two pictures in their order give away.
+             * @default [
+             *       "digit"
+             *     ]
+             */
+            kinds: ("digit" | "direction" | "shape" | "first_blink" | "first_eye")[];
+            /**
+             * Difficulty
+             * @description From 0 to 1: the share of dots that do not follow (half of them at 1); how alike the two blinks are,
+             *     or how close the two eyes.
+             * @default 0.3
+             */
+            difficulty: number;
+            /**
+             * Contrast
+             * @description Contrast of the dots against the page's background, from above 0 to 1.
+             * @default 0.6
+             */
+            contrast: number;
+            /**
+             * Seconds
+             * @description Length of a check's clip.
+             * @default 2.4
+             */
+            seconds: number;
+            /**
+             * Clips
+             * @description How many check clips are made. Nobody sees one twice; the more there are, the less a list of
+             *     their answers is worth.
+             * @default 24
+             */
+            clips: number;
+            /** @description The way around for people who cannot see such clips; without it they can only guess. */
+            other_way: components["schemas"]["OtherWay"] | null;
+            /**
+             * Wording
+             * @description Question and answers of kinds of check, in place of the program's own English and German.
+             * @default []
+             */
+            wording: components["schemas"]["CheckWording"][];
+        };
+        /**
          * MultipleChoiceField
          * @description Any of several answers.
          */
@@ -3941,6 +4062,26 @@ export interface components {
             kind: "other";
             /** Note */
             note: string;
+        };
+        /**
+         * OtherWay
+         * @description What somebody does who cannot see a motion check. Who takes it is at most `unclear`.
+         */
+        OtherWay: {
+            /**
+             * Label
+             * @description The button that leads to it, offered before the clip and beside the answers.
+             */
+            label: {
+                [key: string]: string;
+            };
+            /**
+             * Text
+             * @description Markdown of the page behind the button; its button goes on with the study.
+             */
+            text: {
+                [key: string]: string;
+            };
         };
         /**
          * OwnClips
@@ -6731,6 +6872,7 @@ export type ChangeOut = components['schemas']['ChangeOut'];
 export type ChangePassword = components['schemas']['ChangePassword'];
 export type ChangeSettings = components['schemas']['ChangeSettings'];
 export type ChangeStatus = components['schemas']['ChangeStatus'];
+export type CheckWording = components['schemas']['CheckWording'];
 export type Checked = components['schemas']['Checked'];
 export type ChoiceField = components['schemas']['ChoiceField'];
 export type ClipOut = components['schemas']['ClipOut'];
@@ -6759,6 +6901,7 @@ export type ErrorBody = components['schemas']['ErrorBody'];
 export type ErrorDetail = components['schemas']['ErrorDetail'];
 export type Event = components['schemas']['Event'];
 export type Events = components['schemas']['Events'];
+export type Evidence = components['schemas']['Evidence'];
 export type Exclude = components['schemas']['Exclude'];
 export type ExcludeAttention = components['schemas']['ExcludeAttention'];
 export type ExcludeFast = components['schemas']['ExcludeFast'];
@@ -6801,6 +6944,7 @@ export type MethodsNumber = components['schemas']['MethodsNumber'];
 export type MethodsOut = components['schemas']['MethodsOut'];
 export type MonitorSnapshot = components['schemas']['MonitorSnapshot'];
 export type MonitoredRun = components['schemas']['MonitoredRun'];
+export type MotionChecks = components['schemas']['MotionChecks'];
 export type MultipleChoiceField = components['schemas']['MultipleChoiceField'];
 export type NewAccount = components['schemas']['NewAccount'];
 export type NewInvitation = components['schemas']['NewInvitation'];
@@ -6816,6 +6960,7 @@ export type NumberField = components['schemas']['NumberField'];
 export type OneAfterTheOther = components['schemas']['OneAfterTheOther'];
 export type Option = components['schemas']['Option'];
 export type OtherResults = components['schemas']['OtherResults'];
+export type OtherWay = components['schemas']['OtherWay'];
 export type OwnClips = components['schemas']['OwnClips'];
 export type PairChoices = components['schemas']['PairChoices'];
 export type PairResults = components['schemas']['PairResults'];

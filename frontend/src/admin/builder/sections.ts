@@ -45,8 +45,8 @@ const NAMED: readonly Section[] = [
   {
     id: "rules",
     label: "Checks and exclusions",
-    about: "Attention checks, who is screened out or warned while taking part, and whose data the analysis leaves out.",
-    keys: ["attention", "screening", "warnings", "exclusions"],
+    about: "Attention and motion checks, who is screened out or warned while taking part, and whose data the analysis leaves out.",
+    keys: ["attention", "evidence", "screening", "warnings", "exclusions"],
   },
   { id: "analysis", label: "Analysis", about: "The analysis, fixed before the data.", keys: ["analysis"] },
   {

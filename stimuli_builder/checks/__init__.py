@@ -1,0 +1,1 @@
+"""Motion checks: clips whose content is defined by motion alone, or by the order of what happens."""

@@ -1,0 +1,140 @@
+"""`stimuli checks`, and the checks of `stimuli build`: the clips and their rows of the manifest."""
+
+import hashlib
+import secrets
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.manifest import MANIFEST_NAME, CheckClip, Manifest
+from stimuli_builder.characters.writing import write_bytes
+from stimuli_builder.checks.plan import PlannedCheck, planned_checks
+from stimuli_builder.clips.design_clips import Options
+from stimuli_builder.clips.folder import former_manifest, readable_failures, stale
+from stimuli_builder.clips.manifest_file import manifest_text
+from stimuli_builder.clips.state import RENDER_KEY, BuildState, Built
+
+SEED_NAME = ".checks-seed"
+"""Beside the manifest while checks are made: the seed drawn, so that an interrupted build goes on with it."""
+SEED_BITS = 53
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class ChecksReport:
+    """What was made of checks."""
+
+    manifest: Manifest
+    built: int
+    removed: tuple[str, ...]
+
+
+def build_checks(
+    experiment: Experiment, folder: Path, options: Options, progress: Progress, *, anew: bool = False
+) -> ChecksReport:
+    """Make the clips of an experiment's motion checks beside its clips, and name them in the manifest.
+
+    Parameters
+    ----------
+    anew: draw another seed than that of the checks that are there.
+
+    Raises
+    ------
+    InputError
+        The experiment asks for no checks, the folder holds no clips of it or cannot be written, or the work
+        was interrupted; what is made by then is kept and used by the next run.
+    """
+    if not experiment.evidence.motion_checks.per_block:
+        raise InputError(
+            f"'{experiment.name}' asks for no motion checks; set per_block in [evidence.motion_checks]"
+        )
+    former = former_manifest(experiment, folder)
+    if former is None:
+        raise InputError(f"{folder} holds no {MANIFEST_NAME}; make the clips first, with `stimuli build`")
+    seed = seed_for(folder, former, options, anew=anew)
+    planned = planned_checks(experiment, seed, options)
+    state = BuildState.read(folder, former)
+    missing = missing_checks(planned, state)
+    progress(0, len(missing))
+    with readable_failures(folder, state), state.recording():
+        keep_seed(folder, seed)
+        for done, built in enumerate(rendered(missing, folder), start=1):
+            state.add(built)
+            progress(done, len(missing))
+        manifest = with_checks(former, planned, seed, state)
+        write_bytes(folder / MANIFEST_NAME, manifest_text(manifest).encode())
+    removed = stale(former, manifest)
+    for name in removed:
+        (folder / name).unlink(missing_ok=True)
+    finish(folder, state)
+    return ChecksReport(manifest, len(missing), removed)
+
+
+def seed_for(folder: Path, former: Manifest | None, options: Options, *, anew: bool = False) -> int:
+    """The seed of the checks: the option's, that of an unfinished or former build, else a secret one."""
+    if options.checks_seed is not None:
+        return options.checks_seed
+    begun = folder / SEED_NAME
+    if begun.is_file() and (text := begun.read_text(encoding="utf-8").strip()).isdigit():
+        return int(text)
+    if former is not None and former.checks_seed is not None and not anew:
+        return former.checks_seed
+    return secrets.randbits(SEED_BITS)
+
+
+def keep_seed(folder: Path, seed: int) -> None:
+    """Note the seed until the manifest holds it."""
+    write_bytes(folder / SEED_NAME, str(seed).encode())
+
+
+def finish(folder: Path, state: BuildState) -> None:
+    """The manifest says everything: what was noted meanwhile goes."""
+    (folder / SEED_NAME).unlink(missing_ok=True)
+    state.finish()
+
+
+def missing_checks(planned: Sequence[PlannedCheck], state: BuildState) -> list[PlannedCheck]:
+    """The checks whose clip is not there as it was made."""
+    return [check for check in planned if not state.intact(check.job.input_hash)]
+
+
+def rendered(missing: Sequence[PlannedCheck], folder: Path) -> Iterator[Built]:
+    """Render clips into `folder`, each whole or not at all, under names that say nothing of them."""
+    for check in missing:
+        content = check.job.render()
+        sha256 = hashlib.sha256(content).hexdigest()
+        write_bytes(folder / f"{sha256}.mp4", content)
+        yield Built(check.job.input_hash, f"{sha256}.mp4", sha256, len(content), check.job.frames)
+
+
+def with_checks(
+    manifest: Manifest, planned: Sequence[PlannedCheck], seed: int, state: BuildState
+) -> Manifest:
+    """The manifest with these checks in place of those that it had."""
+    checks = tuple(_check_clip(check, state) for check in planned)
+    return manifest.model_copy(update={"checks": checks, "checks_seed": seed if checks else None})
+
+
+def _check_clip(check: PlannedCheck, state: BuildState) -> CheckClip:
+    job, built = check.job, state[check.job.input_hash]
+    return CheckClip(
+        check=job.check,
+        number=job.number,
+        answer=job.answer,
+        file=built.file,
+        sha256=built.sha256,
+        bytes=built.bytes,
+        fps=job.fps,
+        frames=built.frames,
+        width_px=job.size_px[0],
+        height_px=job.size_px[1],
+        width_mm=check.width_mm,
+        inputs={
+            RENDER_KEY: job.input_hash,
+            "difficulty": f"{job.difficulty:g}",
+            "contrast": f"{job.contrast:g}",
+            "encoder": job.encoder,
+        },
+    )
