@@ -18,6 +18,8 @@ from experiments.toml_lines import line_of
 FOLDER = Path(__file__).parent
 _PLACE = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
 SHIPPED = ("exp1", "exp2", "exp3")
+DEMOS = ("pairs-demo", "sliders-demo", "threshold-demo")
+"""Demonstrations of the other kinds of trial and of sliders; each is found by its file's name or its own."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +56,15 @@ def load_experiment(name_or_path: str) -> Experiment:
 
 def locate(name_or_path: str) -> Path:
     """Return the TOML file of a shipped experiment's name or of a path; InputError where neither exists."""
-    if name_or_path in SHIPPED:
-        return FOLDER / f"{name_or_path}.toml"
+    stem = name_or_path.replace("_", "-")
+    if stem in (*SHIPPED, *DEMOS):
+        return FOLDER / f"{stem}.toml"
     path = Path(name_or_path)
     if path.is_file():
         return path
     if path.suffix == ".toml":
         raise InputError(f"no file {name_or_path}; expected a TOML file or one of {', '.join(SHIPPED)}")
-    raise InputError(f"no experiment '{name_or_path}'{did_you_mean(name_or_path, SHIPPED)}")
+    raise InputError(f"no experiment '{name_or_path}'{did_you_mean(stem, (*SHIPPED, *DEMOS))}")
 
 
 def parse_experiment(text: str, source: str = "definition") -> Experiment:

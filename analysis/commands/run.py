@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 
 
 def run(
-    experiment: Annotated[str, typer.Argument(help="exp1, exp2, exp3, or an experiment's TOML file.")],
+    experiment: Annotated[str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.")],
     database: Annotated[
         str | None,
         typer.Option(

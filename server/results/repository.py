@@ -1,11 +1,11 @@
 """What the results page reads: the runs of a pool, and what their results depend on."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, Select, and_, func, select
+from sqlalchemy import ColumnElement, Select, and_, case, func, select
 from sqlalchemy.orm import Session
 
-from server.models import Rating, Study, StudyRun, StudyVersion
+from server.models import Rating, SeriesAnswer, SeriesTrial, Study, StudyRun, StudyVersion
 from server.results.cache import Revision
 
 
@@ -30,6 +30,63 @@ class Pool(NamedTuple):
         return select(StudyVersion.id).where(
             StudyVersion.study_id == self.study_id, StudyVersion.series == self.series
         )
+
+
+class StimulusCount(NamedTuple):
+    """Answers that counted at one stimulus of a series."""
+
+    series: str
+    value: float
+    n: int
+    positive: int
+
+
+class LatestEstimate(NamedTuple):
+    """The newest estimate of one run's series."""
+
+    series: str
+    threshold: float
+    threshold_sd: float
+
+
+def _series_answers(of: Pool, *columns: Any) -> Select[Any]:
+    """A query of answers that counted in their series, of runs that are not excluded."""
+    same_trial = and_(
+        SeriesTrial.study_run_id == SeriesAnswer.study_run_id,
+        SeriesTrial.trial_index == SeriesAnswer.trial_index,
+    )
+    return (
+        select(*columns)
+        .select_from(SeriesAnswer)
+        .join(SeriesTrial, same_trial)
+        .join(StudyRun, StudyRun.id == SeriesAnswer.study_run_id)
+        .where(of.runs(), StudyRun.excluded.is_(False), SeriesAnswer.counts.is_(True))
+    )
+
+
+def stimulus_counts(session: Session, of: Pool) -> list[StimulusCount]:
+    """Every stimulus of every series with its answers, stimuli ascending."""
+    positive = func.sum(case((SeriesAnswer.correct.is_(True), 1), else_=0))
+    place = (SeriesTrial.series, SeriesAnswer.value)
+    query = _series_answers(of, *place, func.count(), positive).group_by(*place).order_by(*place)
+    return [StimulusCount(series, value, n, int(of_n)) for series, value, n, of_n in session.execute(query)]
+
+
+def latest_estimates(session: Session, of: Pool) -> list[LatestEstimate]:
+    """What each run's series led to so far; series without an estimate are left out."""
+    keys = (SeriesAnswer.study_run_id, SeriesTrial.series)
+    reckoned = SeriesAnswer.threshold.is_not(None)
+    last = _series_answers(of, *keys, func.max(SeriesAnswer.number).label("last")).where(reckoned)
+    newest = last.group_by(*keys).subquery()
+    query = _series_answers(of, SeriesTrial.series, SeriesAnswer.threshold, SeriesAnswer.threshold_sd).join(
+        newest,
+        and_(
+            newest.c.study_run_id == SeriesAnswer.study_run_id,
+            newest.c.series == SeriesTrial.series,
+            newest.c.last == SeriesAnswer.number,
+        ),
+    )
+    return [LatestEstimate(*row) for row in session.execute(query.order_by(SeriesAnswer.threshold))]
 
 
 def revision(session: Session, study: Study, of: Pool) -> Revision:

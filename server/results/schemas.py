@@ -129,6 +129,37 @@ class PairResults(StudyResults):
     ties: int
 
 
+class StimulusAnswers(BaseModel):
+    """The answers that counted at one stimulus of a series."""
+
+    value: float = Field(description="The stimulus as a number.")
+    n: int
+    positive: int = Field(description="Yes, or the interval of the stimulus.")
+
+
+class SeriesResult(BaseModel):
+    """One adaptive series, over the people who are not excluded."""
+
+    name: str
+    levels: dict[str, str] = Field(description="Level of each factor but that of the stimulus.")
+    people: int = Field(description="Runs with an estimate.")
+    answers: int
+    mean: float | None = Field(description="Mean of the people's latest thresholds.")
+    sd: float | None = Field(description="Standard deviation of them.")
+    mean_posterior_sd: float | None = Field(description="Posterior SD of an estimate on average.")
+    stimuli: list[StimulusAnswers]
+    thresholds: list[float] = Field(description="The people's latest thresholds, ascending.")
+
+
+class ThresholdResults(StudyResults):
+    """Adaptive series."""
+
+    kind: Literal["threshold"] = "threshold"
+    factor: str = Field(description="The factor along which series move.")
+    two_interval: bool
+    series_results: list[SeriesResult]
+
+
 class OtherResults(StudyResults):
     """Of a kind of trial without a summary."""
 
@@ -136,4 +167,4 @@ class OtherResults(StudyResults):
     note: str
 
 
-AnyResults = Results | PairResults | OtherResults
+AnyResults = Results | PairResults | ThresholdResults | OtherResults

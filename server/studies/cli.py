@@ -47,7 +47,7 @@ def register(parent: typer.Typer) -> None:
 
 @study_app.command("add")
 def add(
-    experiment: Annotated[str, typer.Argument(help="exp1, exp2, exp3, or a TOML file.")],
+    experiment: Annotated[str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.")],
     clips: Annotated[
         Path, typer.Option(help="Folder with manifest.json and its clips (see `stimuli build`).")
     ],

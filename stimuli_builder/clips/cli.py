@@ -14,7 +14,9 @@ from experiments.errors import InputError
 if TYPE_CHECKING:
     from stimuli_builder.clips.build import Progress, Report
 
-ExperimentName = Annotated[str, typer.Argument(help="exp1, exp2, exp3 or a TOML file.", show_default=False)]
+ExperimentName = Annotated[
+    str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.", show_default=False)
+]
 PLAN_HELP = """
 Print an experiment's design: factors, cells, clips, trials, blocks and expected minutes.
 

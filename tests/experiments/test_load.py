@@ -2,6 +2,7 @@ import pytest
 
 from experiments.errors import InputError
 from experiments.load import (
+    FOLDER,
     SHIPPED,
     DefinitionError,
     load_experiment,
@@ -137,3 +138,11 @@ def test_a_file_that_is_not_text_is_told_in_one_line(tmp_path) -> None:
     file.write_bytes(b"\x91\x00\xff")
     with pytest.raises(InputError, match=r"study\.toml is not UTF-8 text .*; save it as UTF-8"):
         load_experiment(str(file))
+
+
+@pytest.mark.parametrize("name", ["pairs-demo", "sliders_demo", "threshold-demo"])
+def test_demos_are_found_by_the_names_of_their_file_and_of_the_experiment(name: str) -> None:
+    by_name, file = load_experiment(name), name.replace("_", "-")
+    assert load_experiment(by_name.name) == by_name == load_experiment(str(FOLDER / f"{file}.toml"))
+    with pytest.raises(InputError, match=r"no experiment 'pairs_dmo'; did you mean 'pairs-demo'\?"):
+        load_experiment("pairs_dmo")

@@ -5430,6 +5430,50 @@ export interface components {
             known: number;
         };
         /**
+         * SeriesResult
+         * @description One adaptive series, over the people who are not excluded.
+         */
+        SeriesResult: {
+            /** Name */
+            name: string;
+            /**
+             * Levels
+             * @description Level of each factor but that of the stimulus.
+             */
+            levels: {
+                [key: string]: string;
+            };
+            /**
+             * People
+             * @description Runs with an estimate.
+             */
+            people: number;
+            /** Answers */
+            answers: number;
+            /**
+             * Mean
+             * @description Mean of the people's latest thresholds.
+             */
+            mean: number | null;
+            /**
+             * Sd
+             * @description Standard deviation of them.
+             */
+            sd: number | null;
+            /**
+             * Mean Posterior Sd
+             * @description Posterior SD of an estimate on average.
+             */
+            mean_posterior_sd: number | null;
+            /** Stimuli */
+            stimuli: components["schemas"]["StimulusAnswers"][];
+            /**
+             * Thresholds
+             * @description The people's latest thresholds, ascending.
+             */
+            thresholds: number[];
+        };
+        /**
          * Session
          * @description What happens when a participant comes back.
          */
@@ -5800,6 +5844,24 @@ export interface components {
             };
         };
         /**
+         * StimulusAnswers
+         * @description The answers that counted at one stimulus of a series.
+         */
+        StimulusAnswers: {
+            /**
+             * Value
+             * @description The stimulus as a number.
+             */
+            value: number;
+            /** N */
+            n: number;
+            /**
+             * Positive
+             * @description Yes, or the interval of the stimulus.
+             */
+            positive: number;
+        };
+        /**
          * Stop
          * @description When a series ends: after `trials`, earlier once its estimate is as certain as `sd` and `entropy` say.
          *
@@ -6082,6 +6144,47 @@ export interface components {
              * @default 0
              */
             known?: number;
+        };
+        /**
+         * ThresholdResults
+         * @description Adaptive series.
+         */
+        ThresholdResults: {
+            /** Study */
+            study: string;
+            /** Origin */
+            origin: string;
+            /** Series */
+            series: number;
+            /**
+             * Counted At
+             * Format: date-time
+             */
+            counted_at: string;
+            /** Participants */
+            participants: number;
+            /**
+             * Ratings
+             * @description Answers of any kind that count.
+             */
+            ratings: number;
+            /** Response Times */
+            response_times: components["schemas"]["TimeBin"][];
+            playback: components["schemas"]["Playback"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "threshold";
+            /**
+             * Factor
+             * @description The factor along which series move.
+             */
+            factor: string;
+            /** Two Interval */
+            two_interval: boolean;
+            /** Series Results */
+            series_results: components["schemas"]["SeriesResult"][];
         };
         /**
          * Tickets
@@ -7004,6 +7107,7 @@ export type SeenClip = components['schemas']['SeenClip'];
 export type Series = components['schemas']['Series'];
 export type SeriesOut = components['schemas']['SeriesOut'];
 export type SeriesPlace = components['schemas']['SeriesPlace'];
+export type SeriesResult = components['schemas']['SeriesResult'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
@@ -7020,6 +7124,7 @@ export type Slider = components['schemas']['Slider'];
 export type Stacked = components['schemas']['Stacked'];
 export type StageChange = components['schemas']['StageChange'];
 export type Stimulus = components['schemas']['Stimulus'];
+export type StimulusAnswers = components['schemas']['StimulusAnswers'];
 export type Stop = components['schemas']['Stop'];
 export type Strips = components['schemas']['Strips'];
 export type StudyDetail = components['schemas']['StudyDetail'];
@@ -7028,6 +7133,7 @@ export type TextField = components['schemas']['TextField'];
 export type Texts = components['schemas']['Texts'];
 export type Threshold = components['schemas']['Threshold'];
 export type ThresholdAnswer = components['schemas']['ThresholdAnswer'];
+export type ThresholdResults = components['schemas']['ThresholdResults'];
 export type Tickets = components['schemas']['Tickets'];
 export type Ties = components['schemas']['Ties'];
 export type TimeBin = components['schemas']['TimeBin'];
@@ -9536,7 +9642,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Results"] | components["schemas"]["PairResults"] | components["schemas"]["OtherResults"];
+                    "application/json": components["schemas"]["Results"] | components["schemas"]["PairResults"] | components["schemas"]["ThresholdResults"] | components["schemas"]["OtherResults"];
                 };
             };
             /** @description Nothing has changed. */

@@ -2,17 +2,26 @@
 
 import { Card, Group, ScrollArea, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useState } from "react";
+import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
 import { clipsQuery } from "../queries";
 import { ClipCard } from "../studies/ClipsTab";
 import { fixed } from "../ui/format";
+import { cellLabels, type Factors } from "./plots";
 
 type Clip = Schemas["ClipResult"];
 const keyOf = (clip: Clip) => `${clip.cell} ${String(clip.exemplar)} ${clip.clip_sha256}`;
 
-export function ClipResults({ study, data }: { study: string; data: Schemas["Results"] }) {
+export function ClipResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
   const clips = useQuery(clipsQuery(study));
+  const labels = useMemo(
+    () =>
+      cellLabels(
+        data.clips.map(({ cell }) => cell),
+        factors,
+      ),
+    [data, factors],
+  );
   const [chosen, setChosen] = useState("");
   const current = data.clips.find((clip) => keyOf(clip) === chosen) ?? data.clips[0];
   const shown = clips.data?.find((clip) => clip.clip_sha256 === current?.clip_sha256 && clip.cell === current.cell);
@@ -39,7 +48,7 @@ export function ClipResults({ study, data }: { study: string; data: Schemas["Res
                 <Table.Tr key={keyOf(clip)} bg={clip === current ? "var(--mantine-color-default-hover)" : ""}>
                   <Table.Td>
                     <button type="button" className="line-link" aria-pressed={clip === current} onClick={() => setChosen(keyOf(clip))}>
-                      {clip.cell} {clip.exemplar}
+                      {labels.get(clip.cell)} {clip.exemplar}
                     </button>
                   </Table.Td>
                   <Table.Td className="number">{clip.ratings}</Table.Td>

@@ -5,13 +5,13 @@ import { useMemo } from "react";
 import type { Schemas } from "../api";
 import { PlotFigure } from "../ui/PlotFigure";
 import { HowShown } from "./HowShown";
-import { cellLabels, choicePlot, levelPlot } from "./pair-plots";
+import { choicePlot, comparedCells, levelPlot } from "./pair-plots";
 import { type Factors, labelsOf } from "./plots";
 
 type Data = Schemas["PairResults"];
 
 export function PairResults({ data, factors }: { data: Data; factors: Factors }) {
-  const labels = useMemo(() => cellLabels(data, factors), [data, factors]);
+  const labels = useMemo(() => comparedCells(data, factors), [data, factors]);
   const choices = useMemo(() => choicePlot(data, labels), [data, labels]);
   const sides = data.left + data.right + data.ties;
   const share = (count: number) => (sides === 0 ? "–" : `${Math.round((100 * count) / sides)}%`);
@@ -23,7 +23,8 @@ export function PairResults({ data, factors }: { data: Data; factors: Factors })
             Chosen over
           </Title>
           <Text size="sm">
-            Share of comparisons in which the cell of the row was chosen over that of the column; a tie is half for each.
+            Share of comparisons in which the cell of the row was chosen over that of the column, which has the number of its row; a tie is
+            half for each.
           </Text>
           <PlotFigure options={choices} label="Share of choices in each pair of cells" />
         </Card>

@@ -13,7 +13,9 @@ import { PairResults } from "./PairResults";
 import { type DataOrigin, ORIGINS, originOf } from "./origins";
 import { MethodsCard } from "./MethodsCard";
 import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from "./plots";
+import { NoAnswers } from "./NoAnswers";
 import { Reports } from "./Reports";
+import { ThresholdResults } from "./ThresholdResults";
 
 export function ResultsTab() {
   const { study = "" } = useParams({ strict: false });
@@ -52,7 +54,7 @@ export function ResultsTab() {
       <Answer of={results}>
         {(data) =>
           data.ratings === 0 ? (
-            <Text c="dimmed">No answers of origin {origin} in this data series yet.</Text>
+            <NoAnswers origin={origin} runs={detail?.series.find((one) => one.number === data.series)?.runs ?? {}} choose={setOrigin} />
           ) : (
             <OfKind study={study} data={data} factors={detail?.design.factors ?? []} />
           )
@@ -89,10 +91,12 @@ function OfKind({ study, data, factors }: ShownProps<AnyResults>) {
     <Stack>
       <Alert>
         Data series {data.series}, {data.origin}: {data.participants} runs, {data.ratings.toLocaleString()} answers, counted{" "}
-        {when(data.counted_at)}. This is what arrives, for a look at whether all is well; the analysis is the report below.
+        {when(data.counted_at)}. {data.origin === "simulated" && "These are simulated people: nobody gave these answers. "}This is what
+        arrives, for a look at whether all is well; the analysis is the report below.
       </Alert>
       {data.kind === "clip_rating" && <Shown study={study} data={data} factors={factors} />}
       {data.kind === "paired_comparison" && <PairResults data={data} factors={factors} />}
+      {data.kind === "threshold" && <ThresholdResults data={data} factors={factors} />}
       {data.kind === "other" && (
         <>
           <Text>{data.note}</Text>
@@ -107,23 +111,29 @@ function OfKind({ study, data, factors }: ShownProps<AnyResults>) {
 
 function Shown({ study, data, factors }: ShownProps<Schemas["Results"]>) {
   const singles = data.margins.filter((margin) => margin.factors.length <= 2);
-  const cells = useMemo(() => cellPlot(data), [data]);
   return (
     <Stack>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {singles.map((margin) => (
           <MarginCard key={margin.factors.join(":")} margin={margin} data={data} factors={factors} />
         ))}
-        <Card withBorder>
-          <Title order={2} size="h5">
-            Answers in each cell
-          </Title>
-          <PlotFigure options={cells} label="Distribution of answers in each cell" />
-        </Card>
+        <CellCard data={data} factors={factors} />
         <HowShown data={data} />
       </SimpleGrid>
-      <ClipResults study={study} data={data} />
+      <ClipResults study={study} data={data} factors={factors} />
     </Stack>
+  );
+}
+
+function CellCard({ data, factors }: { data: Schemas["Results"]; factors: Factors }) {
+  const cells = useMemo(() => cellPlot(data, factors), [data, factors]);
+  return (
+    <Card withBorder>
+      <Title order={2} size="h5">
+        Answers in each cell
+      </Title>
+      <PlotFigure options={cells} label="Distribution of answers in each cell" />
+    </Card>
   );
 }
 

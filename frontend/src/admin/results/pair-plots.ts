@@ -2,38 +2,22 @@
 
 import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../api";
-import { type Factors, labelsOf } from "./plots";
+import { cellLabels, type Factors, labelAxis, labelsOf, leftOf } from "./plots";
 
 type Data = Schemas["PairResults"];
 
-/** The cells that were compared, in declared order, with the labels of the factors in which they differ. */
-export function cellLabels({ pairs }: Data, factors: Factors): Map<string, string> {
-  const met = new Set(pairs.flatMap(({ first, second }) => [first, second]));
-  const cells = [...met].sort((one, other) => order(one, factors) - order(other, factors));
-  const varied = factors.map((_, place) => new Set(cells.map((cell) => cell.split("/")[place])).size > 1);
-  return new Map(cells.map((cell) => [cell, labelOf(cell, factors, varied)]));
-}
-
-/** The place of a cell among all, the last factor fastest. */
-function order(cell: string, factors: Factors): number {
-  const levels = cell.split("/");
-  return factors.reduce(
-    (sum, factor, place) => sum * factor.levels.length + factor.levels.findIndex(({ name }) => name === levels[place]),
-    0,
+/** The cells that were compared, with their labels. */
+export function comparedCells({ pairs }: Data, factors: Factors): Map<string, string> {
+  return cellLabels(
+    pairs.flatMap(({ first, second }) => [first, second]),
+    factors,
   );
 }
 
-function labelOf(cell: string, factors: Factors, varied: boolean[]): string {
-  const labels = cell.split("/").map((level, place) => labelsOf(factors, factors[place]?.name ?? "").of(level));
-  return labels.filter((_, place) => varied[place]).join(", ") || cell;
-}
-
-const LONGEST = 24;
-const short = (label: string) => (label.length > LONGEST ? `${label.slice(0, LONGEST - 1)}…` : label);
-
-/** One row and column a cell: how often that of the row was chosen over that of the column. */
+/** One row and column a cell, columns by the numbers of the rows: how often that of the row was chosen over that of the column. */
 export function choicePlot({ pairs }: Data, labels: Map<string, string>): Plot.PlotOptions {
   const names = [...labels.values()];
+  const numbers = new Map(names.map((name, place) => [name, String(place + 1)]));
   const rows = pairs.flatMap(({ first, second, n, first_chosen, ties }) => {
     const share = (first_chosen + ties / 2) / n;
     const [one, other] = [labels.get(first) ?? first, labels.get(second) ?? second];
@@ -43,13 +27,14 @@ export function choicePlot({ pairs }: Data, labels: Map<string, string>): Plot.P
     ];
   });
   return {
-    height: 110 + 34 * names.length,
-    marginLeft: 12 + 7 * Math.min(LONGEST, Math.max(4, ...names.map((name) => name.length))),
-    marginBottom: 100,
-    x: { domain: names, label: "over", tickRotate: -30, tickFormat: short },
-    y: { domain: names, label: null, tickFormat: short },
+    height: 80 + 44 * names.length,
+    marginLeft: leftOf(names),
+    marginBottom: 40,
+    x: { domain: names, label: "over", tickFormat: (name: string) => numbers.get(name) ?? "" },
+    y: { domain: names, label: null },
     color: { type: "linear", scheme: "PuOr", domain: [0, 1], legend: true, label: "share chosen", tickFormat: ".0%" },
     marks: [
+      labelAxis((name) => `${numbers.get(name) ?? ""} ${name}`),
       Plot.cell(rows, { x: "over", y: "chosen", fill: "share", inset: 0.5, tip: true, channels: { comparisons: "n" } }),
       Plot.text(rows, {
         x: "over",

@@ -4,7 +4,7 @@ import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../api";
 
 type Results = Schemas["Results"];
-export type AnyResults = Results | Schemas["PairResults"] | Schemas["OtherResults"];
+export type AnyResults = Results | Schemas["PairResults"] | Schemas["ThresholdResults"] | Schemas["OtherResults"];
 export type Factors = Schemas["DesignOut"]["factors"];
 
 /** The label of a level, and the labels of a factor in declared order. */
@@ -12,6 +12,40 @@ export function labelsOf(factors: Factors, name: string): { title: string; of: (
   const factor = factors.find((one) => one.name === name);
   const labels = new Map(factor?.levels.map((level) => [level.name, level.label]) ?? []);
   return { title: factor?.label ?? name, of: (level) => labels.get(level) ?? level, all: [...labels.values()] };
+}
+
+/** Cells in declared order with the labels of the factors in which they differ. */
+export function cellLabels(cells: Iterable<string>, factors: Factors): Map<string, string> {
+  const every = [...new Set(cells)].sort((one, other) => order(one, factors) - order(other, factors));
+  const varied = factors.map((_, place) => new Set(every.map((cell) => cell.split("/")[place])).size > 1);
+  return new Map(every.map((cell) => [cell, labelOf(cell, factors, varied)]));
+}
+
+/** The place of a cell among all, the last factor fastest. */
+function order(cell: string, factors: Factors): number {
+  const levels = cell.split("/");
+  return factors.reduce(
+    (sum, factor, place) => sum * factor.levels.length + factor.levels.findIndex(({ name }) => name === levels[place]),
+    0,
+  );
+}
+
+function labelOf(cell: string, factors: Factors, varied: boolean[]): string {
+  const labels = cell.split("/").map((level, place) => labelsOf(factors, factors[place]?.name ?? "").of(level));
+  return labels.filter((_, place) => varied[place]).join(", ") || cell;
+}
+
+/** Room and line width for labels on the left: they break into lines, so that a phone's width holds the figure too. */
+const LABEL_EMS = 9;
+const PX_PER_EM = 12;
+
+export function leftOf(labels: string[]): number {
+  const longest = Math.max(3, ...labels.map((label) => label.length));
+  return 24 + PX_PER_EM * Math.min(LABEL_EMS, 0.6 * longest);
+}
+
+export function labelAxis(text: (name: string) => string): Plot.Markish {
+  return Plot.axisY({ lineWidth: LABEL_EMS, label: null, tickFormat: text });
 }
 
 /** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
@@ -46,26 +80,28 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
 const SHARE_COLOUR = "#3c8697";
 
 /** One row a cell, one column an answer: the share of answers as depth of colour, and as a number. */
-export function cellPlot({ cells, bins }: Results): Plot.PlotOptions {
+export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotOptions {
+  const labels = cellLabels(
+    cells.map(({ cell }) => cell),
+    factors,
+  );
+  const names = [...labels.values()];
   const rows = cells.flatMap((cell) =>
     cell.counts.map((count, place) => ({
-      cell: cell.cell,
+      cell: labels.get(cell.cell) ?? cell.cell,
       response: bins[place] ?? 0,
       share: cell.ratings === 0 ? 0 : count / cell.ratings,
     })),
   );
   const deepest = Math.max(0.01, ...rows.map((row) => row.share));
   return {
-    height: Math.max(140, 26 * cells.length + 50),
-    marginLeft: 12 + 7 * Math.max(4, ...cells.map((cell) => Math.min(22, cell.cell.length))),
+    height: Math.max(140, 34 * cells.length + 50),
+    marginLeft: leftOf(names),
     marginBottom: 36,
     x: { label: "answer" },
-    y: {
-      label: null,
-      domain: cells.map((cell) => cell.cell),
-      tickFormat: (name: string) => (name.length > 22 ? `${name.slice(0, 21)}…` : name),
-    },
+    y: { label: null, domain: names },
     marks: [
+      labelAxis((name) => name),
       Plot.cell(rows, {
         x: "response",
         y: "cell",
