@@ -12,9 +12,16 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import srgb_to_linear
-from stimuli_builder.characters.declaration import DECLARATION_FILE, Declaration, Picture, read_declaration
+from stimuli_builder.characters.declaration import (
+    DECLARATION_FILE,
+    Declaration,
+    Level,
+    Picture,
+    read_declaration,
+)
+from stimuli_builder.characters.level_video import decode_level_video
 from stimuli_builder.characters.lower_lid_layer import LowerLidLayer
-from stimuli_builder.characters.reading import decode_picture, slices
+from stimuli_builder.characters.reading import declared_bytes, decode_picture, slices
 
 SHIPPED = Path(__file__).parent / "data"
 
@@ -33,6 +40,7 @@ class Atlas:
     def __init__(self, folder: Path, declaration: Declaration) -> None:
         self.folder = folder
         self.declaration = declaration
+        self._videos: dict[str, NDArray[np.uint8]] = {}
 
     @property
     def name(self) -> str:
@@ -66,9 +74,10 @@ class Atlas:
     def level_srgb(self, index: int) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB code values of one level's crop."""
         level = self.declaration.levels[index]
-        return self._decode(
-            level, self.declaration.crop[2:], f"atlas level {index} (closure {level.closure:g})"
-        )
+        what = f"atlas level {index} (closure {level.closure:g})"
+        if level.frame is None:
+            return self._decode(level, self.declaration.crop[2:], what)
+        return self._frame(level, level.frame, what)
 
     def levels_linear(self) -> NDArray[np.float32]:
         """(n, h, w, 3) linear light of every level's crop; decoded at each call, so keep it.
@@ -93,6 +102,18 @@ class Atlas:
             self.level_srgb(index)
         if self.has_lower_lid:
             _ = self.lower_lid_layer
+
+    def _frame(self, level: Level, number: int, what: str) -> NDArray[np.uint8]:
+        if level.file not in self._videos:
+            content = declared_bytes(self.folder, level, what)
+            self._videos[level.file] = decode_level_video(content, what, level.file)
+        frames, (width, height) = self._videos[level.file], self.declaration.crop[2:]
+        if number >= len(frames) or frames.shape[1:3] != (height, width):
+            raise InputError(
+                f"{what}: {level.file} holds {len(frames)} of {frames.shape[2]} x {frames.shape[1]} px, "
+                f"the declaration asks for frame {number} of {width} x {height} px"
+            )
+        return np.asarray(frames[number], np.uint8)
 
     def _decode(self, picture: Picture, size: Iterable[int], what: str) -> NDArray[np.uint8]:
         return decode_picture(self.folder, picture, tuple(size), what)

@@ -1,20 +1,13 @@
 """`stimuli bake`: render a character's atlas."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from experiments.errors import InputError
+from stimuli_builder.characters.cli_face import bake_face
+from stimuli_builder.characters.cli_progress import baking
 from stimuli_builder.characters.photorealistic.bake import BakeOrder, bake, write_atlas
 from stimuli_builder.characters.photorealistic.framing import parse_size
 from stimuli_builder.characters.photorealistic.parameters import PRESETS_FILE, load_preset
@@ -83,23 +76,12 @@ def bake_photorealistic(
         write_atlas(order)
         typer.echo(f"{levels} levels of '{preset}' are in {order.out}")
         return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task(f"baking {preset}")
-
-        def report(done: int, total: int, what: str) -> None:
-            progress.update(task, completed=done, total=total, description=f"baking {preset} ({what})")
-
+    with baking(preset) as report:
         bake(order, report)
     typer.echo(f"{levels} levels of '{preset}' are in {order.out}")
 
 
 def register(app: typer.Typer) -> None:
     """Add `bake` to the command line."""
+    bake_app.command("face")(bake_face)
     app.add_typer(bake_app, name="bake")

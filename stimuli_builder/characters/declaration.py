@@ -33,9 +33,13 @@ class Picture(_Declared):
 
 
 class Level(Picture):
-    """The crop as it looks at one eyelid closure (0 open, 1 closed)."""
+    """The crop as it looks at one eyelid closure (0 open, 1 closed).
+
+    Where `file` is a video of levels, `frame` is the number of its picture, from 0.
+    """
 
     closure: Closure
+    frame: int | None = Field(None, ge=0)
 
 
 class LowerLidPose(Picture):
@@ -77,6 +81,8 @@ class LowerLid(_Declared):
             raise ValueError("lower_lid.poses must hold every pair of vertical_mm and horizontal_mm once")
         if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
             raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
+        if any(matte.frame is not None for matte in self.mattes):
+            raise ValueError("lower_lid.mattes must be pictures; only levels may be frames of a video")
         _require_ascending([matte.closure for matte in self.mattes], "lower_lid.mattes")
         return self
 

@@ -15,18 +15,10 @@ from stimuli_builder.characters.declaration import Picture
 
 def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: str) -> NDArray[np.uint8]:
     """(h, w, 3) sRGB code values of one picture; InputError where missing, damaged or the wrong size."""
+    content = declared_bytes(folder, picture, what)
     try:
-        content = (folder / picture.file).read_bytes()
-        if picture.sha256 is not None and hashlib.sha256(content).hexdigest() != picture.sha256:
-            raise InputError(
-                f"{what} is damaged: {picture.file} does not match its declared sha256; bake it again"
-            )
         image = Image.open(BytesIO(content)).convert("RGB")
-    except FileNotFoundError as error:
-        raise InputError(f"{what} is missing: no {picture.file} in {folder}; bake it again") from error
     except (OSError, UnidentifiedImageError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(f"{what} is damaged: cannot decode {picture.file}; bake it again") from error
     if image.size != tuple(size):
         declared = " x ".join(str(n) for n in size)
@@ -35,6 +27,21 @@ def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: st
             f"the declaration asks for {declared} px"
         )
     return np.asarray(image, dtype=np.uint8)
+
+
+def declared_bytes(folder: Path, picture: Picture, what: str) -> bytes:
+    """Content of one declared file; InputError where it is missing or another than declared."""
+    try:
+        content = (folder / picture.file).read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{what} is missing: no {picture.file} in {folder}; bake it again") from error
+    except OSError as error:
+        raise InputError(f"{what} is damaged: cannot decode {picture.file}; bake it again") from error
+    if picture.sha256 is not None and hashlib.sha256(content).hexdigest() != picture.sha256:
+        raise InputError(
+            f"{what} is damaged: {picture.file} does not match its declared sha256; bake it again"
+        )
+    return content
 
 
 def slices(crop: tuple[int, int, int, int]) -> tuple[slice, slice]:

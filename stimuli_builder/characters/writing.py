@@ -27,8 +27,13 @@ def write_picture(folder: Path, file: str, image: NDArray[np.uint8]) -> Picture:
     """Write (h, w, 3) or (h, w) code values as lossless WebP; return what the declaration says of it."""
     buffer = BytesIO()
     Image.fromarray(image).convert("RGB").save(buffer, "WEBP", lossless=True, quality=90, method=4)
-    write_bytes(folder / file, buffer.getvalue())
-    return Picture(file=file, sha256=hashlib.sha256(buffer.getvalue()).hexdigest())
+    return write_bytes_declared(folder, file, buffer.getvalue())
+
+
+def write_bytes_declared(folder: Path, file: str, content: bytes) -> Picture:
+    """Write a file of the atlas; return what the declaration says of it."""
+    write_bytes(folder / file, content)
+    return Picture(file=file, sha256=hashlib.sha256(content).hexdigest())
 
 
 def write_declaration(folder: Path, declaration: Declaration) -> None:

@@ -47,13 +47,12 @@ class BakedCharacter:
         if declaration.lower_lid is not None:
             pictures += [*declaration.lower_lid.poses, *declaration.lower_lid.mattes]
         digest = hashlib.sha256((self.folder / DECLARATION_FILE).read_bytes())
-        for picture in pictures:
+        for file in dict.fromkeys(picture.file for picture in pictures):
             try:
-                digest.update((self.folder / picture.file).read_bytes())
+                digest.update((self.folder / file).read_bytes())
             except OSError as error:
                 raise InputError(
-                    f"character '{declaration.name}': {picture.file} is missing from {self.folder}; "
-                    "bake it again"
+                    f"character '{declaration.name}': {file} is missing from {self.folder}; bake it again"
                 ) from error
         return digest.hexdigest()
 

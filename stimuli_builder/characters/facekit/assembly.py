@@ -1,0 +1,97 @@
+"""From rendered shots to the atlas: develop, lay over the still frame, move levels in between, write."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
+from stimuli_builder.characters.declaration import Declaration, Level
+from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM
+from stimuli_builder.characters.facekit.plan import closures_of
+from stimuli_builder.characters.facekit.renderer import Shot
+from stimuli_builder.characters.facekit.scene import FaceScene
+from stimuli_builder.characters.level_video import write_level_video
+from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
+from stimuli_builder.characters.photorealistic.framing import bounding_box
+from stimuli_builder.characters.photorealistic.inbetween import flow_mix
+from stimuli_builder.characters.writing import write_bytes, write_declaration, write_picture
+
+STUDIO_EV = 0.15
+LEVELS_FILE = "levels.mkv"
+NOTICE_FILE = Path(__file__).with_name("ICT-FaceKit-LICENSE.txt")
+"""Goes beside every character rendered from the kit's geometry, as its licence asks."""
+Picture = NDArray[np.uint8]
+
+
+class Assembly:
+    """Pictures of one bake: of its shots those at the closures `rendered`, ascending."""
+
+    def __init__(self, scene: FaceScene, shots: list[Shot], rendered: list[float]) -> None:
+        self._scene, self._rendered = scene, rendered
+        self._levels = {shot.closure: shot for shot in shots[1:]}
+        self.crop = bounding_box(list(scene.boxes.values()))
+        still = self._developed(shots[0].read()["frame"])
+        # The open level's own samples go into the still frame, so that nothing changes when a blink begins.
+        self._still = self._laid(still, self._levels[0.0])
+
+    def level(self, closure: float) -> Picture:
+        """(h, w, 3) sRGB code values of the crop at a rendered closure."""
+        frame = self._still if closure == 0.0 else self._laid(self._still, self._levels[closure])
+        return to_8_bit(self._cut(frame))
+
+    def levels(self, count: int) -> Iterator[tuple[float, Picture]]:
+        """Closures and pictures of an atlas: rendered where there is a shot, else moved in between."""
+        low_picture = self.level(self._rendered[0])
+        for low, high in pairwise(self._rendered):
+            yield low, low_picture
+            high_picture = self.level(high)
+            ends = srgb_to_linear(low_picture), srgb_to_linear(high_picture)
+            for closure in closures_of(count):
+                if low < closure < high:
+                    share = (closure - low) / (high - low)
+                    yield closure, linear_to_srgb(np.maximum(flow_mix(*ends, share), 0))
+            low_picture = high_picture
+        yield self._rendered[-1], low_picture
+
+    def write(self, folder: Path, name: str, count: int, provenance: dict[str, Any]) -> None:
+        """Write the character, its declaration last."""
+        closures, pictures = zip(*self.levels(count), strict=True)
+        video = write_level_video(folder, LEVELS_FILE, pictures)
+        view = self._scene.view
+        declaration = Declaration(
+            name=name,
+            label=self._scene.identity.label,
+            size_px=view.size_px,
+            px_per_mm=view.px_per_mm,
+            inter_ocular_mm=INTER_OCULAR_MM,
+            opening_mm=round(self._scene.opening_mm, 2),
+            crop=self.crop,
+            base=write_picture(folder, "open.webp", to_8_bit(self._still)),
+            levels=tuple(
+                Level(closure=closure, file=video.file, sha256=video.sha256, frame=number)
+                for number, closure in enumerate(closures)
+            ),
+            provenance=provenance,
+        )
+        write_bytes(folder / NOTICE_FILE.name, NOTICE_FILE.read_bytes())
+        write_declaration(folder, declaration)
+
+    def _developed(self, light: NDArray[np.float16]) -> NDArray[np.float32]:
+        return develop(light.astype(np.float32), self._scene.identity.exposure_ev + STUDIO_EV)
+
+    def _laid(self, still: NDArray[np.float32], shot: Shot) -> NDArray[np.float32]:
+        """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims."""
+        laid = still.copy()
+        for name, light in shot.read().items():
+            x, y, width, height = box = shot.boxes[name]
+            where = laid[y : y + height, x : x + width]
+            where += self._scene.view.feather(box) * (self._developed(light) - where)
+        return laid
+
+    def _cut(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        x, y, width, height = self.crop
+        return image[y : y + height, x : x + width]

@@ -1,0 +1,147 @@
+"""Bake a face: render what is missing, coarse to fine, and write an atlas whenever a generation is whole."""
+
+import errno
+import hashlib
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import InputError
+from stimuli_builder.characters.facekit.assembly import Assembly
+from stimuli_builder.characters.facekit.identity import Identity
+from stimuli_builder.characters.facekit.kit import FaceKit
+from stimuli_builder.characters.facekit.plan import LEVEL_COUNTS, Samples, closures_of, shots
+from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
+from stimuli_builder.characters.facekit.scene import FaceScene
+from stimuli_builder.characters.photorealistic.environment import BPY_VERSION, ensure_blender
+
+# Raise when geometry, textures, materials or lights change: work of another recipe is not resumed.
+RECIPE = 1
+NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
+
+
+@dataclass(frozen=True)
+class FaceOrder:
+    """What to bake and where; `work` keeps rendered shots so that a stopped bake goes on.
+
+    Of the atlas's `levels`, `rendered` are rendered and the others moved in between.
+    """
+
+    name: str
+    identity: Identity
+    framing: str
+    size_px: tuple[int, int]
+    levels: int
+    rendered: int
+    samples: Samples
+    light: str
+    out: Path
+    work: Path
+    blender: Path
+    device: str
+    threads: int
+
+    def work_folder(self, kit: FaceKit) -> Path:
+        """Folder of this face's shots: another face, size, quality, kit or recipe has another."""
+        key = f"{self.identity.model_dump_json()} {self.framing} {self.size_px} {self.samples} {self.light}"
+        digest = hashlib.sha256(f"{key} {load_light(self.light)} {kit.fingerprint} {RECIPE}".encode())
+        return self.work / f"face-{self.name}-{digest.hexdigest()[:10]}"
+
+
+class FaceBake:
+    """One bake: its scene, the shots it needs and the atlas they make."""
+
+    def __init__(self, order: FaceOrder, kit: FaceKit) -> None:
+        self.order, self.kit, self.work = order, kit, order.work_folder(kit)
+
+    @cached_property
+    def scene(self) -> FaceScene:
+        """The face's geometry."""
+        return FaceScene(self.kit, self.order.identity, self.order.framing, self.order.size_px)
+
+    @cached_property
+    def shots(self) -> list[Shot]:
+        """Every shot, in the order of rendering."""
+        return shots(self.work, self.order.size_px, self.scene.boxes, self.order.samples, self.order.rendered)
+
+    def run(self, report: Callable[[int, int, str], None]) -> None:
+        """Render what is missing and write the atlas; `report(done, total, what)` after each shot.
+
+        Raises
+        ------
+        InputError
+            Blender cannot be had or failed, or the disk is full; what is rendered stays.
+        """
+        try:
+            self.work.mkdir(parents=True, exist_ok=True)
+            missing = [shot for shot in self.shots if not shot.file.exists()]
+            report(len(self.shots) - len(missing), len(self.shots), "begin")
+            if missing:
+                self._render(missing, report)
+            self.write()
+        except OSError as error:
+            if error.errno == errno.ENOSPC:
+                raise InputError(
+                    f"the disk is full: free some of it and bake again; what is rendered stays in {self.work}"
+                ) from error
+            raise
+
+    def _render(self, missing: list[Shot], report: Callable[[int, int, str], None]) -> None:
+        order = self.order
+        python = ensure_blender(order.blender)
+        setup = Setup(python, order.light, order.device, order.threads, self.work / "blender.log")
+        done = len(self.shots) - len(missing)
+        with Renderer(self.scene, setup) as renderer:
+            for shot in missing:
+                renderer.render(shot)
+                done += 1
+                report(done, len(self.shots), f"{shot.file.stem} on {renderer.device}")
+                if done - 1 in LEVEL_COUNTS and done < len(self.shots):
+                    self.write(done - 1)
+
+    def write(self, rendered: int | None = None) -> None:
+        """Write the character from the first `rendered` levels of the plan, or from all that are there.
+
+        Raises
+        ------
+        InputError
+            Not even the still frame and both ends are rendered.
+        """
+        have = [shot.closure for shot in self.shots[1:] if shot.file.exists()]
+        if not self.shots[0].file.exists() or not {0.0, 1.0} <= set(have):
+            raise InputError(
+                f"nothing to write: the still frame, the open and the shut level are not all in {self.work}; "
+                "bake them first"
+            )
+        grid = set(closures_of(rendered)) if rendered else {0.0, 1.0, *have}
+        assembly = Assembly(self.scene, self.shots, sorted(grid & set(have)))
+        levels = max(min(self.order.levels, 8 * (len(have) - 1) + 1), 2)
+        count = max(count for count in LEVEL_COUNTS if count <= levels)
+        assembly.write(
+            self.order.out, self.order.name, count, self._provenance(count, sorted(grid & set(have)))
+        )
+
+    def _provenance(self, levels: int, rendered: list[float]) -> dict[str, Any]:
+        order, width, height = self.order, *self.order.size_px
+        return {
+            "command": f"stimuli bake face --identity {order.name} --framing {order.framing} "
+            f"--size {width}x{height} --levels {levels} --rendered {order.rendered} "
+            f"--samples {order.samples.boxes} --frame-samples {order.samples.frame} --light {order.light}",
+            "geometry": NOTICE,
+            "recipe": RECIPE,
+            "rendered_levels": len(rendered),
+            "rendered_closures": rendered,
+            "samples": order.samples.boxes,
+            "frame_samples": order.samples.frame,
+            "moved_mm_at_closure_1": {k: round(v, 3) for k, v in self.scene.movement_mm().items()},
+            "versions": {"palpebra": version("palpebra"), "bpy": BPY_VERSION, "numpy": version("numpy")},
+            "platform": f"{sys.platform} {platform.machine()}",
+            "date": datetime.now(UTC).date().isoformat(),
+            "face": order.identity.model_dump(mode="json"),
+        }

@@ -1,0 +1,169 @@
+"""Eyeballs, the wet film over them, tear line and caruncle of one side, as meshes of quads; lengths in cm."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stimuli_builder.characters.facekit.blink_path import BlinkPath
+from stimuli_builder.characters.facekit.hair import edge_line
+from stimuli_builder.characters.facekit.kit import Array, Index
+from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, LASH_LOOP, chains
+from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth, spherical, surface_radius
+
+TEXTURE_LIMIT = 1.25
+"""Radians from the gaze axis at the edge of the eye's texture."""
+_SHADE_REACH_CM = (0.16, 0.07)
+_SHADE_DEPTH = (0.55, 0.22)
+_SEAM_POINTS = 70
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Vertices (n, 3), quads (m, 4), UVs (n, 2) where textured, and per-vertex values by name."""
+
+    vertices: Array
+    quads: Index
+    uv: Array | None = None
+    values: dict[str, Array] = field(default_factory=dict)
+
+
+def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
+    """Iris plane and sclera. `shade` is the light that lids and lashes leave near their edges."""
+    radius = path.globes[side].radius
+    limbus = float(np.arcsin(IRIS_CM / radius))
+
+    def profile(angle: Array) -> Array:
+        depth = radius * np.cos(limbus) - 0.035 - 0.05 * np.clip(1 - angle / limbus, 0, 1)
+        plane = np.minimum(radius, depth / np.maximum(np.cos(angle), 0.2))
+        return np.where(angle < limbus, plane, radius - 0.035 * np.exp(-((angle - limbus) / 0.05)))
+
+    mesh, angle = _dome(path, side, stroke, profile, 1.45, (150, 96))
+    sclera = smooth(limbus - 0.01, limbus + 0.05, angle)
+    shade = _lid_shade(path, posed, side, mesh.vertices)
+    return Mesh(mesh.vertices, mesh.quads, mesh.uv, {"sclera": sclera, "shade": shade})
+
+
+def wet_film(path: BlinkPath, side: int, stroke: float) -> Mesh:
+    """Cornea and tear film: the eye's outer surface."""
+    radius = path.globes[side].radius
+    mesh, _ = _dome(path, side, stroke, lambda a: surface_radius(a, radius) + 0.004, 1.40, (120, 96))
+    return Mesh(mesh.vertices, mesh.quads)
+
+
+def _dome(
+    path: BlinkPath,
+    side: int,
+    stroke: float,
+    profile: Callable[[Array], Array],
+    limit: float,
+    size: tuple[int, int],
+) -> tuple[Mesh, Array]:
+    """Surface of revolution about the gaze axis, and each vertex's angle from it."""
+    rings, sectors = size
+    ahead = path.gaze(side, stroke)
+    right = np.cross([0, 1.0, 0], ahead)
+    right /= np.linalg.norm(right)
+    frame = np.stack([right, np.cross(ahead, right), ahead])
+    angle, turn = np.meshgrid(
+        np.linspace(0, limit, rings + 1), np.linspace(0, 2 * np.pi, sectors, endpoint=False), indexing="ij"
+    )
+    r = profile(angle)
+    local = np.stack(
+        [r * np.sin(angle) * np.cos(turn), r * np.sin(angle) * np.sin(turn), r * np.cos(angle)], -1
+    )
+    uv = 0.5 + angle[..., None] / TEXTURE_LIMIT * 0.5 * np.stack([np.cos(turn), np.sin(turn)], -1)
+    vertices = path.globes[side].centre + local.reshape(-1, 3) @ frame
+    return Mesh(vertices, _tube_quads(rings, sectors), uv.reshape(-1, 2)), angle.ravel()
+
+
+def _tube_quads(rings: int, sectors: int) -> Index:
+    ring, sector = np.meshgrid(np.arange(rings), np.arange(sectors), indexing="ij")
+    following = (sector + 1) % sectors
+    corners = [ring * sectors + sector, (ring + 1) * sectors + sector]
+    corners += [(ring + 1) * sectors + following, ring * sectors + following]
+    return np.asarray(np.stack(corners, -1).reshape(-1, 4))
+
+
+def _lid_shade(path: BlinkPath, posed: Array, side: int, vertices: Array) -> Array:
+    """(n,) share of light left: dark under the upper lid and its lashes, a little above the lower lid."""
+    globe = path.globes[side]
+    _, azimuth, elevation = spherical(vertices - globe.centre)
+    shade = np.ones(len(vertices))
+    for upper in (True, False):
+        edge = edge_line(path, posed, side, EDGE_LOOP, upper)
+        _, at, height = spherical(edge - globe.centre)
+        order = np.argsort(at)
+        distance = (np.interp(azimuth, at[order], height[order]) - elevation) * globe.radius
+        distance = np.clip(distance if upper else -distance, 0, None)
+        reach, depth = (pair[0 if upper else 1] for pair in (_SHADE_REACH_CM, _SHADE_DEPTH))
+        shade *= 1 - depth * np.exp(-((distance / reach) ** 1.2))
+    return shade
+
+
+def tear_line(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
+    """Meniscus where the lower lid's edge meets the globe."""
+    centre = path.globes[side].centre
+    edge = edge_line(path, posed, side, EDGE_LOOP, False)
+    away = edge - centre
+    radius = np.linalg.norm(away, axis=1)
+    gap = path.clearance(edge, side, stroke)
+    line = centre + away / radius[:, None] * (radius - gap + 0.012)[:, None] + np.array([0, 0.012, 0])
+    inset = np.minimum(np.arange(len(line)), np.arange(len(line))[::-1])
+    thickness = 0.018 * np.clip(inset / 14, 0, 1) * (1 - 0.7 * smooth(0.9, 1.0, stroke))
+    return _tube(line, thickness)
+
+
+def _tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
+    along = np.gradient(line, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True) + 1e-9
+    first = np.cross(along, [0, 0, 1.0])
+    first /= np.linalg.norm(first, axis=1, keepdims=True) + 1e-9
+    second = np.cross(along, first)
+    turn = np.linspace(0, 2 * np.pi, sectors, endpoint=False)[None, :, None]
+    around = np.cos(turn) * first[:, None] + np.sin(turn) * second[:, None]
+    vertices = line[:, None] + radius[:, None, None] * around
+    return Mesh(vertices.reshape(-1, 3), _tube_quads(len(line) - 1, sectors))
+
+
+def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
+    """The pink flesh of the nasal corner and the fold beside it, which fills the corner when shut."""
+    tip = _nasal_tip(path, posed, side, EDGE_LOOP)
+    corner = _nasal_tip(path, posed, side, LASH_LOOP)
+    tilt = -side * 0.5
+    main = _ellipsoid(tip + np.array([side * 0.16, -0.025, -0.035]), (0.19, 0.10, 0.11), tilt)
+    fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.075]), (0.17, 0.14, 0.08), tilt)
+    filling = _ellipsoid(corner + np.array([side * 0.05, 0.0, -0.035]), (0.085, 0.055, 0.055), tilt)
+    meshes = [main, fold, filling, _seam(path, posed, side)]
+    starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
+    quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), quads)
+
+
+def _seam(path: BlinkPath, posed: Array, side: int) -> Mesh:
+    """Flesh where the lids' nasal ends have met; without it the shut corner is a dark pit."""
+    upper, lower = (edge_line(path, posed, side, LASH_LOOP, up)[:_SEAM_POINTS] for up in (True, False))
+    gap = np.linalg.norm(upper - lower, axis=1)
+    met = smooth(0.17, 0.11, gap) * smooth(_SEAM_POINTS - 1, _SEAM_POINTS - 25, np.arange(_SEAM_POINTS))
+    line = (upper + lower) / 2 - np.array([0, 0, 0.035])
+    return _tube(line, 0.002 + 0.040 * met)
+
+
+def _nasal_tip(path: BlinkPath, posed: Array, side: int, loop: int) -> Array:
+    upper, _ = chains(path.kit, path.loops[side][loop], side)
+    return np.asarray(posed[upper[0]])
+
+
+def _ellipsoid(centre: Array, size: tuple[float, float, float], tilt: float) -> Mesh:
+    rings, sectors = 24, 40
+    polar, turn = np.meshgrid(
+        np.linspace(1e-3, np.pi - 1e-3, rings + 1),
+        np.linspace(0, 2 * np.pi, sectors, endpoint=False),
+        indexing="ij",
+    )
+    unit = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], -1).reshape(
+        -1, 3
+    )
+    x, y, z = (unit * np.array(size)).T
+    turned = np.stack([x * np.cos(tilt) + z * np.sin(tilt), y, z * np.cos(tilt) - x * np.sin(tilt)], -1)
+    return Mesh(centre + turned, _tube_quads(rings, sectors))

@@ -1,0 +1,166 @@
+"""Per-vertex pigments, gloss, pores and furrows of the resting skin, for the skin's shader."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stimuli_builder.characters.facekit.field_noise import value_noise
+from stimuli_builder.characters.facekit.kit import Array
+from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.lid_skin import FaceSkin, age_depth
+from stimuli_builder.characters.facekit.sphere import smooth
+
+SPOTS = 220
+NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
+"""Numbers of Multi-PIE landmarks."""
+
+
+class Pigments:
+    """Draws the shader's per-vertex values of one face."""
+
+    def __init__(self, skin: FaceSkin) -> None:
+        self.skin, self.look, self.rest = skin, skin.identity.skin, skin.rest
+        self.seed = skin.identity.seed
+        self.landmarks = skin.path.rest[skin.path.kit.landmarks]
+        self.front = smooth(2.0, 5.0, self.rest[:, 2])
+        self.dark = self.look.melanin > 0.4
+        self.contrast = min(1.0, (0.2 / self.look.melanin) ** 0.5)
+        self.centres = {side: skin.path.globes[side].centre for side in SIDES}
+
+    def values(self) -> dict[str, Array]:
+        """Values by attribute name: (n,) or, of coordinates, (n, 3)."""
+        lips = self._lips()
+        wet, fine, coordinates = self._lid_values()
+        melanin = self._melanin(lips) * (1 - 0.35 * wet)
+        haemoglobin = self._haemoglobin(lips) + wet * 0.30
+        melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
+        haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
+        # Fine speckle per vertex: as noise in the shader it doubled the time of a render.
+        # Fainter on the lids, where the blink stretches it into streaks.
+        calm = 0.35 + 0.65 * smooth(8.0, 13.0, self.skin.coordinates.loop)
+        melanin *= np.clip(1 + self.contrast * calm * 0.12 * self._noise(11.0, 22, 3), 0.5, 1.6)
+        haemoglobin *= np.clip(1 + calm * 0.13 * self._noise(15.0, 23, 2), 0.5, 1.6)
+        melanin += self._spots()
+        warp = 0.045 * np.stack([self._noise(3.5, k, 2) for k in (19, 20, 21)], -1)
+        return {
+            "rest": self.rest,
+            "warp": self.rest + warp,
+            "lidc": coordinates,
+            "mel": np.clip(melanin, 0.02, None),
+            "hem": np.clip(haemoglobin, 0.02, None),
+            "pore": np.clip(self._pores(lips), 0, 1.5)
+            * np.clip(0.7 + 0.4 * self._noise(5.0, 16, 1), 0.15, 1.2),
+            "net": np.clip(0.75 + 0.35 * self._noise(2.6, 17, 2), 0.2, 1.3) * age_depth(self.look.age) ** 0.5,
+            "rough": np.clip(self._roughness(lips), 0.2, 0.6),
+            "wet": wet,
+            "fine": fine * age_depth(self.look.age) ** 0.7,
+        }
+
+    def _noise(self, scale: float, offset: int, octaves: int = 3) -> Array:
+        return value_noise(self.rest * scale, self.seed + offset, octaves) / 1.9
+
+    def _spot(self, centre: Array, width: float, height: float) -> Array:
+        x, y = self.rest[:, 0] - centre[0], self.rest[:, 1] - centre[1]
+        return np.asarray(np.exp(-((x / width) ** 2 + (y / height) ** 2) / 2) * self.front)
+
+    def _near_eye(self, side: int, x: float, y: float, width: float, height: float) -> Array:
+        """A spot at (x towards the temple, y up) from an eye's centre, cm."""
+        return self._spot(self.centres[side] + np.array([side * x, y, 0]), width, height)
+
+    def _lips(self) -> Array:
+        outline = self.landmarks[LIPS, :2]
+        if self.rest[:, 1].min() > outline[:, 1].max() + 0.5:
+            return np.zeros(len(self.rest))
+        distance = _polygon_distance(self.rest[:, :2], outline)
+        return np.asarray((self.rest[:, 2] > 5) / (1 + np.exp(np.clip((distance + 0.03) / 0.055, -60, 60))))
+
+    def _melanin(self, lips: Array) -> Array:
+        base, around = self.look.melanin, 0.55 if self.dark else 1.0
+        tired = 0.75 + 0.25 * age_depth(self.look.age)
+        out = base * (1 + 0.06 * self.contrast * value_noise(self.rest * 0.35, self.seed + 1, 3))
+        for side in SIDES:
+            lids = 0.30 * tired * self._near_eye(side, -0.3, -0.9, 1.3, 0.35)
+            lids += 0.22 * self._near_eye(side, 0, 0.75, 1.7, 0.45) + 0.10 * self._near_eye(
+                side, 0, 0, 2.2, 1.5
+            )
+            out += base * around * lids
+        out += base * 0.10 * self._spot(self.landmarks[BRIDGE] + np.array([0, 3.5, 0]), 4.5, 2.2)
+        return np.asarray(out + lips * (0.05 + 0.10 * base))
+
+    def _haemoglobin(self, lips: Array) -> Array:
+        out = self.look.haemoglobin * (1 + 0.06 * value_noise(self.rest * 0.5, self.seed + 2, 3))
+        for side in SIDES:
+            out += 0.11 * self._near_eye(side, 1.0, -3.2, 1.5, 1.2) + 0.05 * self._near_eye(
+                side, 0.4, -2.4, 1.6, 0.9
+            )
+            out += 0.05 * self._near_eye(side, -0.9, -0.85, 0.9, 0.35) + 0.06 * self._near_eye(
+                side, 0, 0.7, 1.6, 0.35
+            )
+            out += 0.09 * self._near_eye(side, -1.5, -0.2, 0.4, 0.5) + 0.05 * self._near_eye(
+                side, 1.35, -0.2, 0.4, 0.5
+            )
+        out += 0.22 * self._spot(self.landmarks[NOSE], 0.9, 0.8)
+        out += sum(0.16 * self._spot(self.landmarks[k], 0.5, 0.6) for k in NOSTRILS)
+        out += 0.10 * self._spot(self.landmarks[CHIN] + np.array([0, 1.3, 0]), 1.2, 0.9)
+        out -= 0.07 * self._spot(self.landmarks[BRIDGE] + np.array([0, 2.8, 0]), 3.5, 1.6)
+        return np.asarray(out + lips * (0.30 if self.dark else 0.42))
+
+    def _roughness(self, lips: Array) -> Array:
+        broad = value_noise(self.rest * 0.35, self.seed + 1, 3)
+        out = 0.45 + 0.03 * broad + (0.04 if self.dark else 0.0) - 0.13 * lips
+        out -= 0.09 * self._spot(self.landmarks[NOSE] + np.array([0, 1.0, 0]), 0.9, 2.0)
+        out -= 0.06 * self._spot(self.landmarks[BRIDGE] + np.array([0, 2.8, 0]), 3.0, 1.5)
+        return np.asarray(out - 0.05 * (self.skin.coordinates.loop < 7) + 0.04 * self._noise(8.0, 18, 2))
+
+    def _pores(self, lips: Array) -> Array:
+        depth = 0.8 + 0.2 * age_depth(self.look.age)
+        out = 0.50 * depth + 0.55 * self._spot(self.landmarks[NOSE], 1.3, 1.2)
+        for side in SIDES:
+            out += 0.45 * depth * self._near_eye(side, -0.6, -3.0, 1.5, 1.3)
+            out *= 1 - 0.92 * np.clip(1.25 * self._near_eye(side, 0, 0.1, 1.6, 0.9), 0, 1)
+        out += 0.30 * self._spot(self.landmarks[BRIDGE] + np.array([0, 2.5, 0]), 3.0, 1.5)
+        return np.asarray(out * (1 - lips))
+
+    def _lid_values(self) -> tuple[Array, Array, Array]:
+        """Wetness, depth of fine lines, and (n, 3) coordinates along and across the lids."""
+        at, n = self.skin.coordinates, len(self.rest)
+        wet, fine, lines = np.zeros(n), np.zeros(n), np.zeros((n, 3))
+        uneven = np.clip(0.75 + 0.3 * value_noise(self.rest * 1.6, self.seed + 40, 2), 0.1, 1.3)
+        for side in SIDES:
+            here = (at.side == side) & (self.rest[:, 2] > 4)
+            centre, loop = self.centres[side], at.loop
+            turn = np.arctan2(self.rest[:, 1] - centre[1], (self.rest[:, 0] - centre[0]) * side)
+            lid = np.where(loop < 13.5, loop * 1.5, 20) + at.upper * 30
+            lines[here] = np.stack([turn * 2.2 + side * 40, lid, np.zeros(n)], -1)[here]
+            wet[here] = smooth(3.05, 2.5, loop)[here]
+            corner = np.exp(-(((at.azimuth - 1.05) / 0.45) ** 2))
+            reach = smooth(2.8, 5.5, loop) * smooth(13.6, 9.0, loop)
+            fine[here] = (reach * (0.35 + 0.25 * (1 - at.upper) + 0.4 * corner) * uneven)[here]
+        return wet, fine, lines
+
+    def _spots(self) -> Array:
+        """Freckles and a few small moles as added melanin."""
+        rng = np.random.default_rng([self.seed, 15])
+        out = np.zeros(len(self.rest))
+        places = np.flatnonzero((self.rest[:, 2] > 5) & (self.skin.coordinates.loop > 6))
+        tree = cKDTree(self.rest)
+        for place in rng.choice(places, SPOTS):
+            mole = rng.random() < 0.04
+            size = rng.uniform(0.05, 0.09) if mole else rng.uniform(0.015, 0.05)
+            strength = (0.25 if mole else 0.13) * rng.uniform(0.3, 1)
+            near = tree.query_ball_point(self.rest[place], 0.22)
+            distance2 = ((self.rest[near] - self.rest[place]) ** 2).sum(1)
+            out[near] += strength * np.exp(-distance2 / size**2)
+        return self.look.freckles * out * (1.0 + self.look.melanin)
+
+
+def _polygon_distance(points: Array, outline: Array) -> Array:
+    """(n,) signed distance of (n, 2) points to a closed polygon, below 0 inside, at most 9."""
+    inside, distance = np.zeros(len(points), bool), np.full(len(points), 9.0)
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        along = b - a
+        share = np.clip(((points - a) @ along) / (along @ along), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(points - a - share[:, None] * along, axis=1))
+        straddles = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
+        crossing = (points[:, 1] - a[1]) / (along[1] + 1e-12) * along[0] + a[0]
+        inside ^= straddles & (points[:, 0] < crossing)
+    return np.where(inside, -distance, distance)

@@ -1,0 +1,147 @@
+"""One Cycles process that renders poses of one face: the package's side of cycles_face_worker.py."""
+
+import json
+import subprocess
+import tempfile
+import tomllib
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.characters.facekit import framing
+from stimuli_builder.characters.facekit.framing import Box
+from stimuli_builder.characters.facekit.scene import FaceScene
+
+WORKER = Path(__file__).with_name("cycles_face_worker.py")
+LIGHTS_FILE = Path(__file__).with_name("lights.toml")
+DEVICES = ("auto", "cpu", "gpu")
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture to render: a closure, which boxes of the frame, and where to."""
+
+    file: Path
+    closure: float
+    boxes: dict[str, Box]
+    samples: int
+
+    def read(self) -> dict[str, NDArray[np.float16]]:
+        """(h, w, 3) scene-linear light of each box."""
+        with np.load(self.file) as stored:
+            return {name: stored[name] for name in stored.files}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How a face is rendered: Blender's Python, light preset, device, threads, and where chatter goes."""
+
+    python: Path
+    light: str
+    device: str
+    threads: int
+    log: Path
+
+
+class Renderer:
+    """Context manager round the Blender process; one shot at a time."""
+
+    def __init__(self, scene: FaceScene, setup: Setup) -> None:
+        self._scene, self._setup = scene, setup
+        self._folder = tempfile.TemporaryDirectory(prefix="bake-")
+        here = Path(self._folder.name)
+        scene.write(here / "scene.npz", 0.0)
+        scene.write_textures(here / "textures.npz")
+        (here / "settings.json").write_text(json.dumps(_settings(scene, setup, here)))
+        self._log_file = setup.log.open("a")
+        self._process = subprocess.Popen(  # noqa: S603 - our own worker
+            [str(setup.python), str(WORKER), str(here / "settings.json")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log_file,
+            text=True,
+        )
+        self.device = ""
+
+    def __enter__(self) -> "Renderer":
+        try:
+            self.device = str(self._answer("starting")["device"])
+        except BaseException as error:
+            self.__exit__(type(error), error, None)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None:
+            self._process.kill()
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                with suppress(BrokenPipeError):
+                    stream.close()
+        self._process.wait()
+        self._log_file.close()
+        self._folder.cleanup()
+
+    def render(self, shot: Shot) -> float:
+        """Render one shot to its file and return the seconds it took.
+
+        Raises
+        ------
+        InputError
+            Blender failed or ended, say because the GPU went away or the disk is full.
+        """
+        pose = Path(self._folder.name) / "pose.npz"
+        self._scene.write_pose(pose, shot.closure)
+        job = {"pose": str(pose), "out": str(shot.file.resolve())}
+        job |= {"samples": shot.samples, "boxes": shot.boxes}  # type: ignore[dict-item]
+        # A process that ended breaks the pipe; its answer below says what happened.
+        with suppress(BrokenPipeError):
+            if self._process.stdin is not None:
+                self._process.stdin.write(json.dumps(job) + "\n")
+                self._process.stdin.flush()
+        return float(self._answer(f"rendering {shot.file.name}")["seconds"])
+
+    def _answer(self, doing: str) -> dict[str, Any]:
+        line = self._process.stdout.readline() if self._process.stdout is not None else ""
+        answer: dict[str, Any] = json.loads(line) if line else {"error": "it ended without a word"}
+        if "error" in answer:
+            raise InputError(
+                f"Blender stopped while {doing}: {answer['error']}; what is rendered stays: bake again"
+                f"{'' if self._setup.device == 'cpu' else ', with --device cpu if the GPU is gone'} "
+                f"(see {self._setup.log})"
+            )
+        return answer
+
+
+def load_light(name: str, file: Path = LIGHTS_FILE) -> dict[str, Any]:
+    """A light preset; InputError with the nearest name where there is none."""
+    presets: dict[str, dict[str, Any]] = tomllib.loads(file.read_text(encoding="utf-8"))
+    if name not in presets:
+        raise InputError(f"no light preset '{name}'{did_you_mean(name, presets)}")
+    return presets[name]
+
+
+def _settings(scene: FaceScene, setup: Setup, folder: Path) -> dict[str, Any]:
+    view, identity = scene.view, scene.identity
+    return {
+        "scene": str(folder / "scene.npz"),
+        "textures": str(folder / "textures.npz"),
+        "size_px": list(view.size_px),
+        "width_cm": view.width_cm,
+        "centre_y_cm": view.centre_y_cm,
+        "plane_z_cm": framing.PLANE_Z_CM,
+        "distance_cm": framing.DISTANCE_CM,
+        "look": {"melanin": identity.skin.melanin, "hair": list(identity.hair.colour)},
+        "lights": load_light(setup.light),
+        "device": setup.device,
+        "threads": setup.threads,
+        "seed": 1,
+    }

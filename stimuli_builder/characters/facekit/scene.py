@@ -1,0 +1,180 @@
+"""One face's scene as plain arrays: what stays, and the positions of each closure.
+
+The renderer (cycles_face_worker.py) runs in an environment of its own with Blender's numpy, so it gets .npz
+files: `header` (JSON: parts with kind, name, material and fields) and each part's arrays under
+`<index>_<field>`.
+"""
+
+import json
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stimuli_builder.characters.facekit.blink_path import BlinkPath
+from stimuli_builder.characters.facekit.eye_texture import eye_maps
+from stimuli_builder.characters.facekit.eyes import Mesh, caruncle, eyeball, tear_line, wet_film
+from stimuli_builder.characters.facekit.framing import FRAMINGS, Box, View
+from stimuli_builder.characters.facekit.hair import Brow, Lashes, Strands
+from stimuli_builder.characters.facekit.identity import Identity
+from stimuli_builder.characters.facekit.kit import Array, FaceKit
+from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.lid_skin import FaceSkin, face_part, lid_skin
+from stimuli_builder.characters.facekit.pigments import Pigments
+from stimuli_builder.characters.facekit.subdivision import subdivide
+
+SIDE_NAMES = {1: "left", -1: "right"}
+MOVES_CM = 0.004
+SMALL_WIDTH_PX = 480
+"""Below this width a pixel is larger than the quads of one subdivision less."""
+TEXTURE_SHARE = 1400 / 960
+"""Width of the eye's texture over that of the picture: six texels to a pixel of the iris."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A mesh or a bunch of hair with its material."""
+
+    name: str
+    material: str
+    shape: Mesh | Strands
+
+    def arrays(self) -> dict[str, Any]:
+        """Everything a renderer needs to build it."""
+        if isinstance(self.shape, Strands):
+            return {"points": _single(self.shape.points), "radii": _single(self.shape.radii)}
+        out = {"vertices": _single(self.shape.vertices), "quads": self.shape.quads.astype(np.int32)}
+        if self.shape.uv is not None:
+            out["uv"] = _single(self.shape.uv)
+        return out | {f"value_{name}": _single(value) for name, value in self.shape.values.items()}
+
+    def moving(self) -> dict[str, Any]:
+        """What differs from closure to closure."""
+        arrays = self.arrays()
+        return {name: arrays[name] for name in ("points", "vertices", "value_shade") if name in arrays}
+
+
+class FaceScene:
+    """One identity in one framing, posed at any closure."""
+
+    def __init__(self, kit: FaceKit, identity: Identity, framing: str, size_px: tuple[int, int]) -> None:
+        self.identity, self.framing = identity, FRAMINGS[framing]
+        self.path = BlinkPath(kit, identity.rest(kit), identity.movement)
+        self.strokes = lid_skin(self.path, identity).strokes
+        levels = self.framing.levels - (size_px[0] < SMALL_WIDTH_PX)
+        faces = face_part(kit, self.framing.low, self.framing.high)
+        self.skin = FaceSkin(self.path, identity, subdivide(faces, levels), self.strokes)
+        globes = self.path.globes
+        self.view = View.of(self.framing, size_px, globes[1].centre, globes[-1].centre)
+        self._brows = {side: Brow(self.skin, side) for side in SIDES}
+        self._lashes = [
+            (
+                f"{'upper' if upper else 'lower'}_lashes_{SIDE_NAMES[side]}",
+                Lashes(self.path, identity.hair, side, upper, identity.seed),
+            )
+            for side in SIDES
+            for upper in (True, False)
+        ]
+
+    @cached_property
+    def _values(self) -> dict[str, Array]:
+        return Pigments(self.skin).values()
+
+    def parts(self, closure: float) -> list[Part]:
+        """Every part at a closure, always in the same order, with what colours it."""
+        first, *others = self.shapes(closure)
+        skin = replace(first.shape, values=self._values) if isinstance(first.shape, Mesh) else first.shape
+        return [replace(first, shape=skin), *others]
+
+    def shapes(self, closure: float) -> list[Part]:
+        """The parts without the skin's colours."""
+        strokes = self.strokes.of(closure)
+        coarse, posed = self.path.at(strokes), self.skin.at(closure)
+        parts = [Part("skin", "skin", Mesh(posed, self.skin.fine.quads))]
+        for side, name in SIDE_NAMES.items():
+            stroke = strokes[side]
+            parts += [
+                Part(f"eye_{name}", "eye", eyeball(self.path, coarse, side, stroke)),
+                Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
+                Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
+                Part(f"flesh_{name}", "flesh", caruncle(self.path, coarse, side)),
+                Part(f"brow_{name}", "brow", self._brows[side].at(posed)),
+            ]
+        return parts + [Part(name, "lash", row.at(coarse)) for name, row in self._lashes]
+
+    def write(self, file: Path, closure: float) -> None:
+        """Write the whole scene."""
+        parts = self.parts(closure)
+        self._write(file, parts, [part.arrays() for part in parts])
+
+    def write_pose(self, file: Path, closure: float) -> None:
+        """Write the moving arrays alone."""
+        parts = self.shapes(closure)
+        self._write(file, parts, [part.moving() for part in parts])
+
+    @staticmethod
+    def _write(file: Path, parts: list[Part], content: list[dict[str, Any]]) -> None:
+        header = [
+            {
+                "name": part.name,
+                "material": part.material,
+                "kind": "hair" if isinstance(part.shape, Strands) else "mesh",
+                "fields": sorted(arrays),
+            }
+            for part, arrays in zip(parts, content, strict=True)
+        ]
+        named = {f"{k}_{field}": value for k, arrays in enumerate(content) for field, value in arrays.items()}
+        np.savez(file, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **named)
+
+    def write_textures(self, file: Path) -> None:
+        """Write the eye's maps: `colour` linear albedo, `height` in 0-1; lowest row first."""
+        dark = self.identity.skin.melanin > 0.9
+        size = round(TEXTURE_SHARE * self.view.size_px[0])
+        colour, height = eye_maps(self.identity.iris, self.identity.seed + 3, 1.25 if dark else 1.0, size)
+        np.savez(file, colour=colour, height=height)
+
+    @cached_property
+    def boxes(self) -> dict[str, Box]:
+        """What a blink changes in the picture, by side of the person."""
+        opened, shut = self.shapes(0.0), self.shapes(1.0)
+        out = {}
+        for side, name in SIDE_NAMES.items():
+            points = []
+            for a, b in zip(opened, shut, strict=True):
+                if a.material == "skin" or (a.material in ("lash", "brow") and a.name.endswith(name)):
+                    points.append(_moved_points(a, b, side))
+            out[name] = self.view.box_round(np.concatenate(points))
+        return out
+
+    @property
+    def opening_mm(self) -> float:
+        """Mean height of the open eyes at the pupils, in declared mm."""
+        return float(np.mean(list(self.strokes.open_cm.values()))) * self.view.mm_per_cm
+
+    def movement_mm(self) -> dict[str, float]:
+        """The largest displacement of each named part of the face between open and shut, in declared mm."""
+        at, rest, shut = self.skin.coordinates, self.skin.at(0.0), self.skin.at(1.0)
+        moved = np.linalg.norm(shut - rest, axis=1) * self.view.mm_per_cm
+        lower_edge = (at.upper < 0.5) & (np.abs(at.loop - 3) < 0.5) & (np.abs(at.azimuth) < 0.3)
+        change = (shut - rest) * self.view.mm_per_cm
+        far = at.loop > 13.5
+        height = rest[:, 1] - self.path.globes[1].centre[1]
+        return {
+            "lower_lid_up": float(np.median(change[lower_edge, 1])),
+            "lower_lid_nasal": float(np.median(-change[lower_edge, 0] * at.side[lower_edge])),
+            "brow": float(moved[far & (height > 1.5)].max(initial=0.0)),
+            "cheek": float(moved[far & (height < -1.0)].max(initial=0.0)),
+        }
+
+
+def _moved_points(opened: Part, shut: Part, side: int) -> Array:
+    key = "points" if isinstance(opened.shape, Strands) else "vertices"
+    a, b = (part.arrays()[key].reshape(-1, 3).astype(np.float64) for part in (opened, shut))
+    moved = (np.abs(a - b).max(1) > MOVES_CM) & (a[:, 0] * side > 0)
+    return np.concatenate([a[moved], b[moved]])
+
+
+def _single(values: Array) -> Any:
+    return values.astype(np.float32)

@@ -1,0 +1,20 @@
+"""The face kit that lies beside the checkout, read once."""
+
+from pathlib import Path
+
+import pytest
+
+from stimuli_builder.characters.facekit.kit import FaceKit, load_facekit
+
+
+@pytest.fixture(scope="session")
+def packed_kit(shared_data: Path) -> Path:
+    file = shared_data / "facekit" / "ict_facekit.npz"
+    if not file.is_file():
+        pytest.skip("the face kit is not here (looked for ../shared/data/facekit beside the checkout)")
+    return file
+
+
+@pytest.fixture(scope="session")
+def kit(packed_kit: Path) -> FaceKit:
+    return load_facekit(packed_kit)

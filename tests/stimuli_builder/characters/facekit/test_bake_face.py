@@ -1,0 +1,256 @@
+"""Planning, resuming and assembling a bake of a face, its faults, and Blender where there is one."""
+
+import errno
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from experiments.errors import InputError
+from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.facekit.bake import FaceBake, FaceOrder
+from stimuli_builder.characters.facekit.framing import FRAMINGS, parse_size
+from stimuli_builder.characters.facekit.identity import (
+    IDENTITIES_FILE,
+    identity_of_seed,
+    load_identity,
+)
+from stimuli_builder.characters.facekit.kit import FaceKit
+from stimuli_builder.characters.facekit.plan import Samples, closures_of
+from stimuli_builder.characters.facekit.renderer import Renderer, Setup, load_light
+from stimuli_builder.characters.facekit.scene import FaceScene
+from stimuli_builder.cli import app
+
+SIZE = (240, 90)
+BLENDER = Path(__file__).parents[4] / ".venv-bake" / "bin" / "python"
+
+
+def order(tmp_path: Path, levels: int = 9, rendered: int = 3) -> FaceOrder:
+    return FaceOrder(
+        name="alder",
+        identity=load_identity("alder"),
+        framing="eyes",
+        size_px=SIZE,
+        levels=levels,
+        rendered=rendered,
+        samples=Samples(1, 1),
+        light="studio",
+        out=tmp_path / "out",
+        work=tmp_path / "work",
+        blender=tmp_path / "blender",
+        device="cpu",
+        threads=1,
+    )
+
+
+@pytest.fixture(scope="module")
+def scene(kit: FaceKit) -> FaceScene:
+    return FaceScene(kit, load_identity("alder"), "eyes", SIZE)
+
+
+def bake_of(kit: FaceKit, scene: FaceScene, wanted: FaceOrder) -> FaceBake:
+    bake = FaceBake(wanted, kit)
+    bake.__dict__["scene"] = scene  # built once for the module: it takes seconds
+    return bake
+
+
+def pretend_rendered(bake: FaceBake, count: int) -> None:
+    """Put grey shots, darker with closure, where a bake of that many shots would have left its renders."""
+    bake.work.mkdir(parents=True, exist_ok=True)
+    for shot in bake.shots[:count]:
+        grey = 0.3 - 0.1 * shot.closure
+        np.savez(shot.file, **{k: np.full((b[3], b[2], 3), grey, np.float16) for k, b in shot.boxes.items()})
+
+
+def test_the_plan_bisects_and_renders_each_level_once(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
+    planned = [shot.closure for shot in bake_of(kit, scene, order(tmp_path, 17, 17)).shots]
+    assert planned[:6] == [0.0, 0.0, 1.0, 0.5, 0.25, 0.75]
+    assert sorted(planned[1:]) == closures_of(17)
+
+
+def test_boxes_hold_all_that_moves(scene: FaceScene) -> None:
+    opened, shut = (scene.shapes(closure)[0].arrays()["vertices"] for closure in (0.0, 1.0))
+    moved = np.abs(opened - shut).max(1) > 0.01
+    for points in (opened[moved], shut[moved]):
+        at = scene.view.project(points.astype(float))
+        inside = np.zeros(len(at), bool)
+        for x, y, width, height in scene.boxes.values():
+            inside |= (at[:, 0] > x) & (at[:, 0] < x + width) & (at[:, 1] > y) & (at[:, 1] < y + height)
+        assert inside.all()
+    assert all(width < 0.4 * SIZE[0] for _, _, width, _ in scene.boxes.values())
+
+
+def test_the_eyes_lie_60_mm_apart_and_the_rest_holds_still(scene: FaceScene) -> None:
+    globes = scene.path.globes
+    at = scene.view.project(np.stack([globes[1].centre, globes[-1].centre]) + np.array([0, 0, 1.0177]))
+    assert abs(at[0, 0] - at[1, 0]) / scene.view.px_per_mm == pytest.approx(60.0, abs=0.3)
+    assert 8.5 < scene.opening_mm < 11.5
+    moved = scene.movement_mm()
+    assert max(moved["brow"], moved["cheek"], abs(moved["lower_lid_nasal"])) < 0.05
+
+
+def test_everything_moves_in_one_fixed_topology(scene: FaceScene) -> None:
+    for opened, shut in zip(scene.parts(0.0), scene.parts(0.6), strict=True):
+        assert opened.name == shut.name
+        for key, value in opened.arrays().items():
+            assert shut.arrays()[key].shape == value.shape
+            if key not in ("points", "vertices", "value_shade"):
+                np.testing.assert_array_equal(shut.arrays()[key], value)
+            assert np.isfinite(value).all()
+
+
+def test_a_finished_bake_writes_a_character_without_blender(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path
+) -> None:
+    bake = bake_of(kit, scene, order(tmp_path))
+    pretend_rendered(bake, 4)
+    bake.run(lambda *_: None)
+    atlas = load_atlas(tmp_path / "out")
+    atlas.check_files()
+    assert atlas.closures.tolist() == closures_of(9)
+    darker = [atlas.level_srgb(k).mean() for k in (0, 4, 8)]
+    assert darker[0] > darker[1] > darker[2]
+    np.testing.assert_array_equal(atlas.level_srgb(0).shape[:2], atlas.base_linear()[atlas.crop].shape[:2])
+    provenance = atlas.declaration.provenance
+    assert provenance["rendered_closures"] == [0.0, 0.5, 1.0]
+    assert "ICT-FaceKit" in provenance["geometry"]
+    assert atlas.declaration.inter_ocular_mm == 60.0
+    assert "Permission is hereby granted" in (tmp_path / "out" / "ICT-FaceKit-LICENSE.txt").read_text()
+
+
+def test_an_interrupted_bake_says_what_lacks_and_keeps_what_is_there(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path
+) -> None:
+    bake = bake_of(kit, scene, order(tmp_path))
+    pretend_rendered(bake, 2)
+    with pytest.raises(InputError, match="nothing to write: the still frame, the open and the shut level"):
+        bake.write()
+    assert len(list(bake.work.glob("*.npz"))) == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_face_size_quality_or_light_is_other_work(kit: FaceKit, tmp_path: Path) -> None:
+    first = order(tmp_path)
+    places = {first.work_folder(kit)}
+    for change in (
+        {"identity": identity_of_seed(8)},
+        {"size_px": (480, 180)},
+        {"samples": Samples(2, 1)},
+        {"light": "window"},
+    ):
+        places.add(FaceOrder(**(first.__dict__ | change)).work_folder(kit))
+    assert len(places) == 5
+
+
+def test_a_full_disk_is_said_in_one_line(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bake = bake_of(kit, scene, order(tmp_path))
+    pretend_rendered(bake, 4)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(
+        InputError, match="the disk is full: free some of it and bake again; what is rendered"
+    ):
+        bake.run(lambda *_: None)
+
+
+def program(tmp_path: Path, body: str) -> Path:
+    """A program that stands where Blender's Python would."""
+    file = tmp_path / "python"
+    file.write_text(f"#!{sys.executable}\nimport json, sys\n{body}\n")
+    file.chmod(0o755)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (
+            "print(json.dumps({'error': 'CUDA error: device lost'}))",
+            "CUDA error: device lost; what is rendered",
+        ),
+        ("sys.exit(3)", "it ended without a word; what is rendered stays"),
+    ],
+)
+def test_a_gpu_that_vanishes_is_said_in_one_line(
+    scene: FaceScene, tmp_path: Path, body: str, said: str
+) -> None:
+    setup = Setup(program(tmp_path, body), "studio", "auto", 1, tmp_path / "log")
+    with (
+        pytest.raises(InputError, match=f"Blender stopped while starting: {said}.* --device cpu if the GPU"),
+        Renderer(scene, setup),
+    ):
+        pass
+
+
+@pytest.mark.skipif(not BLENDER.exists(), reason="Blender's environment .venv-bake is not made here")
+def test_blender_renders_a_shot_that_darkens_the_iris_behind_the_lid(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path
+) -> None:
+    bake = bake_of(kit, scene, order(tmp_path, 2, 2))
+    with Renderer(scene, Setup(BLENDER, "studio", "cpu", 2, tmp_path / "log")) as renderer:
+        for shot in bake.shots[1:]:
+            renderer.render(shot)
+    opened, shut = (shot.read()["left"].astype(float) for shot in bake.shots[1:])
+    centre = tuple(slice(n // 2 - 2, n // 2 + 3) for n in opened.shape[:2])
+    assert shut[centre].mean() > 1.5 * opened[centre].mean()
+
+
+@pytest.mark.parametrize("name", ["alder", "birch", "cedar", "hazel"])
+def test_declared_identities_are_whole(name: str) -> None:
+    assert load_identity(name).label
+
+
+def test_faults_of_identities_are_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no identity 'aldre' in identities.toml"):
+        load_identity("aldre")
+    with pytest.raises(InputError, match="seed must lie between 0 and 999999; it is 1000000"):
+        identity_of_seed(1_000_000)
+    file = tmp_path / "mine.toml"
+    file.write_text(IDENTITIES_FILE.read_text().replace("age = 31", "age = 310"))
+    with pytest.raises(
+        InputError, match=r"mine.toml: alder.skin.age: Input should be less than or equal to 80"
+    ):
+        load_identity("alder", file)
+    file.write_text("not toml")
+    with pytest.raises(InputError, match="is not TOML"):
+        load_identity("alder", file)
+    with pytest.raises(InputError, match="cannot read identities"):
+        load_identity("alder", tmp_path / "none.toml")
+
+
+def test_sizes_and_lights_are_checked() -> None:
+    assert parse_size(None, "face") == FRAMINGS["face"].size_px
+    assert parse_size("1920x720", "eyes") == (1920, 720)
+    with pytest.raises(InputError, match="framing must be one of eyes, face; it is 'head'"):
+        parse_size(None, "head")
+    with pytest.raises(InputError, match="size 960x960 does not fit the framing 'eyes'"):
+        parse_size("960x960", "eyes")
+    with pytest.raises(InputError, match="size must be WIDTHxHEIGHT"):
+        parse_size("big", "eyes")
+    with pytest.raises(InputError, match="no light preset 'studoi'"):
+        load_light("studoi")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--identity", "alder", "--seed", "4"], "give either --identity NAME or --seed NUMBER"),
+        (["--seed", "-1"], "seed must lie between 0 and 999999; it is -1"),
+        (["--identity", "alder", "--levels", "10"], "levels must be one of"),
+        (["--identity", "alder", "--levels", "9", "--rendered", "17"], "cannot render 17 levels of an atlas"),
+        (["--identity", "alder", "--device", "tpu"], "device must be one of auto, cpu, gpu; it is 'tpu'"),
+        (["--identity", "alder"], "no face kit there"),
+    ],
+)
+def test_the_command_says_faults_in_one_line(tmp_path: Path, arguments: list[str], said: str) -> None:
+    result = CliRunner().invoke(app, ["bake", "face", "--facekit", str(tmp_path), *arguments])
+    assert result.exit_code != 0
+    fault = str(result.exception) if isinstance(result.exception, InputError) else result.output
+    assert said in " ".join(fault.split())

@@ -1,0 +1,97 @@
+"""Levels kept as frames of one video: what comes back, and what is said of a damaged one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.declaration import Declaration, Level, read_declaration
+from stimuli_builder.characters.example import CLOSURES, CROP, draw_crop
+from stimuli_builder.characters.level_video import decode_level_video, write_level_video
+from stimuli_builder.characters.photorealistic.development import psnr_db
+from stimuli_builder.characters.writing import write_declaration
+from stimuli_builder.clips.characters import find_character
+
+
+def textured(closure: float) -> np.ndarray:
+    """A level with skin-like noise that stands still, as a renderer's fixed seed gives."""
+    noise = np.random.default_rng(3).integers(-12, 13, (CROP[3], CROP[2], 3))
+    return np.clip(draw_crop(closure).astype(int) + noise, 0, 255).astype(np.uint8)
+
+
+@pytest.fixture
+def in_video(tiny_character: Path) -> Path:
+    """The example character with its levels in a video of odd size."""
+    video = write_level_video(tiny_character, "levels.mkv", [textured(closure) for closure in CLOSURES])
+    declared = read_declaration(tiny_character)
+    levels = tuple(
+        Level(closure=closure, frame=k, **video.model_dump()) for k, closure in enumerate(CLOSURES)
+    )
+    changed = Declaration.model_validate(declared.model_dump() | {"levels": levels, "lower_lid": None})
+    write_declaration(tiny_character, changed)
+    return tiny_character
+
+
+def test_levels_come_back_in_order_and_nearly_as_written(in_video: Path) -> None:
+    atlas = load_atlas(in_video)
+    atlas.check_files()
+    for number, closure in enumerate(CLOSURES):
+        assert psnr_db(atlas.level_srgb(number), textured(closure)) > 45
+
+
+def test_pictures_of_odd_size_keep_it(tmp_path: Path) -> None:
+    pictures = [np.full((31, 45, 3), (200, 120, 40 + k), np.uint8) for k in range(3)]
+    write_level_video(tmp_path, "odd.mkv", pictures)
+    frames = decode_level_video((tmp_path / "odd.mkv").read_bytes(), "levels", "odd.mkv")
+    assert frames.shape == (3, 31, 45, 3)
+    assert np.abs(frames.astype(int) - np.stack(pictures)).max() <= 2
+
+
+def test_the_same_pictures_give_the_same_bytes(tmp_path: Path) -> None:
+    pictures = [textured(closure) for closure in CLOSURES]
+    written = [write_level_video(tmp_path, name, pictures) for name in ("a.mkv", "b.mkv")]
+    assert written[0].sha256 == written[1].sha256
+
+
+def test_alike_levels_take_a_fraction_of_single_pictures(tmp_path: Path) -> None:
+    one = write_level_video(tmp_path, "one.mkv", [textured(0.5)])
+    many = write_level_video(tmp_path, "many.mkv", [textured(0.5)] * 9)
+    sizes = [(tmp_path / picture.file).stat().st_size for picture in (one, many)]
+    assert sizes[1] < 2 * sizes[0]
+
+
+def test_clips_read_a_character_kept_in_a_video(in_video: Path) -> None:
+    character = find_character(str(in_video))
+    levels = character.levels((48, 24))
+    assert len(levels.levels) == len(CLOSURES)
+    assert psnr_db(levels.picture(1.0)[4:20, 4:44], textured(1.0)) > 40
+    assert len(character.fingerprint) == 64
+
+
+def test_a_damaged_video_is_said_in_one_line(in_video: Path) -> None:
+    file = in_video / "levels.mkv"
+    file.write_bytes(file.read_bytes()[:-40])
+    with pytest.raises(InputError, match=r"atlas level 0 .* is damaged: levels.mkv does not match"):
+        load_atlas(in_video).check_files()
+
+
+def test_bytes_that_are_no_video_are_said_in_one_line() -> None:
+    with pytest.raises(InputError, match=r"levels is damaged: cannot decode x.mkv; bake it again"):
+        decode_level_video(b"no video at all", "levels", "x.mkv")
+
+
+def test_a_frame_beyond_the_video_is_refused(in_video: Path) -> None:
+    declared = read_declaration(in_video).model_dump()
+    declared["levels"][-1]["frame"] = 9
+    write_declaration(in_video, Declaration.model_validate(declared))
+    with pytest.raises(InputError, match=r"holds 4 of 40 x 16 px, the declaration asks for frame 9"):
+        load_atlas(in_video).check_files()
+
+
+def test_mattes_are_pictures(tiny_character: Path) -> None:
+    declared = read_declaration(tiny_character).model_dump()
+    declared["lower_lid"]["mattes"][0]["frame"] = 0
+    with pytest.raises(ValueError, match=r"lower_lid.mattes must be pictures"):
+        Declaration.model_validate(declared)
