@@ -7,6 +7,7 @@ import typer
 
 from analysis.commands.output import (
     JsonOption,
+    VerifyOption,
     check_folder,
     names_in,
     save_json,
@@ -49,6 +50,7 @@ def anova(
         str | None, typer.Option(help="Column that numbers a participant's trials; repeats are found by it.")
     ] = None,
     scale: Annotated[str | None, typer.Option(help="Refuse ratings outside, e.g. 1:7.")] = None,
+    verify_with_r: VerifyOption = False,
     two_factor_pairs: Annotated[
         bool, typer.Option("--two-factor-pairs", help="Also compare all cells of every two-factor margin.")
     ] = False,
@@ -84,6 +86,8 @@ def anova(
         raise InputError("no factor named; expected e.g. --within face,blur or --between group")
     if out is not None:
         check_folder(out)
+    elif verify_with_r:
+        raise InputError("--verify-with-r needs the folder of a report: add e.g. --out results")
     with saying("reading ratings"):
         data = read_long_table(
             file, participant, rating, factors, trial, scale_bounds(scale), groups, covariates
@@ -108,7 +112,7 @@ def anova(
     show(contents)
     save_json(json, contents.numbers)
     if out is not None:
-        save_report(contents, out)
+        save_report(contents, out, with_r=verify_with_r)
 
 
 def _bounds(text: str | None) -> tuple[float, float] | None:

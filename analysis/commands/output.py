@@ -23,6 +23,10 @@ def _writable(path: Path | None) -> Path | None:
     return path
 
 
+VerifyOption = Annotated[
+    bool,
+    typer.Option("--verify-with-r", help="Let R compute the report's tables anew, and compare."),
+]
 JsonOption = Annotated[
     Path | None, typer.Option(help="Write every number to this JSON file.", callback=_writable)
 ]
@@ -89,15 +93,22 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
     typer.echo(f"\nwritten: {path}")
 
 
-def save_report(contents: "Contents", folder: Path, more: bool = False) -> None:
-    """Write the report; `more` adds what takes long."""
+def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: bool = False) -> None:
+    """Write the report; `more` adds what takes long, `with_r` lets R compute its tables anew."""
     from analysis.report.formats import wrap
+    from analysis.report.verify_with_r import rscript, verify_with_r
     from analysis.report.write import write_report
 
+    if with_r:
+        rscript()
     with saying("writing") as say:
         paths = write_report(contents, folder, more, say)
     files = ", ".join(path.name for path in paths)
     typer.echo("\n" + "\n".join(wrap(f"written to {folder}: {files}")))
+    if with_r:
+        with saying("R"):
+            said = verify_with_r(paths)
+        typer.echo(f"\n{said}")
 
 
 @contextmanager

@@ -6,7 +6,15 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, check_folder, save_json, save_report, saying, show
+from analysis.commands.output import (
+    JsonOption,
+    VerifyOption,
+    check_folder,
+    save_json,
+    save_report,
+    saying,
+    show,
+)
 from experiments.errors import InputError
 
 
@@ -58,6 +66,7 @@ def run(
     sensitivity: Annotated[
         bool, typer.Option(help="Add what takes long to the report: mixed and ordinal models, Bayes factors.")
     ] = True,
+    verify_with_r: VerifyOption = False,
 ) -> None:
     """Analyse a study as its experiment declares: exclusions, the paper's table, every test, one report.
 
@@ -82,6 +91,8 @@ def run(
 
     if database is not None and csv is not None:
         raise InputError("--database and --csv exclude each other; give one")
+    if verify_with_r and not report:
+        raise InputError("--verify-with-r needs the report; leave --no-report out")
     declared = load_experiment(experiment)
     reading = plan_of(declared.trial.kind).reading
     folder = out or Path("out") / "analysis" / declared.name
@@ -104,4 +115,4 @@ def run(
     show(contents)
     save_json(json, contents.numbers)
     if report:
-        save_report(contents, folder, more=sensitivity)
+        save_report(contents, folder, more=sensitivity, with_r=verify_with_r)

@@ -39,6 +39,10 @@ def _no_pictures() -> tuple[Picture, ...]:
     return ()
 
 
+def _no_files(_: str) -> dict[str, bytes]:
+    return {}
+
+
 def _no_sections(_: Progress) -> tuple[Section, ...]:
     return ()
 
@@ -52,6 +56,8 @@ class Part:
     title: empty where the report has one part.
     tables: the first leads, the others are every test.
     draw: makes the figures, which takes time. more: makes further sections, which takes more.
+    beside: makes files that lie beside the report, by name; it is told the key of this part.
+    key: what the names of this part's files begin with, where there are several.
     """
 
     tables: tuple[Table, ...]
@@ -59,6 +65,8 @@ class Part:
     title: str = ""
     draw: Callable[[], tuple[Picture, ...]] = _no_pictures
     more: Callable[[Progress], tuple[Section, ...]] = _no_sections
+    beside: Callable[[str], dict[str, bytes]] = _no_files
+    key: str = ""
 
     def under(self, key: str, title: str) -> "Part":
         """The same as one of several parts: titled, its tables and figures in files that begin with `key`."""
@@ -67,7 +75,7 @@ class Part:
         def draw() -> tuple[Picture, ...]:
             return tuple(replace(one, key=f"{key}-{one.key}") for one in self.draw())
 
-        return replace(self, title=title, tables=tables, draw=draw)
+        return replace(self, title=title, tables=tables, draw=draw, key=key)
 
 
 @dataclass(frozen=True)

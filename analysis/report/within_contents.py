@@ -6,6 +6,7 @@ from analysis.plans.result import Analysis
 from analysis.report.contents import Contents, Part, Picture, Progress, Section
 from analysis.report.json_output import as_data
 from analysis.report.left_out import left_out
+from analysis.report.r_script import r_files
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables
 
@@ -50,7 +51,14 @@ def part_of(
     title: str = "",
 ) -> Part:
     """The tables, sentences and figures of one analysis."""
-    return Part(all_tables(analysis), sentences(analysis), title, lambda: draw_all(analysis), more)
+    return Part(
+        all_tables(analysis),
+        sentences(analysis),
+        title,
+        lambda: draw_all(analysis),
+        more,
+        lambda key: r_files(analysis, key),
+    )
 
 
 def methods_of(analysis: Analysis) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
 from analysis.report.contents import Contents, Picture, Progress, Section
-from analysis.report.formats import Table, as_latex, as_markdown
+from analysis.report.formats import Table, as_latex
+from analysis.report.templating import filled
 from experiments.errors import InputError
 from experiments.files import whole_file
 from experiments.json import json_text
@@ -31,8 +32,8 @@ def write_report(
 ) -> list[Path]:
     """Write every file of the report into `folder`, each whole or not at all; give back their paths.
 
-    Files: report.html, report.md, tables.tex, results.json, and figure-*.png and .svg. `more` adds the
-    sections that take long.
+    Files: report.html, report.md, tables.tex, results.json, figure-*.png and .svg, and what a part lays
+    beside. `more` adds the sections that take long.
     """
     make_folder(folder)
     progress("figures")
@@ -52,6 +53,8 @@ def write_report(
     files: dict[str, bytes] = {}
     for picture in (picture for part in parts for picture in part.pictures):
         files[f"{picture.key}.svg"], files[f"{picture.key}.png"] = picture.svg, picture.png
+    for part in contents.parts:
+        files.update(part.beside(part.key))
     files["tables.tex"] = _latex(contents, parts).encode()
     files["results.json"] = json_text(contents.numbers).encode()
     files["report.md"] = _render("report.md.j2", contents, parts).encode()
@@ -92,18 +95,4 @@ def self_check(said: tuple[str, ...]) -> str:
 
 
 def _render(template: str, contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
-    # as with matplotlib: commands that only print tables need not pay for the import
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("analysis", "report/templates"),
-        autoescape=template.endswith(".html.j2"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["markdown_table"] = as_markdown
-    return environment.get_template(template).render(
-        contents=contents, parts=parts, version=version("palpebra")
-    )
+    return filled(template, contents=contents, parts=parts, version=version("palpebra"))

@@ -109,8 +109,8 @@ def test_report_is_whole_marked_self_contained_and_byte_stable(tmp_path) -> None
         write_report(contents_of(analysis_of("exp3", tmp_path, 6)), folder)
     names = sorted(path.name for path in one.iterdir())
     assert names == [
-        *("figure-lower-lid.png", "figure-lower-lid.svg", "report.html", "report.md"),
-        *("results.json", "tables.tex"),
+        *("cell-means.csv", "figure-lower-lid.png", "figure-lower-lid.svg", "report.html", "report.md"),
+        *("results.json", "tables.tex", "verify.R"),
     ]
     assert all((one / name).read_bytes() == (two / name).read_bytes() for name in names)
     html = (one / "report.html").read_text(encoding="utf-8")
