@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test check setup setup-test lock format types bench scope load audit screenshots docs api clean
+.PHONY: addon playground help run test check setup setup-test lock format types bench scope load evidence audit screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -67,6 +67,9 @@ scope: setup-test ## what reaches a virtual screen against what is recorded (hou
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python tools/load.py $(LOAD)
+
+evidence: setup-test ## people and programs of every manner take part: who is caught, who is warned (EVIDENCE="--runs 20 --honest 100")
+	@$(BIN)/python -m tools.evidence_table $(EVIDENCE)
 
 addon: setup ## build the Blender add-on: dist/palpebra_blinks-VERSION.zip
 	@$(BIN)/python tools/build_addon.py

@@ -1,44 +1,134 @@
-"""Table of docs/evidence.md: which signal speaks against how many runs of each manner.
+"""`make evidence`: people and programs of every manner take part, and which signal speaks against whom.
 
-server simulate STUDY --as MANNER --participants 20 --json FOLDER/MANNER.json   (for each manner)
-python tools/evidence_table.py FOLDER
+python -m tools.evidence_table --runs 200 --honest 1000   a study of its own, `server simulate` once a manner
+python -m tools.evidence_table --folder FOLDER            the table of MANNER.json files that are there
 """
 
+import argparse
 import json
+import os
+import subprocess
 import sys
+import tempfile
+import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+from server.context import open_services
 from server.evidence.signals import SIGNAL_NAMES
 from server.evidence.verdict import VERDICTS, points_of
+from server.migrate import upgrade
+from server.settings import Settings
 from server.simulation.manners import MANNERS
+from tests.helpers.studies import SHORT, add_study
+
+Run = dict[str, Any]
+STUDY = "evidence"
+# 36 clips of three seconds, two checks, warnings as they are by default.
+TEXT = SHORT.replace("per_cell = 2", "per_cell = 9").replace('"short"', f'"{STUDY}"', 1)
+RULES = "".join(
+    f'[[warnings.rules]]\nrule = "{rule}"\n\n' for rule in ("same_answer", "repeated_pattern", "fast_answers")
+)
+CLIP_FRAMES = 90
+NEVER_LIKELY = ("http", "http-slow", "script")
 
 
-def main(folder: Path) -> None:
-    """Print the table for the files of this folder."""
-    runs = {
-        name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))["runs"] for name in MANNERS
-    }
-    rows = [("Runs", {name: str(len(found)) for name, found in runs.items()})]
-    rows.append(("Answers refused", {name: str(refused(found)) for name, found in runs.items()}))
-    for verdict in VERDICTS[:3]:
-        counts = {name: Counter(run["verdict"] for run in found)[verdict] for name, found in runs.items()}
-        rows.append((f"Verdict `{verdict}`", {name: str(count) for name, count in counts.items()}))
-    for signal in SIGNAL_NAMES:
-        against = {
-            name: sum(points_of(signal, run["signals"][signal]) < 0 for run in found if run["answers"])
-            for name, found in runs.items()
+def main() -> int:
+    """Print the table; 1 where it does not say what it must."""
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    asked.add_argument("--runs", type=int, default=200, help="of each manner but the honest one (200)")
+    asked.add_argument("--honest", type=int, default=1000, help="honest runs (1000)")
+    asked.add_argument("--only", nargs="+", choices=list(MANNERS), default=list(MANNERS), help="manners")
+    asked.add_argument("--folder", type=Path, help="take the files that lie here, and run nothing")
+    asked.add_argument("--out", type=Path, help="keep the files here")
+    options = asked.parse_args()
+    if options.folder is not None:
+        runs = {
+            name: read(options.folder, name)
+            for name in MANNERS
+            if (options.folder / f"{name}.json").is_file()
         }
-        rows.append((f"`{signal}` against", {name: str(count or "") for name, count in against.items()}))
-    lines = ["| | " + " | ".join(MANNERS) + " |", "|---|" + "--:|" * len(MANNERS)]
-    lines += [f"| {title} | " + " | ".join(cells[name] for name in MANNERS) + " |" for title, cells in rows]
-    sys.stdout.write("\n".join(lines) + "\n")
+    else:
+        counts = {name: options.honest if name == "honest" else options.runs for name in options.only}
+        with tempfile.TemporaryDirectory() as folder:
+            runs = simulated(Path(folder), options.out or Path(folder), counts)
+    if not runs:
+        sys.stderr.write("error: expected MANNER.json files of `server simulate --as`, found none\n")
+        return 2
+    sys.stdout.write(table(runs) + "\n")
+    faults = broken(runs)
+    sys.stderr.writelines(f"error: {fault}\n" for fault in faults)
+    return int(bool(faults))
 
 
-def refused(runs: list[dict[str, dict[str, int]]]) -> int:
-    """Answers refused in all runs."""
-    return sum(sum(run["refused"].values()) for run in runs)
+def simulated(data: Path, out: Path, counts: dict[str, int]) -> dict[str, list[Run]]:
+    """The runs of each manner on a new study, each by the command that anybody may give."""
+    settings = Settings(data_folder=data, database_url=f"sqlite:///{data / 'palpebra.sqlite'}")
+    services = open_services(settings)
+    upgrade(services.database)
+    add_study(services, data / "clips to add", f"{TEXT}\n[warnings]\n{RULES}", frames=CLIP_FRAMES)
+    services.database.close()
+    environment = {**os.environ, "PALPEBRA_DATA_FOLDER": str(data), "DATABASE_URL": settings.database_url}
+    for seed, (name, count) in enumerate(counts.items(), start=1):
+        begun = time.monotonic()
+        command = [sys.executable, "-m", "server", "simulate", STUDY, "--as", name, "--seed", str(seed)]
+        command += ["--participants", str(count), "--at-once", "2", "--json", str(out / f"{name}.json")]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+        sys.stderr.write(f"{name}: {count} runs in {time.monotonic() - begun:.0f} s\n")
+    return {name: read(out, name) for name in counts}
+
+
+def read(folder: Path, name: str) -> list[Run]:
+    """The runs in the file of a manner."""
+    runs: list[Run] = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))["runs"]
+    return runs
+
+
+def table(runs: dict[str, list[Run]]) -> str:
+    """A column a manner, a row a verdict and a signal, as Markdown."""
+    rows = [("Runs", {name: len(found) for name, found in runs.items()})]
+
+    def count(title: str, counted: Callable[[Run], float]) -> None:
+        rows.append((title, {name: int(sum(map(counted, found))) for name, found in runs.items()}))
+
+    count("Answers refused", lambda run: sum(run["refused"].values()))
+    for verdict in VERDICTS[:3]:
+        count(f"Verdict `{verdict}`", lambda run, verdict=verdict: run["verdict"] == verdict)  # type: ignore[misc]
+    count("Warned", lambda run: bool(run["warned"]))
+    count("Ended after warnings", lambda run: run["ended"])
+    for signal in SIGNAL_NAMES:
+        count(f"`{signal}` against", lambda run, signal=signal: speaks_against(run, signal))  # type: ignore[misc]
+    lines = ["| | " + " | ".join(runs) + " |", "|---|" + "--:|" * len(runs)]
+    lines += [
+        f"| {title} | " + " | ".join(str(cells[name] or "") for name in runs) + " |" for title, cells in rows
+    ]
+    return "\n".join(lines)
+
+
+def speaks_against(run: Run, signal: str) -> bool:
+    """Whether a signal takes points from a run that has answers."""
+    return bool(run["answers"]) and points_of(signal, run["signals"].get(signal)) < 0
+
+
+def broken(runs: dict[str, list[Run]]) -> list[str]:
+    """What the table must say and does not."""
+    faults = []
+    for name in NEVER_LIKELY:
+        likely = sum(run["verdict"] == "likely" for run in runs.get(name, []))
+        if likely:
+            faults.append(f"{name}: expected no run likely a person's, got {likely}")
+    honest = Counter(run["verdict"] == "likely" for run in runs.get("honest", []))
+    if honest[False] >= 0.01 * honest.total() > 0:
+        faults.append(f"honest: expected under 1% not likely, got {honest[False]} of {honest.total()}")
+    for name, low, high in (("careless", 0.9, 1.01), ("honest", -0.01, 0.01)):
+        found = runs.get(name, [])
+        warned = sum(bool(run["warned"]) for run in found)
+        if found and not low * len(found) < warned < high * len(found):
+            faults.append(f"{name}: warned {warned} of {len(found)}")
+    return faults
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    sys.exit(main())

@@ -43,6 +43,13 @@ def run(
         ),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="A CSV export instead of a database.")] = None,
+    runs: Annotated[
+        Path | None,
+        typer.Option(
+            help="The runs CSV (`server export --format runs`): verdicts on the runs and their signals.",
+            show_default=False,
+        ),
+    ] = None,
     study: Annotated[str | None, typer.Option(help="Name of the study, where there are several.")] = None,
     origin: Annotated[
         Origin | None,
@@ -79,6 +86,8 @@ def run(
       analysis run exp2 --database postgresql://me@host/palpebra --study spring
 
       analysis run exp1 --origin pilot --series 2
+
+      analysis run exp3 --csv ratings.csv --runs runs.csv
     """
     from analysis.errors import NoRatingsError
     from analysis.plans.plan import plan_of
@@ -86,6 +95,7 @@ def run(
     from analysis.read.database import default_url
     from analysis.read.pool import Origin as PoolOrigin
     from analysis.read.pool import Pool
+    from analysis.read.runs_file import read_runs
     from analysis.read.study_answers import load_csv, load_database
     from experiments.load import load_experiment
 
@@ -108,7 +118,7 @@ def run(
                     database or default_url(), declared, reading, study, report and sensitivity
                 )
             )
-            contents = study_contents(declared, answers, pool)
+            contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None)
     except NoRatingsError as error:
         typer.echo(f"nothing to analyse: {error}", err=True)
         raise typer.Exit(1) from None

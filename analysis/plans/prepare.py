@@ -10,7 +10,9 @@ from analysis.errors import NoRatingsError
 from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.plans.plan import Plan, plan_of
 from analysis.read.pool import Pool, pooled
+from analysis.read.runs_file import RunEvidence, with_verdicts
 from analysis.read.study_answers import StudyAnswers
+from analysis.report.evidence import evidence_section
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 
@@ -34,10 +36,17 @@ class Prepared:
         return self.exclusions.rows
 
 
-def study_contents(experiment: Experiment, answers: StudyAnswers, pool: Pool = Pool()) -> "Contents":
-    """Analyse a study by the plan of its kind of trial."""
+def study_contents(
+    experiment: Experiment, answers: StudyAnswers, pool: Pool = Pool(), runs: RunEvidence | None = None
+) -> "Contents":
+    """Analyse a study by the plan of its kind of trial; `runs` are verdicts and signals of a runs file."""
     plan = plan_of(experiment.trial.kind)
-    return plan.analyse(prepare(experiment, plan, answers, pool))
+    answers = with_verdicts(answers, runs) if runs else answers
+    contents = plan.analyse(prepare(experiment, plan, answers, pool))
+    evidence, numbers = evidence_section(pooled(answers.rows, pool, answers.source)[0], runs)
+    if evidence is None:
+        return contents
+    return replace(contents, evidence=evidence, numbers=contents.numbers | {"evidence": numbers})
 
 
 def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Pool = Pool()) -> Prepared:

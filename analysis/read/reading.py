@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 
 from experiments.columns import View, names_of
-from experiments.columns.base import EXCLUSION, LEVELS, ORIGIN, RUN, STUDY
+from experiments.columns.base import EVIDENCE, EXCLUSION, LEVELS, ORIGIN, RUN, STUDY
 
 _NOT_ASKED = ("run", "language")
-_OF_A_RUN = tuple(column for column in (*STUDY, *RUN, *EXCLUSION, *ORIGIN) if column.name not in _NOT_ASKED)
+_OF_A_RUN = tuple(
+    column for column in (*STUDY, *RUN, *EXCLUSION, *ORIGIN, *EVIDENCE) if column.name not in _NOT_ASKED
+)
 RUN_TEXTS = names_of(_OF_A_RUN, "text", "integer")
 RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
 """Columns that are the same for all rows of a run."""

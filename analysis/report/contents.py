@@ -87,6 +87,7 @@ class Contents:
     lead: how many participants, and what was asked of them.
     numbers: every number, as the JSON file has it.
     given: what people gave (ratings, comparisons), for the mark of synthetic data.
+    evidence: whether people gave it; None where the data do not say.
     """
 
     name: str
@@ -101,3 +102,4 @@ class Contents:
     methods: str
     numbers: dict[str, Any] = field(repr=False)
     given: str = "answers"
+    evidence: Section | None = None

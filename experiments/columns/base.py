@@ -297,3 +297,16 @@ VIEWS: tuple[Column, ...] = (
     ),
 )
 """Each view of the trial, as it was begun and as it ended."""
+
+VERDICTS = ("likely", "unclear", "unlikely", "not_judged")
+
+EVIDENCE: tuple[Column, ...] = (
+    Column(
+        "evidence_verdict",
+        "text",
+        "Whether the run's answers are likely a person's; not_judged until the run is over, and where the "
+        "page brought no evidence.",
+        values=VERDICTS,
+        source="coalesce(r.evidence_verdict, 'not_judged')",
+    ),
+)

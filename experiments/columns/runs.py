@@ -1,6 +1,6 @@
 """The columns of the runs CSV: one row a visit."""
 
-from experiments.columns.base import ORIGINS
+from experiments.columns.base import ORIGINS, VERDICTS
 from experiments.columns.column import Column
 
 
@@ -69,7 +69,7 @@ RUN_COLUMNS: tuple[Column, ...] = (
         "evidence_verdict",
         "text",
         "Whether the answers are likely a person's; not_judged where the page brought no evidence.",
-        values=("likely", "unclear", "unlikely", "not_judged"),
+        values=VERDICTS,
     ),
     Column("evidence_points", "number", "Points of all signals together, on which the verdict rests."),
     *EVIDENCE_COLUMNS,

@@ -14,6 +14,7 @@ from experiments.rules.attention import AttentionChecks
 from experiments.rules.drop_failed_plays import DropFailedPlays
 from experiments.rules.drop_slow_trials import DropSlowTrials
 from experiments.rules.exclude_attention import ExcludeAttention
+from experiments.rules.exclude_evidence import ExcludeEvidence
 from experiments.rules.exclude_fast import ExcludeFast
 from experiments.rules.exclude_incomplete import ExcludeIncomplete
 from experiments.rules.exclude_playback import ExcludePlayback
@@ -38,6 +39,7 @@ ExclusionRule = Annotated[
     | ExcludePlayback
     | ExcludeStraightLining
     | ExcludeFast
+    | ExcludeEvidence
     | DropFailedPlays
     | DropSlowTrials,
     Field(discriminator="rule"),
@@ -49,6 +51,7 @@ __all__ = [
     "DropFailedPlays",
     "DropSlowTrials",
     "ExcludeAttention",
+    "ExcludeEvidence",
     "ExcludeFast",
     "ExcludeIncomplete",
     "ExcludePlayback",

@@ -32,6 +32,9 @@ OF_RUNS: dict[str, str] = {
     "unclear": f"{COMPLETE} AND r.evidence_verdict = 'unclear'",
     "unlikely": f"{COMPLETE} AND r.evidence_verdict = 'unlikely'",
     "not_judged": f"{COMPLETE} AND coalesce(r.evidence_verdict, 'not_judged') = 'not_judged'",
+    "warned": "EXISTS (SELECT 1 FROM run_events e WHERE e.study_run_id = r.id AND e.type = 'warned')",
+    "ended_by_warnings": "EXISTS (SELECT 1 FROM run_events e WHERE e.study_run_id = r.id "
+    "AND e.type = 'screened_out' AND CAST(e.data AS text) LIKE '%\"lapse\"%')",
     "refused": "EXISTS (SELECT 1 FROM run_events e "
     "WHERE e.study_run_id = r.id AND e.type = 'answer_refused')",
 }

@@ -1,4 +1,4 @@
-"""The Methods paragraph: sentences whose every number names its source; plain text and LaTeX.
+"""The Methods paragraph: sentences whose every number names its source; plain text, LaTeX, HTML.
 
 A sentence is a template with {name} for a number, {name:s} for the ending of its plural, and words for
 what was declared.
@@ -8,6 +8,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from html import escape
 
 from experiments.definition import Experiment
 from server.methods.numbers import Number
@@ -51,6 +52,20 @@ class Methods:
                 lines.append(f"% {name} = {number.value}: {number.source}")
         return "\n".join(lines) + "\n"
 
+    def html(self) -> str:
+        """The paragraph, each number a link to its source in the list below it."""
+        order = self._order()
+        link = '<a href="#methods-{mark}">{value}</a>'
+        paragraph = " ".join(self._filled(escape(sentence), order, link) for sentence in self.sentences)
+        sources = "\n".join(
+            f'<li id="methods-{mark}">{escape(name)}: <code>{escape(self.numbers[name].source)}</code></li>'
+            for name, mark in order.items()
+        )
+        return (
+            f'<h2 id="methods-paragraph">Methods paragraph</h2>\n<p>{paragraph}</p>\n'
+            f"<details><summary>Where each number comes from</summary>\n<ol>\n{sources}\n</ol>\n</details>\n"
+        )
+
     def json(self) -> str:
         """Paragraph and numbers for programs."""
         content = {
@@ -89,6 +104,7 @@ def sentences(
         *_recruitment(recruiter, found),
         *_screening(experiment),
         *_checks(experiment),
+        *_warnings(experiment),
         *_exclusions(experiment, rules),
         *_display(experiment),
         *_evidence(found),
@@ -121,6 +137,14 @@ def _checks(experiment: Experiment) -> list[str]:
     each = experiment.attention.per_block
     declared = f"{each} instructed answer{'s' * (each != 1)} a block"
     return [f"Attention was checked by {declared}; completed visits hold {{checks}}."] if each else []
+
+
+def _warnings(experiment: Experiment) -> list[str]:
+    names = ", ".join(rule.rule.replace("_", " ") for rule in experiment.warnings.rules)
+    if not names:
+        return []
+    ends = " {ended_by_warnings} were ended since they went on." if experiment.warnings.then == "end" else ""
+    return [f"While taking part people were warned of {names}, in {{warned}} visits.{ends}"]
 
 
 def _exclusions(experiment: Experiment, rules: Sequence[tuple[str, str]]) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.files import whole_file
 from server.methods.numbers import Number, numbers
 from server.methods.paragraph import Methods, sentences
 from server.models import Study
@@ -14,6 +15,8 @@ from server.studies.lookup import definition_of
 from server.studies.series import version_of_series
 
 RESULTS = "results.json"
+PLACE = "<!-- after the method -->"
+"""Where `analysis run` leaves room in its page."""
 
 
 def methods_of(
@@ -40,7 +43,11 @@ def read_results(folder: Path) -> dict[str, Any] | None:
 
 
 def write(folder: Path, methods: Methods) -> None:
-    """Put the paragraph beside a report: as text, as LaTeX, and with its numbers as JSON."""
+    """Put the paragraph into a report, and beside it as text, as LaTeX, and with its numbers as JSON."""
+    page = folder / "report.html"
+    written = page.read_text(encoding="utf-8").replace(PLACE, methods.html(), 1)
+    with whole_file(page) as temporary:
+        temporary.write_text(written, encoding="utf-8")
     for name, content in (("txt", methods.text()), ("tex", methods.latex()), ("json", methods.json())):
         (folder / f"methods.{name}").write_text(content, encoding="utf-8")
 

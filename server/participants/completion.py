@@ -36,6 +36,7 @@ def complete_run(services: Services, session: Session, token: str) -> Completion
         run.evidence_verdict = judge_run(session, run).verdict
         _close_when_full(session, study, run)
     if run.status == "screened_out":
+        run.evidence_verdict = run.evidence_verdict or judge_run(session, run).verdict
         return _screened_out(session, run, loaded.experiment)
     if run.status != "complete":
         raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")

@@ -13,6 +13,7 @@ from server.clock import now
 from server.context import Services
 from server.db import insert_once
 from server.evidence.schemas import Tickets
+from server.evidence.service import judge_run
 from server.evidence.tickets import issue, tickets
 from server.models import NO_SLOT, Calibration, RunEvent, StudyRun
 from server.participants import bounds, repository, screening
@@ -210,4 +211,5 @@ def withdraw(session: Session, token: str) -> Saved:
     run = find_run(session, token, lock=True)
     if run.status == "active":
         run.status, run.last_seen_at = "withdrawn", now()
+        run.evidence_verdict = judge_run(session, run).verdict
     return saved(run)

@@ -16,6 +16,7 @@ from server.accounts.identity import Identity
 from server.clock import now
 from server.context import Services
 from server.errors import Conflict, NotFound
+from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.methods.service import methods_of, read_results, write
 from server.models import Job, Study
@@ -127,15 +128,16 @@ def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> 
 
 
 def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> int:
-    """Write the ratings and the declaration of a series; return the series."""
+    """Write the ratings, the runs and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
     with services.database.read() as session:
         study = find_study(session, name)
         version = version_of_series(session, study, wanted.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
         with (inputs / "answers.csv").open("wb") as stream:
-            for piece in csv_pieces(rating_table(session, study, wanted.origin)):
-                stream.write(piece)
+            stream.writelines(csv_pieces(rating_table(session, study, wanted.origin)))
+        with (inputs / "runs.csv").open("wb") as stream:
+            stream.writelines(runs_csv(session, study, wanted.origin))
         return version.series
 
 
@@ -143,6 +145,7 @@ def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
     """Run the analysis; return its own error line where it failed, else an empty text."""
     program = Path(sys.executable).with_name("analysis")
     command = [str(program), "run", str(inputs / "definition.toml"), "--csv", str(inputs / "answers.csv")]
+    command += ["--runs", str(inputs / "runs.csv")]
     command += ["--origin", wanted.origin, "--series", str(series), "--out", str(folder)]
     command += [] if wanted.sensitivity else ["--no-sensitivity"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603

@@ -52,8 +52,7 @@ class Actor(Person):
             if not due or self._is_over():
                 break
             for trial in due:
-                if not self._is_over():
-                    self.rate(trial, state["trial"])
+                self.rate(trial, state["trial"])
             self._deliver()
             state = self._state()
         if self._is_over() or not self._forms(state, "after"):

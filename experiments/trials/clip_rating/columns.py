@@ -76,6 +76,7 @@ RATINGS = View(
         *base.CLOCK,
         *SCALE,
         *base.VIEWS,
+        *base.EVIDENCE,
     ),
     rows=_rows,
 )

@@ -83,6 +83,7 @@ COMPARISONS = View(
         *base.ORIGIN,
         *base.CLOCK,
         *base.VIEWS,
+        *base.EVIDENCE,
     ),
     rows=rows_of("paired_comparison", _ROLES),
 )

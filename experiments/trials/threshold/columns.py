@@ -114,6 +114,7 @@ THRESHOLDS = View(
         *base.ORIGIN,
         *base.CLOCK,
         *base.VIEWS,
+        *base.EVIDENCE,
     ),
     rows=rows_of("threshold", {}, _TABLES),
 )

@@ -2580,6 +2580,26 @@ export interface components {
             more_than: number;
         };
         /**
+         * ExcludeEvidence
+         * @description Leave out runs by the verdict on whether a person answered (docs/evidence.md).
+         */
+        ExcludeEvidence: {
+            /**
+             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            rule: "evidence_verdict";
+            /**
+             * Verdicts
+             * @description Verdicts that leave a run out. Assistive technology can be `unclear`; runs of pages that brought no
+             *     evidence are `not_judged`.
+             * @default [
+             *       "unlikely"
+             *     ]
+             */
+            verdicts: ("unlikely" | "unclear" | "not_judged")[];
+        };
+        /**
          * ExcludeFast
          * @description Leave out participants whose median response time lies below `below_ms`.
          */
@@ -2875,7 +2895,7 @@ export interface components {
              * @description Rules, fixed before the data, that leave out runs or trials when the study is analysed.
              * @default []
              */
-            exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"])[];
+            exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["ExcludeEvidence"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"])[];
             /**
              * Forms
              * @description Questionnaires before and after the trials.
@@ -7007,6 +7027,7 @@ export type Events = components['schemas']['Events'];
 export type Evidence = components['schemas']['Evidence'];
 export type Exclude = components['schemas']['Exclude'];
 export type ExcludeAttention = components['schemas']['ExcludeAttention'];
+export type ExcludeEvidence = components['schemas']['ExcludeEvidence'];
 export type ExcludeFast = components['schemas']['ExcludeFast'];
 export type ExcludeIncomplete = components['schemas']['ExcludeIncomplete'];
 export type ExcludePlayback = components['schemas']['ExcludePlayback'];

@@ -61,6 +61,7 @@ def test_export_and_database_give_the_same_numbers(tmp_path, rows) -> None:
         (rules.ExcludePlayback(more_than=0.2), {"verdict": "flagged"}, "poor_playback_share: 100% of plays"),
         (rules.ExcludeStraightLining(), {"response": 4}, "same_response_share: 100% of answers are the same"),
         (rules.ExcludeFast(below_ms=200), {"rt": 150}, "median_response_time: median 150 ms"),
+        (rules.ExcludeEvidence(), {"evidence_verdict": "unlikely"}, "evidence_verdict: unlikely"),
     ],
 )
 def test_a_participant_rule_excludes_by_name_with_its_reason(tmp_path, rows, rule, values, reason) -> None:

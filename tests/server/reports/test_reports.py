@@ -1,3 +1,4 @@
+import re
 import time
 from typing import Any
 
@@ -34,6 +35,12 @@ def test_a_report_is_built_by_a_process_of_its_own(
     shown = experimenter.get(f"/studies/short/reports/{report['id']}/{page}")
     assert "<html" in shown.text
     assert "sandbox" in shown.headers["content-security-policy"]
+    # Verdicts and signals by the analysis; the Methods by the server, its numbers linked to their queries.
+    assert "Evidence that answers are a person" in shown.text
+    assert re.search(r"tickets: Share of answers with a good ticket.*?<td", shown.text, re.S)
+    assert 'completed visits hold <a href="#methods-' in shown.text
+    for mark in re.findall(r'href="#methods-(\d+)"', shown.text):
+        assert re.search(rf'<li id="methods-{mark}">\w+: <code>SELECT count', shown.text)
 
 
 def test_a_report_on_no_data_fails_with_a_reason(experimenter: Admin, study: StudyInDatabase) -> None:
