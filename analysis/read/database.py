@@ -88,7 +88,9 @@ class AnswersQuery:
 
     def _of_runs(self, run: "pd.Categorical[str]") -> dict[str, Any]:
         """The columns of every row's run."""
-        names = ["run", *RUN_TEXTS, *RUN_FLAGS]
+        there = self._reading.view.names
+        texts, flags = ([name for name in names if name in there] for names in (RUN_TEXTS, RUN_FLAGS))
+        names = ["run", *texts, *flags]
         found = [
             row
             for rows in self._portions(f"DISTINCT {', '.join(names)} FROM {self._view} WHERE {self._where}")
@@ -98,9 +100,9 @@ class AnswersQuery:
         wanted = [of_run[name] for name in run.categories]
         taken = run.codes.astype(np.int64)
         columns: dict[str, Any] = {}
-        for i, name in enumerate(RUN_TEXTS):
+        for i, name in enumerate(texts):
             columns[name] = categorical(taken, ["" if row[i] is None else str(row[i]) for row in wanted])
-        for i, name in enumerate(RUN_FLAGS, len(RUN_TEXTS)):
+        for i, name in enumerate(flags, len(texts)):
             columns[name] = np.array([bool(row[i]) for row in wanted], dtype=bool)[taken]
         return columns
 

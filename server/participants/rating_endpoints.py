@@ -1,5 +1,6 @@
 """The one endpoint that must never lose anything: a rating is answered after it is committed."""
 
+from typing import Any
 from uuid import UUID
 
 from fastapi import APIRouter, Request, Response
@@ -29,11 +30,11 @@ async def put_rating(
         return service.save_rating(*work, received_at)
 
     receipt, is_new = await services.group_commit.run(token, save)
-    adapts = KINDS[rating.answer.kind].adapts
-    if adapts:
+    left_out: dict[str, Any] = {} if receipt.warning else {"receipt": {"warning"}}
+    if KINDS[rating.answer.kind].adapts:
         receipt, following = await run_in_threadpool(next_trials, services, token, receipt)
-        content = RatingSaved(receipt=receipt, next=following).model_dump_json()
+        content = RatingSaved(receipt=receipt, next=following).model_dump_json(exclude=left_out)
     else:
-        content = RatingSaved(receipt=receipt).model_dump_json(exclude={"next"})
+        content = RatingSaved(receipt=receipt).model_dump_json(exclude=left_out | {"next": True})
     # A finished response, so that FastAPI does not validate and encode the receipt once more.
     return Response(content, 201 if is_new else 200, media_type="application/json")  # type: ignore[return-value]

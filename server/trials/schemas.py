@@ -176,7 +176,9 @@ class Receipt(BaseModel):
     again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
     remaining: int = Field(description="Trials of the run that still need an answer.")
     status: RunStatus = Field(description="Of the run: screened_out where this answer ended it.")
-    warning: WarningShown | None = Field(default=None, description="To be shown before the next trial.")
+    warning: WarningShown | None = Field(
+        default=None, description="To be shown before the next trial; left out where there is none."
+    )
 
 
 class NextTrials(BaseModel):

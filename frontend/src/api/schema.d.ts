@@ -4646,7 +4646,7 @@ export interface components {
              * @enum {string}
              */
             status: "active" | "complete" | "screened_out" | "withdrawn";
-            /** @description To be shown before the next trial. */
+            /** @description To be shown before the next trial; left out where there is none. */
             warning?: components["schemas"]["WarningShown"] | null;
         };
         /**

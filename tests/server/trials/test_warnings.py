@@ -66,8 +66,8 @@ def test_the_fifth_equal_answer_is_warned_of_in_the_participant_s_words(warned: 
     participant = warned()
     participant.request("PUT", "/language", {"language": "de"})
     receipts = rate(participant, main_trials(participant)[:5])
-    assert [one["warning"] for one in receipts[:4]] == [None] * 4
-    warning = receipts[4]["warning"]
+    assert [one.get("warning") for one in receipts[:4]] == [None] * 4
+    warning = receipts[4].get("warning")
     assert (warning["rule"], warning["number"], warning["maximum"]) == ("same_answer", 1, 2)
     assert "Ihre letzten Antworten waren alle gleich" in warning["text"]
     assert participant.state()["warning"] == warning
@@ -79,7 +79,7 @@ def test_who_goes_on_is_ended_with_the_code_of_a_failed_check(warned: Warned, se
     participant = warned()
     trials = main_trials(participant)
     for part in (trials[:5], trials[5:10]):
-        assert rate(participant, part)[-1]["warning"]
+        assert rate(participant, part)[-1].get("warning")
         show(participant)
     assert [one["status"] for one in rate(participant, trials[10:15])] == ["active"] * 4 + ["screened_out"]
     assert participant.rate(trials[15], 4).json()["error"]["code"] == "run_closed"
@@ -114,7 +114,7 @@ def test_nobody_is_ended_by_answers_from_before_a_warning_was_read(warned: Warne
     """An outbox that delivers everything at once leads to one warning, however many answers it holds."""
     participant = warned()
     receipts = rate(participant, main_trials(participant)[:30])
-    assert sum(one["warning"] is not None for one in receipts) == 1
+    assert sum(one.get("warning") is not None for one in receipts) == 1
     assert receipts[-1]["status"] == "active"
 
 
@@ -125,7 +125,7 @@ def test_who_mends_their_ways_hears_no_more(warned: Warned) -> None:
     show(participant)
     for place, trial in enumerate(trials[5:]):
         receipt = rate(participant, [trial], response=1 + place * 3 % 7)[0]
-        assert receipt["warning"] is None
+        assert receipt.get("warning") is None
         assert receipt["status"] == "active"
 
 
@@ -146,7 +146,7 @@ def test_warnings_alone_end_nothing(warned: Warned) -> None:
     rate(participant, trials[:5])
     show(participant)
     receipts = rate(participant, trials[5:])
-    assert {(one["warning"], one["status"]) for one in receipts} == {(None, "active")}
+    assert {(one.get("warning"), one["status"]) for one in receipts} == {(None, "active")}
 
 
 def test_practice_and_checks_are_warned_of_by_nothing(warned: Warned) -> None:
@@ -154,8 +154,8 @@ def test_practice_and_checks_are_warned_of_by_nothing(warned: Warned) -> None:
     others = [trial for trial in participant.state()["trials"] if trial["kind"] == "practice"]
     main = main_trials(participant)
     receipts = rate(participant, [*others, *main[:4]], rt=20.0)
-    assert all(one["warning"] is None for one in receipts)
-    assert rate(participant, main[4:5], rt=20.0)[0]["warning"]["rule"] == "fast_answers"
+    assert all(one.get("warning") is None for one in receipts)
+    assert rate(participant, main[4:5], rt=20.0)[0].get("warning")["rule"] == "fast_answers"
 
 
 def given(values: list[Any], rt: float | None = 700.0) -> list[GivenAnswer]:
