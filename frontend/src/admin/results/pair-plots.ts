@@ -56,6 +56,7 @@ export function levelPlot(name: string, { levels }: Data, factors: Factors): Plo
   if (rows.length === 0) return null;
   return {
     height: 210,
+    marginLeft: 48,
     marginBottom: 52,
     x: { domain: labels.all, label: null },
     y: { domain: [0, 1], tickFormat: ".0%", grid: true, label: "chosen over other levels" },

@@ -34,10 +34,7 @@ export function seriesPlot(series: Series, along: string, positive: string): Plo
     y: { domain: [-0.06, 1], ticks: [0, 0.25, 0.5, 0.75, 1], tickFormat: ".0%", grid: true, label: positive },
     marks: [
       ...(series.mean === null ? [] : [Plot.ruleX([series.mean], { strokeDasharray: "4 3" })]),
-      Plot.tickX(
-        series.thresholds.map((threshold) => ({ threshold })),
-        { x: "threshold", y: -0.04, insetTop: 0, strokeOpacity: 0.5 },
-      ),
+      Plot.ruleX(series.thresholds, { x: (threshold: number) => threshold, y1: () => -0.06, y2: () => -0.01, strokeOpacity: 0.5 }),
       Plot.dot(rows, { x: "value", y: "share", r: radius, fill: "currentColor", fillOpacity: 0.7, tip: true, channels: { answers: "n" } }),
     ],
   };
