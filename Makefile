@@ -49,6 +49,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' --benchmark-only --benchmark-columns=min,median,rounds -s
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_tracking.py
 	@for size in 960x360 1920x720; do PYTHONPATH=. $(BIN)/python tests/bench/clip_memory.py $$size; done
+	@PYTHONPATH=. $(BIN)/python tests/bench/performance_memory.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_server.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_workers.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_labels.py

@@ -89,8 +89,11 @@ class Parameters:
         """
         if not 0.1 <= per_minute <= 60.0:
             raise ValueError(f"expected a blink rate of 0.1 to 60 a minute, got {per_minute}")
-        intervals = {**self.intervals, state: self.intervals[state].with_mean(60.0 / per_minute)}
-        return Parameters(**{**_own(self), "intervals": intervals})
+        return self.with_intervals({state: self.intervals[state].with_mean(60.0 / per_minute)})
+
+    def with_intervals(self, laws: Mapping[StateName, Law]) -> "Parameters":
+        """Return the same with other laws of the intervals in some states."""
+        return Parameters(**{**_own(self), "intervals": {**self.intervals, **laws}})
 
     def with_profile(self, **changes: Any) -> "Parameters":
         """Return the same with some values of the profile model changed."""

@@ -27,6 +27,7 @@ class Clip(Declaration):
     closure: closure at 300 fps over the whole clip (0 open, 1 closed); empty for clips not made here.
     closure_other: the right eye's, where the eyes move apart. lower_vertical_mm, lower_horizontal_mm: the
     lower lid's lift and its slide towards the nose, at 300 fps; empty where it rests.
+    blinks_s: onsets of the blinks of a performance, in s from the clip's start; left out of other clips.
     onset_frame: output frame at which the blink begins. width_mm: shown width at actual size.
     """
 
@@ -49,6 +50,7 @@ class Clip(Declaration):
     closure_other: tuple[float, ...] = ()
     lower_vertical_mm: tuple[float, ...] = ()
     lower_horizontal_mm: tuple[float, ...] = ()
+    blinks_s: tuple[float, ...] = Field(default=(), exclude_if=lambda blinks: not blinks)
     inputs: dict[str, str] = Field(default_factory=dict)
     seed: int | None = None
 

@@ -28,6 +28,13 @@ DurationFrames = Annotated[float, Field(ge=3, le=600)]
 DurationMs = Annotated[float, Field(ge=100, le=2000)]
 CountingRate = Annotated[float, Field(ge=15, le=1000)]
 MIN_BLINK_MS, MAX_BLINK_MS = 100.0, 2000.0
+Timing = Literal["uniform", "intervals", "events", "none"]
+State = Literal["rest", "reading", "screen", "speaking", "listening"]
+EventKind = Literal["utterance_start", "utterance_end", "pause", "turn_end"]
+Seconds = Annotated[float, Field(ge=1, le=60)]
+PerMinute = Annotated[float, Field(ge=0.1, le=60)]
+Moment = Annotated[float, Field(ge=0, le=60)]
+Moments = Annotated[tuple[Moment, ...], Field(max_length=100)]
 
 
 class RenderSettings(Declaration):
@@ -53,6 +60,25 @@ class RenderSettings(Declaration):
     """Which recorded signals move the lower lid."""
     eyes: Literal["alike", "separate"] = "alike"
     """One signal drives both eyes, or the left and the right recording an eye each."""
+    performance: Timing | None = None
+    """Shows a performance of the blink engine for `seconds` instead of a single blink. What times its blinks:
+    a timer whose intervals lie evenly between half and one and a half times their mean (`uniform`), the
+    engine's fitted intervals (`intervals`), these and the events of `events_s` or `speech` (`events`), or
+    nothing, the eyes staying open (`none`). Blink n of an exemplar looks the same whatever times it. The keys
+    `profile` and of the blink's length are for single blinks."""
+    seconds: Seconds = 20.0
+    """Length of a performance, in seconds."""
+    state: State = "listening"
+    """What the person of a performance does, which sets the mean blink rate (docs/blink-engine.md)."""
+    blinks_per_minute: PerMinute | None = None
+    """Mean blink rate of a performance; left out, that published for its state."""
+    events_s: Moments = ()
+    """Moments that blinks answer where `performance` is `events`, in seconds from the clip's start."""
+    event: EventKind = "turn_end"
+    """What happens at the moments of `events_s`."""
+    speech: str = ""
+    """A recording with sound or subtitles (.vtt, .srt) beside the TOML whose pauses and turns blinks answer,
+    where `performance` is `events`; the person speaks then, and is in `state` between turns."""
     fps: Fps = 30
     """Frame rate of the clip, in frames per second."""
     width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
@@ -69,6 +95,17 @@ class RenderSettings(Declaration):
             raise ValueError(
                 f"expected a blink of {MIN_BLINK_MS:g} to {MAX_BLINK_MS:g} ms, got duration_frames "
                 f"{self.duration_frames:g} at {self.duration_frames_fps:g} fps, {length_ms:.0f} ms"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _performance_fits(self) -> Self:
+        answers = bool(self.events_s or self.speech)
+        if self.performance == "events" and not answers:
+            raise ValueError("performance is 'events': expected events_s or speech, got neither")
+        if self.events_s and max(self.events_s) > self.seconds:
+            raise ValueError(
+                f"events_s: expected moments within the {self.seconds:g} s, got {max(self.events_s):g}"
             )
         return self
 
@@ -101,6 +138,20 @@ class RenderOverrides(Declaration):
     """As [render] `lower_lid`, for clips of this level."""
     eyes: Literal["alike", "separate"] | None = None
     """As [render] `eyes`, for clips of this level."""
+    performance: Timing | None = None
+    """As [render] `performance`, for clips of this level."""
+    seconds: Seconds | None = None
+    """As [render] `seconds`, for clips of this level."""
+    state: State | None = None
+    """As [render] `state`, for clips of this level."""
+    blinks_per_minute: PerMinute | None = None
+    """As [render] `blinks_per_minute`, for clips of this level."""
+    events_s: Moments | None = None
+    """As [render] `events_s`, for clips of this level."""
+    event: EventKind | None = None
+    """As [render] `event`, for clips of this level."""
+    speech: str | None = None
+    """As [render] `speech`, for clips of this level."""
     fps: Fps | None = None
     """As [render] `fps`, for clips of this level."""
 

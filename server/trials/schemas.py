@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from experiments.trials.clip_rating.declaration import MAX_FRAMES_LOGGED
 from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.union import AnyAnswer
 from server.evidence.schemas import RatingEvidence
@@ -66,7 +67,7 @@ class PlaybackLog(BaseModel):
     )
     refresh_rate_hz: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] | None = None
     device_pixel_ratio: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
-    drawn: Annotated[list[FrameTime], Field(max_length=5000)] | None = Field(
+    drawn: Annotated[list[FrameTime], Field(max_length=MAX_FRAMES_LOGGED)] | None = Field(
         default=None,
         description="Index and time in ms since the start key of every drawn frame, view after view.",
     )

@@ -33,7 +33,9 @@ class ClipCurve:
     lower_vertical_mm, lower_horizontal_mm : float64 array (n,) or None
         The lower lid's lift and its slide towards the nose; None leaves the lower lid to the character.
     onset_sample : int
-        Where the blink begins.
+        Where the blink begins; the first of a performance.
+    blinks_s : tuple of float
+        Where the blinks of a performance begin, in s; empty for a single blink.
     """
 
     closure: Array
@@ -43,6 +45,7 @@ class ClipCurve:
     closure_other: Array | None = None
     lower_vertical_mm: Array | None = None
     lower_horizontal_mm: Array | None = None
+    blinks_s: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("closure", "closure_other", "lower_vertical_mm", "lower_horizontal_mm"):

@@ -14,6 +14,7 @@ from stimuli_builder.clips.characters import Geometry, fingerprint, geometry
 from stimuli_builder.clips.curves import Timing, clip_curve, within_reach
 from stimuli_builder.clips.exemplars import exemplar
 from stimuli_builder.clips.jobs import ClipJob, Look
+from stimuli_builder.clips.performances import performance_curve
 
 
 @dataclass(frozen=True)
@@ -83,13 +84,16 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
     seed = options.seed_for(experiment)
     place = geometry(settings.character, options.beside)
     check_look(settings, place)
-    key = design.exemplar_key(experiment, spec)
-    shown = exemplar(settings, exemplar_family(key), spec.exemplar, seed, options.beside)
-    timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
-    curve = clip_curve(shown.profile, timing, settings.lower_lid)
+    family = exemplar_family(design.exemplar_key(experiment, spec))
+    if settings.performance is not None:
+        curve, repeated = performance_curve(settings, family, spec.exemplar, seed, options.beside), False
+    else:
+        shown = exemplar(settings, family, spec.exemplar, seed, options.beside)
+        timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
+        curve, repeated = clip_curve(shown.profile, timing, settings.lower_lid), shown.repeated
     curve, held = within_reach(curve, place.lower_range_mm)
     job = ClipJob(look_of(settings, options), curve)
-    return PlannedClip(spec, settings, job, shown.repeated, place, held)
+    return PlannedClip(spec, settings, job, repeated, place, held)
 
 
 def exemplar_family(key: str) -> str:

@@ -10,10 +10,12 @@ from stimuli_builder.clips.barcode import draw_barcode
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.kernels import GAMMA, blend, to_yuv
 from stimuli_builder.clips.levels import LevelSet
-from stimuli_builder.clips.motion_blur import frame_weights
+from stimuli_builder.clips.motion_blur import frame_windows
 
 Planes = NDArray[np.uint8]
 Light = NDArray[np.float32]
+PAINTED_KEPT = 16
+"""Pictures a painter keeps, so that resting frames are painted once however long the clip is."""
 SEAM_MM = 4.0
 """Where the eyes move apart, the picture changes over from one to the other within this width."""
 
@@ -33,15 +35,18 @@ class FramePainter:
             raise InputError(
                 f"character '{self.character.name}' has no lower-lid layer: use lower_lid = 'none'"
             )
-        rows = frame_weights(len(curve.closure), fps, blur)
         width, height = self.character.size_px
-        memory: dict[bytes, Planes] = {}
-        for number, row in enumerate(rows):
-            used = np.flatnonzero(row)
-            key = same_picture(curve, used, row[used])
-            if key not in memory:
-                memory[key] = self._paint(curve, used, row[used])
-            planes = memory[key].copy()
+        painted: dict[bytes, Planes] = {}
+        for number, (samples, weights) in enumerate(frame_windows(len(curve.closure), fps, blur)):
+            key = same_picture(curve, samples, weights)
+            picture = painted.pop(key, None)
+            if picture is None:
+                picture = self._paint(curve, samples, weights)
+            # The picture shown last is the last to be forgotten.
+            painted[key] = picture
+            if len(painted) > PAINTED_KEPT:
+                painted.pop(next(iter(painted)))
+            planes = picture.copy()
             if barcode:
                 draw_barcode(*_split(planes, width, height), number)
             yield planes

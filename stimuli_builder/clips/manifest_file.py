@@ -7,7 +7,8 @@ from typing import Any
 
 from experiments.definition import Experiment
 from experiments.manifest import Clip, Manifest
-from stimuli_builder.clips.curves import Array
+from experiments.rendering import RenderSettings
+from stimuli_builder.clips.curves import Array, ClipCurve
 from stimuli_builder.clips.design_clips import Options, PlannedClip
 from stimuli_builder.clips.motion_blur import samples_per_frame
 from stimuli_builder.clips.state import RENDER_KEY, BuildState
@@ -93,17 +94,18 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
         width_mm=round(settings.width_px / clip.geometry.px_per_mm_at(settings.width_px), 4),
         profile=curve.profile_id,
         profile_repeated=clip.repeated,
-        duration_frames=curve.duration_frames,
-        onset_frame=int(curve.onset_sample / samples_per_frame(settings.fps)),
+        duration_frames=None if settings.performance else curve.duration_frames,
+        onset_frame=_onset_frame(curve, settings),
         closure=_samples(curve.closure),
         closure_other=_samples(curve.closure_other),
         lower_vertical_mm=_samples(curve.lower_vertical_mm),
         lower_horizontal_mm=_samples(curve.lower_horizontal_mm),
+        blinks_s=curve.blinks_s,
         inputs={
             RENDER_KEY: job.input_hash,
             "character": Path(settings.character).name,
             "character_sha256": job.look.fingerprint,
-            "profile": settings.profile,
+            **_shown(settings),
             "amplitude": settings.amplitude,
             "motion_blur": str(settings.motion_blur).lower(),
             "lower_lid": settings.lower_lid,
@@ -117,3 +119,17 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
 
 def _samples(signal: Array | None) -> tuple[float, ...]:
     return () if signal is None else tuple(signal.tolist())
+
+
+def _onset_frame(curve: ClipCurve, settings: RenderSettings) -> int | None:
+    """Where the blink begins, or the first of a performance; None where nobody blinks."""
+    if settings.performance and not curve.blinks_s:
+        return None
+    return int(curve.onset_sample / samples_per_frame(settings.fps))
+
+
+def _shown(settings: RenderSettings) -> dict[str, str]:
+    """What a clip shows, among its inputs: a blink of a profile, or a performance by its timing."""
+    if settings.performance is None:
+        return {"profile": settings.profile}
+    return {"performance": settings.performance, "state": settings.state}

@@ -1,5 +1,7 @@
 """Which samples of a 300 fps signal an output frame shows, and with what weight."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,8 +16,8 @@ def samples_per_frame(fps: float) -> float:
     return PROFILE_FPS / fps
 
 
-def frame_weights(sample_count: int, fps: float, blur: bool) -> Array:
-    """(frames, samples) weights of a signal's samples in each output frame; every row sums to 1.
+def frame_windows(sample_count: int, fps: float, blur: bool) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """Yield for each output frame the samples of a signal that it shows, and their weights, which sum to 1.
 
     With blur a frame is the mean of the samples inside its time, the paper's average of ten (4.1.1):
     our frame k at 30 fps stands at sample 10 k + 5 and averages 10 k ... 10 k + 9, five before and four
@@ -35,13 +37,20 @@ def frame_weights(sample_count: int, fps: float, blur: bool) -> Array:
         raise InputError(
             f"{sample_count} samples at {PROFILE_FPS} fps are less than one frame at {fps:g} fps"
         )
-    starts = np.arange(frames)[:, None] * step
-    if not blur:
-        weights = np.zeros((frames, sample_count))
-        weights[np.arange(frames), (starts[:, 0] + step / 2 + 1e-9).astype(int)] = 1.0
-        return weights
-    sample = np.arange(sample_count)[None, :]
-    covered = np.minimum(starts + step, sample + 1) - np.maximum(starts, sample)
-    covered = np.clip(covered, 0.0, 1.0)
-    shares: Array = covered / covered.sum(axis=1, keepdims=True)
-    return shares
+    for start in np.arange(frames) * step:
+        if not blur:
+            yield np.array([int(start + step / 2 + 1e-9)]), np.ones(1)
+            continue
+        sample = np.arange(int(start), min(sample_count, int(np.ceil(start + step)) + 1))
+        covered = np.clip(np.minimum(start + step, sample + 1) - np.maximum(start, sample), 0.0, 1.0)
+        used = covered > 0
+        yield sample[used], covered[used] / covered.sum()
+
+
+def frame_weights(sample_count: int, fps: float, blur: bool) -> Array:
+    """(frames, samples) weights of a short signal's samples, as `frame_windows` gives them one by one."""
+    windows = list(frame_windows(sample_count, fps, blur))
+    weights = np.zeros((len(windows), sample_count))
+    for row, (samples, shares) in zip(weights, windows, strict=True):
+        row[samples] = shares
+    return weights

@@ -11,7 +11,7 @@ from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.frames import SEAM_MM, eye_light, same_picture
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet
-from stimuli_builder.clips.motion_blur import frame_weights
+from stimuli_builder.clips.motion_blur import frame_windows
 
 Array = NDArray[np.float64]
 STEP_PX = 3
@@ -68,11 +68,11 @@ class OpeningMeter:
             raise InputError("its lower lid moves, its character's does not")
         known: dict[bytes, list[float]] = {}
         rows = []
-        for row in frame_weights(len(curve.closure), clip.fps, clip.inputs.get("motion_blur") != "false"):
-            samples = np.flatnonzero(row)
-            key = same_picture(curve, samples, row[samples])
+        blur = clip.inputs.get("motion_blur") != "false"
+        for samples, weights in frame_windows(len(curve.closure), clip.fps, blur):
+            key = same_picture(curve, samples, weights)
             if key not in known:
-                known[key] = self._promised(curve, samples, row[samples])
+                known[key] = self._promised(curve, samples, weights)
             rows.append(known[key])
         return self._opening(rows)
 

@@ -54,7 +54,7 @@ def repeated_profiles(experiment: Experiment, seed: int | None = None) -> list[d
     for spec in design.clips(experiment):
         settings = design.render_settings(experiment, spec)
         group = design.exemplar_key(experiment, spec).rpartition("/")[0]
-        if settings.profile == "real" and group not in found:
+        if settings.performance is None and settings.profile == "real" and group not in found:
             order = recorded_order(
                 experiment.exemplars.per_cell,
                 experiment.exemplars.seed if seed is None else seed,

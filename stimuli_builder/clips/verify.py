@@ -74,19 +74,20 @@ def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[lis
         return [f"missing from {folder}"], None
     if file_sha256(path) != clip.sha256:
         return [f"its bytes are not those of the {MANIFEST_NAME} (another sha256)"], None
+    meter = None if isinstance(clip, CheckClip) or not clip.closure else meters.of(clip)
     try:
-        pictures, problems = _decoded(path, clip)
+        measured, problems = _decoded(path, clip, meter)
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
-    if problems or isinstance(clip, CheckClip) or not clip.closure or (meter := meters.of(clip)) is None:
+    if problems or meter is None or isinstance(clip, CheckClip):
         return problems, None
     try:
         promised = meter.promised_mm(clip)
     except InputError as error:
         return [str(error)], None
-    if len(promised) != len(pictures):
-        return [f"its curve is {len(promised)} frames long, the clip {len(pictures)}"], None
-    off = np.abs(meter.measured_mm(pictures) - promised).max(axis=1)
+    if len(promised) != len(measured):
+        return [f"its curve is {len(promised)} frames long, the clip {len(measured)}"], None
+    off = np.abs(measured - promised).max(axis=1)
     worst = float(off.max())
     if worst > TOLERANCE_MM:
         problems.append(
@@ -95,26 +96,33 @@ def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[lis
     return problems, worst
 
 
-def _decoded(path: Path, clip: Clip | CheckClip) -> tuple[NDArray[np.uint8], list[str]]:
-    """Luma of every frame, and what is wrong with number, size and timing."""
+def _decoded(
+    path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None
+) -> tuple[NDArray[np.float64], list[str]]:
+    """(frames, eyes) opening in mm, frame after frame, and what is wrong with number, size and timing."""
+    measured: list[NDArray[np.float64]] = []
+    times: list[Fraction | None] = []
     with av.open(str(path)) as container:
         stream: Any = container.streams.video[0]
-        frames = list(container.decode(stream))
-    problems = list(_timing_problems(stream, frames, clip))
-    if not frames:
+        fits = (stream.width, stream.height) == (clip.width_px, clip.height_px)
+        for frame in container.decode(stream):
+            times.append(None if frame.pts is None else frame.pts * frame.time_base)
+            if meter is not None and fits:
+                luma = frame.to_ndarray(format="yuv420p")[: frame.height]
+                measured.append(meter.measured_mm(luma[None])[0])
+        problems = list(_timing_problems(stream, times, clip))
+    if not times:
         raise InputError("no frame")
-    luma = [frame.to_ndarray(format="yuv420p")[: frame.height] for frame in frames]
-    return np.stack(luma), problems
+    return np.array(measured), problems
 
 
-def _timing_problems(stream: Any, frames: list[Any], clip: Clip | CheckClip) -> Iterator[str]:
-    if len(frames) != clip.frames:
-        yield f"expected {clip.frames} frames, got {len(frames)}"
+def _timing_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:
+    if len(times) != clip.frames:
+        yield f"expected {clip.frames} frames, got {len(times)}"
     if (stream.width, stream.height) != (clip.width_px, clip.height_px):
         yield f"expected {clip.width_px} x {clip.height_px} px, got {stream.width} x {stream.height}"
-    wanted = 1 / Fraction(clip.fps).limit_denominator(1001)
-    times = [frame.pts * frame.time_base for frame in frames if frame.pts is not None]
-    if len(times) != len(frames) or any(abs(t - k * wanted) > wanted / 100 for k, t in enumerate(times)):
+    due = 1 / Fraction(clip.fps).limit_denominator(1001)
+    if any(at is None or abs(at - k * due) > due / 100 for k, at in enumerate(times)):
         yield f"its frames are not spaced evenly at {clip.fps:g} fps"
     if stream.codec_context.has_b_frames:
         yield "it holds B-frames"

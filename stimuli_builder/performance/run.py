@@ -96,14 +96,17 @@ def _checked(job: PerformanceJob) -> StateName:
 
 
 def _speech(job: PerformanceJob) -> tuple[list[Speech], float]:
-    if job.source is None:
-        return [], 0.0
-    if not job.source.is_file():
-        raise InputError(f"{job.source}: no such file; expected a recording with sound, or subtitles")
-    if job.source.suffix.lower() in SUFFIXES:
-        return speech_in_subtitles(job.source, job.speaker)
-    if job.speaker is not None:
+    return ([], 0.0) if job.source is None else speech_of(job.source, job.speaker)
+
+
+def speech_of(source: Path, speaker: str | None = None) -> tuple[list[Speech], float]:
+    """Return the stretches of speech of a recording or of subtitles, and its length in s."""
+    if not source.is_file():
+        raise InputError(f"{source}: no such file; expected a recording with sound, or subtitles")
+    if source.suffix.lower() in SUFFIXES:
+        return speech_in_subtitles(source, speaker)
+    if speaker is not None:
         raise InputError("--speaker is for subtitles with voices; a recording has nobody's name")
     from stimuli_builder.performance.audio import speech_in_audio
 
-    return speech_in_audio(job.source)
+    return speech_in_audio(source)

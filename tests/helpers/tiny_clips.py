@@ -20,11 +20,17 @@ BOX_HEAD_BYTES = 8
 
 
 def make_clip_folder(
-    experiment: Experiment, folder: Path, *, frames: int = 4, fps: int = 30, clip_bytes: int = 0
+    experiment: Experiment,
+    folder: Path,
+    *,
+    frames: int = 4,
+    fps: int = 30,
+    clip_bytes: int = 0,
+    size_px: tuple[int, int] = (256, 96),
 ) -> Manifest:
     """One playable mp4 for each clip of the design, of at least `clip_bytes`, and their manifest."""
     folder.mkdir(parents=True, exist_ok=True)
-    video, clips = encoded_video(frames, fps), []
+    video, clips = encoded_video(frames, fps, *size_px), []
     for spec in design.clips(experiment):
         # A box that players skip makes each file its own, without encoding each anew.
         own = f"{spec.cell}/{spec.exemplar}".encode()
@@ -42,8 +48,8 @@ def make_clip_folder(
                 bytes=len(data),
                 fps=fps,
                 frames=frames,
-                width_px=256,
-                height_px=96,
+                width_px=size_px[0],
+                height_px=size_px[1],
                 width_mm=120.0,
                 profile=f"blink{spec.exemplar:02d}",
             )

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 MAX_SCALES = 8
+MAX_FRAMES_LOGGED = 20_000
+"""Drawn frames that the log of one trial may hold, all its views together: about 320 KB as JSON."""
 
 
 class ClipRating(TrialDeclaration):
@@ -59,6 +61,18 @@ class ClipRating(TrialDeclaration):
         if missing:
             raise ValueError(missing)
         return self
+
+    def fault(self, experiment: "Experiment") -> str | None:
+        """More views of a long performance than the log of a trial may hold."""
+        levels = [level.render for factor in experiment.factors for level in factor.levels]
+        settings = [experiment.render, *(level.applied_to(experiment.render) for level in levels)]
+        longest = max((round(one.seconds * one.fps) for one in settings if one.performance), default=0)
+        if longest * self.views <= MAX_FRAMES_LOGGED:
+            return None
+        return (
+            f"trial.views: {self.views} views of {longest} frames are more than the {MAX_FRAMES_LOGGED} that "
+            "a trial may log; show shorter clips, fewer frames a second or fewer views"
+        )
 
     @property
     def asked_scales(self) -> tuple[Points | Slider, ...]:

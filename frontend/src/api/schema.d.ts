@@ -2750,6 +2750,11 @@ export interface components {
              *       "motion_blur": true,
              *       "lower_lid": "none",
              *       "eyes": "alike",
+             *       "seconds": 20,
+             *       "state": "listening",
+             *       "events_s": [],
+             *       "event": "turn_end",
+             *       "speech": "",
              *       "fps": 30,
              *       "width_px": 960,
              *       "height_px": 360
@@ -4822,6 +4827,41 @@ export interface components {
              */
             eyes: ("alike" | "separate") | null;
             /**
+             * Performance
+             * @description As [render] `performance`, for clips of this level.
+             */
+            performance: ("uniform" | "intervals" | "events" | "none") | null;
+            /**
+             * Seconds
+             * @description As [render] `seconds`, for clips of this level.
+             */
+            seconds: number | null;
+            /**
+             * State
+             * @description As [render] `state`, for clips of this level.
+             */
+            state: ("rest" | "reading" | "screen" | "speaking" | "listening") | null;
+            /**
+             * Blinks Per Minute
+             * @description As [render] `blinks_per_minute`, for clips of this level.
+             */
+            blinks_per_minute: number | null;
+            /**
+             * Events S
+             * @description As [render] `events_s`, for clips of this level.
+             */
+            events_s: number[] | null;
+            /**
+             * Event
+             * @description As [render] `event`, for clips of this level.
+             */
+            event: ("utterance_start" | "utterance_end" | "pause" | "turn_end") | null;
+            /**
+             * Speech
+             * @description As [render] `speech`, for clips of this level.
+             */
+            speech: string | null;
+            /**
              * Fps
              * @description As [render] `fps`, for clips of this level.
              */
@@ -4889,6 +4929,53 @@ export interface components {
              * @enum {string}
              */
             eyes: "alike" | "separate";
+            /**
+             * Performance
+             * @description Shows a performance of the blink engine for `seconds` instead of a single blink. What times its blinks:
+             *     a timer whose intervals lie evenly between half and one and a half times their mean (`uniform`), the
+             *     engine's fitted intervals (`intervals`), these and the events of `events_s` or `speech` (`events`), or
+             *     nothing, the eyes staying open (`none`). Blink n of an exemplar looks the same whatever times it. The keys
+             *     `profile` and of the blink's length are for single blinks.
+             */
+            performance: ("uniform" | "intervals" | "events" | "none") | null;
+            /**
+             * Seconds
+             * @description Length of a performance, in seconds.
+             * @default 20
+             */
+            seconds: number;
+            /**
+             * State
+             * @description What the person of a performance does, which sets the mean blink rate (docs/blink-engine.md).
+             * @default listening
+             * @enum {string}
+             */
+            state: "rest" | "reading" | "screen" | "speaking" | "listening";
+            /**
+             * Blinks Per Minute
+             * @description Mean blink rate of a performance; left out, that published for its state.
+             */
+            blinks_per_minute: number | null;
+            /**
+             * Events S
+             * @description Moments that blinks answer where `performance` is `events`, in seconds from the clip's start.
+             * @default []
+             */
+            events_s: number[];
+            /**
+             * Event
+             * @description What happens at the moments of `events_s`.
+             * @default turn_end
+             * @enum {string}
+             */
+            event: "utterance_start" | "utterance_end" | "pause" | "turn_end";
+            /**
+             * Speech
+             * @description A recording with sound or subtitles (.vtt, .srt) beside the TOML whose pauses and turns blinks answer,
+             *     where `performance` is `events`; the person speaks then, and is in `state` between turns.
+             * @default
+             */
+            speech: string;
             /**
              * Fps
              * @description Frame rate of the clip, in frames per second.

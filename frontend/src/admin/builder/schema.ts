@@ -49,6 +49,7 @@ export type Editor =
   | { kind: "text" }
   | { kind: "translated" }
   | { kind: "words" }
+  | { kind: "numbers" }
   | { kind: "lists" }
   | { kind: "translations" }
   | { kind: "dictionary" }
@@ -94,6 +95,7 @@ function variantsOf({ propertyName, mapping }: NonNullable<Schema["discriminator
 function listEditor(schema: Schema): Editor {
   const items = withoutNull(resolved(schema.items ?? {}));
   if (items.type === "string") return { kind: "words" };
+  if (items.type === "number" || items.type === "integer") return { kind: "numbers" };
   if (items.type === "array" && withoutNull(resolved(items.items ?? {})).type === "string") return { kind: "lists" };
   const inner = editorOf(items).kind;
   if (inner === "translated") return { kind: "translations" };
@@ -148,6 +150,7 @@ export function starter(given: Schema, languages: readonly string[]): unknown {
     case "elements":
       return Array.from({ length: editor.atLeast }, () => starter(editor.of, languages));
     case "words":
+    case "numbers":
     case "lists":
     case "translations":
       return [];

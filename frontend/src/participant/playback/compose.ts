@@ -1,9 +1,12 @@
 /** Several decoded clips on one canvas, drawn as one: frame k of each in the same refresh. */
 import type { DecodedClip } from "./decode";
 import type { Part } from "./player";
+import type { StreamedClip } from "./streamed-clip";
 
+/** One clip, all its frames decoded or those next to be shown. */
+export type SingleClip = DecodedClip | StreamedClip;
 export interface Composed {
-  parts: { clip: DecodedClip; at: Part }[];
+  parts: { clip: SingleClip; at: Part }[];
   fps: number;
   width: number;
   height: number;
@@ -12,13 +15,13 @@ export interface Composed {
 /** Throws where a clip is not there, or where frame rates differ: one clock cannot draw those. */
 export function composition(
   parts: readonly Part[],
-  clipOf: (sha256: string) => DecodedClip | Composed | undefined,
+  clipOf: (sha256: string) => SingleClip | Composed | undefined,
   width: number,
   height: number,
 ): Composed {
   const decoded = parts.map((at) => {
     const clip = clipOf(at.sha256);
-    if (!clip || !("bitmaps" in clip)) throw new Error("expected decoded clips, one of them is not");
+    if (!clip || "parts" in clip) throw new Error("expected decoded clips, one of them is not");
     return { clip, at };
   });
   const rates = new Set(decoded.map(({ clip }) => clip.fps));
@@ -27,8 +30,18 @@ export function composition(
   return { parts: decoded, fps, width, height };
 }
 
-export function framesOf(clip: DecodedClip | Composed): number {
-  return "bitmaps" in clip ? clip.bitmaps.length : Math.max(...clip.parts.map((part) => part.clip.bitmaps.length));
+const countOf = (clip: SingleClip): number => ("bitmaps" in clip ? clip.bitmaps.length : clip.frames);
+const pictureOf = (clip: SingleClip, index: number): ImageBitmap | undefined =>
+  "bitmaps" in clip ? clip.bitmaps[index] : clip.picture(index);
+
+export function framesOf(clip: SingleClip | Composed): number {
+  return "parts" in clip ? Math.max(...clip.parts.map((part) => countOf(part.clip))) : countOf(clip);
+}
+
+/** Those of its clips that are decoded while they are shown. */
+export function streamsOf(clip: SingleClip | Composed): StreamedClip[] {
+  const clips = "parts" in clip ? clip.parts.map((part) => part.clip) : [clip];
+  return clips.filter((one): one is StreamedClip => !("bitmaps" in one));
 }
 
 interface Canvas {
@@ -37,10 +50,10 @@ interface Canvas {
 }
 
 /** Draw frame `index` of every clip there; false where one has no such frame. A clip that is over holds its last one. */
-export function drawFrame(context: Canvas, clip: DecodedClip | Composed, index: number): boolean {
+export function drawFrame(context: Canvas, clip: SingleClip | Composed, index: number): boolean {
   const { width, height } = context.canvas;
-  const pieces = "bitmaps" in clip ? [{ clip, at: { x: 0, y: 0, width, height } }] : clip.parts;
-  const pictures = pieces.map((piece) => piece.clip.bitmaps[Math.min(index, piece.clip.bitmaps.length - 1)]);
+  const pieces = "parts" in clip ? clip.parts : [{ clip, at: { x: 0, y: 0, width, height } }];
+  const pictures = pieces.map((piece) => pictureOf(piece.clip, Math.min(index, countOf(piece.clip) - 1)));
   if (pictures.includes(undefined)) return false;
   pieces.forEach(({ at }, place) => {
     const picture = pictures[place];

@@ -1,5 +1,6 @@
-/** A clip's bytes to its frames as pictures, all of them, before it is shown. Runs in the worker. */
+/** A clip's bytes to its frames as pictures: all of them before it is shown, or of a long clip a few ahead. Runs in the worker. */
 import { BufferSource, EncodedPacketSink, Input, MP4 } from "mediabunny";
+import type { StreamedClip } from "./streamed-clip";
 
 export interface DecodedClip {
   bitmaps: ImageBitmap[];
@@ -8,19 +9,26 @@ export interface DecodedClip {
   height: number;
 }
 
-const LONGEST_CLIP_FRAMES = 900;
+/** A clip whose frames, four bytes a pixel, take more than this is decoded while it is shown. */
+const MAX_KEPT_BYTES = 1 << 28;
+const MAX_KEPT_FRAMES = 900;
 
-/** Decode every frame in presentation order. The declared rate counts before the container's. Throws where unreadable. */
-export async function decodeClip(bytes: ArrayBuffer, declared_fps: number | null): Promise<DecodedClip> {
+/** Decode in presentation order. The declared rate counts before the container's. Throws where unreadable. */
+export async function decodeClip(bytes: ArrayBuffer, declared_fps: number | null): Promise<DecodedClip | StreamedClip> {
   const input = new Input({ formats: [MP4], source: new BufferSource(bytes) });
   const track = await input.getPrimaryVideoTrack();
   if (!track) throw new Error("expected a video track, found none");
   const config = await track.getDecoderConfig();
   if (!config) throw new Error(`expected a codec this browser knows, got ${(await track.getCodec()) ?? "an unknown one"}`);
+  const [width, height] = await Promise.all([track.getDisplayWidth(), track.getDisplayHeight()]);
+  const kept = Math.min(MAX_KEPT_FRAMES, Math.ceil(MAX_KEPT_BYTES / (4 * width * height)));
+  // No more packets are counted than it takes to know.
+  const { packetCount, averagePacketRate } = await track.computePacketStats(kept + 1);
+  const fps = declared_fps ?? averagePacketRate;
+  if (packetCount > kept) return (await import("./streamed-clip")).streamedClip(track, config, fps, width, height);
   const frames = await decodeAll(config, new EncodedPacketSink(track));
   const first = frames[0];
   if (!first) throw new Error("expected at least one frame, got none");
-  const fps = declared_fps ?? (await track.computePacketStats()).averagePacketRate;
   return { bitmaps: frames.map(({ bitmap }) => bitmap), fps, width: first.bitmap.width, height: first.bitmap.height };
 }
 
@@ -38,7 +46,6 @@ async function decodeAll(config: VideoDecoderConfig, sink: EncodedPacketSink): P
     for await (const packet of sink.packets()) {
       if (problems.length > 0) break;
       decoder.decode(packet.toEncodedVideoChunk());
-      if (pending.length > LONGEST_CLIP_FRAMES) throw new Error(`expected at most ${LONGEST_CLIP_FRAMES} frames, got more`);
     }
     if (problems[0]) throw problems[0];
     await decoder.flush();

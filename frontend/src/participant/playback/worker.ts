@@ -2,8 +2,8 @@
  * Decodes clips ahead and draws them at screen refreshes, away from the page's own work.
  * Every drawn frame's index and time is logged and returned.
  */
-import { type Composed, composition, drawFrame, framesOf } from "./compose";
-import { decodeClip, type DecodedClip } from "./decode";
+import { type Composed, composition, drawFrame, framesOf, type SingleClip, streamsOf } from "./compose";
+import { decodeClip } from "./decode";
 import type { Part } from "./player";
 import { absoluteNow, type FromWorker, type ToWorker } from "./protocol";
 import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
@@ -20,20 +20,23 @@ const scope = self as unknown as Scope;
 const WARM_REFRESHES = 4;
 const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callback), absoluteNow, performance.timeOrigin);
 
-const clips = new Map<string, DecodedClip | Composed>();
+const clips = new Map<string, SingleClip | Composed>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
 let background = "#808080";
 
 async function prepare(sha256: string, bytes: ArrayBuffer, declared_fps: number | null): Promise<void> {
   try {
-    const known = clips.get(sha256);
-    const clip = known && "bitmaps" in known ? known : await decodeClip(bytes, declared_fps);
+    const clip = clips.get(sha256) ?? (await decodeClip(bytes, declared_fps));
     clips.set(sha256, clip);
     const { fps, width, height } = clip;
-    scope.postMessage({ type: "prepared", sha256, frames: clip.bitmaps.length, width, height, fps });
+    scope.postMessage({ type: "prepared", sha256, frames: framesOf(clip), width, height, fps });
   } catch (error) {
-    scope.postMessage({ type: "failed", sha256, reason: String(error) });
+    failed(sha256, error);
   }
+}
+
+function failed(sha256: string, reason: unknown): void {
+  scope.postMessage({ type: "failed", sha256, reason: String(reason) });
 }
 
 /** Put decoded clips on one canvas, under a name of their own. */
@@ -43,13 +46,14 @@ function compose(name: string, parts: readonly Part[], width: number, height: nu
     clips.set(name, composed);
     scope.postMessage({ type: "prepared", sha256: name, frames: framesOf(composed), width, height, fps: composed.fps });
   } catch (error) {
-    scope.postMessage({ type: "failed", sha256: name, reason: String(error) });
+    failed(name, error);
   }
 }
 
 function release(sha256: string): void {
   const clip = clips.get(sha256);
   if (clip && "bitmaps" in clip) clip.bitmaps.forEach((bitmap) => bitmap.close());
+  else if (clip && "close" in clip) clip.close();
   clips.delete(sha256);
 }
 
@@ -76,10 +80,21 @@ function warm(): void {
 
 function play(sha256: string, refresh_ms: number, fixation_ms: number): void {
   const clip = clips.get(sha256);
-  if (!clip || !context) {
-    scope.postMessage({ type: "failed", sha256, reason: "expected a prepared clip and a canvas" });
-    return;
-  }
+  if (!clip || !context) return failed(sha256, "expected a prepared clip and a canvas");
+  const start = (): void => begin(sha256, clip, refresh_ms, fixation_ms);
+  const streams = streamsOf(clip);
+  if (streams.length === 0) return start();
+  Promise.all(streams.map((stream) => stream.rewind())).then(start, (error: unknown) => stopBroken(sha256, error));
+}
+
+/** The surround again, and the reason to the page. */
+function stopBroken(sha256: string, reason: unknown): void {
+  clock.stop();
+  blank();
+  failed(sha256, reason);
+}
+
+function begin(sha256: string, clip: SingleClip | Composed, refresh_ms: number, fixation_ms: number): void {
   const until = absoluteNow() + fixation_ms;
   const show = showing(sha256, clip, refresh_ms);
   clock.start((refresh_at_ms, ran_at_ms) => {
@@ -92,17 +107,22 @@ function play(sha256: string, refresh_ms: number, fixation_ms: number): void {
   });
 }
 
-function showing(sha256: string, clip: DecodedClip | Composed, refresh_ms: number): Job {
+function showing(sha256: string, clip: SingleClip | Composed, refresh_ms: number): Job {
+  const streams = streamsOf(clip);
   const schedule = new FrameSchedule(framesOf(clip), 1000 / clip.fps, refresh_ms);
   const evenness = new EvennessMeter();
   const drawn: [number, number][] = [];
   return (refresh_at_ms, ran_at_ms) => {
     evenness.add(refresh_at_ms, ran_at_ms);
+    const broken = streams.find(({ problem }) => problem);
+    if (broken) return stopBroken(sha256, broken.problem);
     if (schedule.isOver(refresh_at_ms)) {
       clock.stop();
       blank();
       const figures = { frames: framesOf(clip), fps: clip.fps, ended_at_ms: absoluteNow(), ...evenness.read() };
       scope.postMessage({ type: "played", sha256, drawn, ...figures });
+      // Ready for another view before it is asked for.
+      for (const stream of streams) stream.rewind().catch(() => {});
       return;
     }
     const index = schedule.next(refresh_at_ms);

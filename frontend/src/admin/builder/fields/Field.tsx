@@ -2,7 +2,7 @@
 
 import { editorOf } from "../schema";
 import { Choice, Flag, Lists, Numeric, OneText, Raw, Translated, Words } from "./scalars";
-import { Dictionary, Translations } from "./lines";
+import { Dictionary, Numbers, Translations } from "./lines";
 import { ByLanguage, Elements, Table, Variants } from "./tables";
 import type { FieldProps } from "./useField";
 
@@ -22,6 +22,8 @@ export function Field(props: FieldProps) {
       return <Translated {...props} />;
     case "words":
       return <Words {...props} />;
+    case "numbers":
+      return <Numbers {...props} />;
     case "lists":
       return <Lists {...props} />;
     case "translations":

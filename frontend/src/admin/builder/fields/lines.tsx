@@ -36,6 +36,29 @@ export function Translations(props: FieldProps) {
   );
 }
 
+/** Numbers in an order: one a line. What is no number stays out until it is one. */
+export function Numbers(props: FieldProps) {
+  const { value, label, help, problem, set } = useField(props);
+  const [text, setText] = useState(() => (Array.isArray(value) ? value.map(String).join("\n") : ""));
+  return (
+    <Textarea
+      label={label}
+      description={`${help} Here: one a line.`}
+      error={problem}
+      autosize
+      minRows={2}
+      maxRows={12}
+      value={text}
+      onChange={(event) => {
+        setText(event.currentTarget.value);
+        const lines = event.currentTarget.value.split("\n").map((line) => line.trim());
+        const numbers = lines.filter((line) => line !== "").map(Number);
+        set(numbers.length === 0 ? undefined : numbers.filter((number) => Number.isFinite(number)));
+      }}
+    />
+  );
+}
+
 /** Words that stand for words: `key = value`, one a line. */
 export function Dictionary(props: FieldProps) {
   const { value, label, help, problem, set } = useField(props);
