@@ -41,6 +41,9 @@ def bake_face(
     frame_samples: Annotated[
         int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the still frame.")
     ] = 32,
+    lower_lid: Annotated[
+        bool, typer.Option(help="--no-lower-lid leaves out the 32 poses that Experiment 3 needs.")
+    ] = True,
     light: Annotated[str, typer.Option(help="Light preset: studio or window.")] = "studio",
     identities: Annotated[
         Path, typer.Option(help="Identities file, to bake a face of your own.")
@@ -83,6 +86,7 @@ def bake_face(
         levels=levels,
         rendered=rendered or levels,
         samples=Samples(samples, frame_samples),
+        lower_lid=lower_lid,
         light=light,
         out=out or Path("out/characters") / name,
         work=work,

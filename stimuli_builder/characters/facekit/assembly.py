@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.declaration import Declaration, Level
-from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM
+from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
+from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM, Box
+from stimuli_builder.characters.facekit.lid_pose import OPEN, LidPose
+from stimuli_builder.characters.facekit.matte import upper_lid_matte
 from stimuli_builder.characters.facekit.plan import closures_of
 from stimuli_builder.characters.facekit.renderer import Shot
 from stimuli_builder.characters.facekit.scene import FaceScene
@@ -18,6 +20,11 @@ from stimuli_builder.characters.level_video import write_level_video
 from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
 from stimuli_builder.characters.photorealistic.framing import bounding_box
 from stimuli_builder.characters.photorealistic.inbetween import flow_mix
+from stimuli_builder.characters.photorealistic.plan import (
+    HORIZONTAL_MM,
+    MATTE_CLOSURES,
+    VERTICAL_MM,
+)
 from stimuli_builder.characters.writing import write_bytes, write_declaration, write_picture
 
 STUDIO_EV = 0.15
@@ -28,20 +35,24 @@ Picture = NDArray[np.uint8]
 
 
 class Assembly:
-    """Pictures of one bake: of its shots those at the closures `rendered`, ascending."""
+    """Pictures of one bake: its levels at the closures `rendered`, ascending; `lower` are poses."""
 
-    def __init__(self, scene: FaceScene, shots: list[Shot], rendered: list[float]) -> None:
+    def __init__(
+        self, scene: FaceScene, frame: Shot, levels: list[Shot], lower: list[Shot], rendered: list[float]
+    ) -> None:
         self._scene, self._rendered = scene, rendered
-        self._levels = {shot.closure: shot for shot in shots[1:]}
+        self._levels = {shot.pose.closure: shot for shot in levels}
+        self._lower = {shot.pose: shot for shot in lower}
         self.crop = bounding_box(list(scene.boxes.values()))
-        still = self._developed(shots[0].read()["frame"])
+        self.lower_lid_crop = bounding_box(list(scene.lower_lid_boxes.values()))
+        still = self._developed(frame.read()["frame"])
         # The open level's own samples go into the still frame, so that nothing changes when a blink begins.
         self._still = self._laid(still, self._levels[0.0])
 
     def level(self, closure: float) -> Picture:
         """(h, w, 3) sRGB code values of the crop at a rendered closure."""
         frame = self._still if closure == 0.0 else self._laid(self._still, self._levels[closure])
-        return to_8_bit(self._cut(frame))
+        return to_8_bit(_cut(frame, self.crop))
 
     def levels(self, count: int) -> Iterator[tuple[float, Picture]]:
         """Closures and pictures of an atlas: rendered where there is a shot, else moved in between."""
@@ -75,6 +86,7 @@ class Assembly:
                 Level(closure=closure, file=video.file, sha256=video.sha256, frame=number)
                 for number, closure in enumerate(closures)
             ),
+            lower_lid=self._write_lower_lid(folder),
             provenance=provenance,
         )
         write_bytes(folder / NOTICE_FILE.name, NOTICE_FILE.read_bytes())
@@ -92,6 +104,41 @@ class Assembly:
             where += self._scene.view.feather(box) * (self._developed(light) - where)
         return laid
 
-    def _cut(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        x, y, width, height = self.crop
-        return image[y : y + height, x : x + width]
+    def _write_lower_lid(self, folder: Path) -> LowerLid | None:
+        """The grid of poses and the mattes, once every pose is rendered."""
+        if not self._lower or not all(shot.file.exists() for shot in self._lower.values()):
+            return None
+        poses, mattes = [], []
+        for pose, image in self.lower_lid_poses():
+            v, h = pose.vertical_mm, pose.horizontal_mm
+            picture = write_picture(folder, f"lower_{round(v * 100):03d}_{round(h * 100):03d}.webp", image)
+            poses.append(LowerLidPose(vertical_mm=v, horizontal_mm=h, **picture.model_dump()))
+        for closure in MATTE_CLOSURES:
+            matte = upper_lid_matte(self._scene, LidPose(closure), self.lower_lid_crop)
+            picture = write_picture(folder, f"matte_{round(closure * 256):03d}.webp", _grey(matte))
+            mattes.append(Level(closure=closure, **picture.model_dump()))
+        return LowerLid(crop=self.lower_lid_crop, poses=tuple(poses), mattes=tuple(mattes))
+
+    def lower_lid_poses(self) -> Iterator[tuple[LidPose, Picture]]:
+        """Poses of the open eyes: the rendered ones, and one between every two neighbouring lifts."""
+        for h in HORIZONTAL_MM:
+            for low, high in pairwise(VERTICAL_MM):
+                ends = [self._lower_lid(LidPose(0.0, v, h)) for v in (low, high)]
+                yield LidPose(0.0, low, h), ends[0]
+                middle = flow_mix(srgb_to_linear(ends[0]), srgb_to_linear(ends[1]), 0.5)
+                yield LidPose(0.0, (low + high) / 2, h), linear_to_srgb(np.maximum(middle, 0))
+            yield LidPose(0.0, VERTICAL_MM[-1], h), self._lower_lid(LidPose(0.0, VERTICAL_MM[-1], h))
+
+    def _lower_lid(self, pose: LidPose) -> Picture:
+        """The lower lids' crop in a rendered pose."""
+        frame = self._still if pose == OPEN else self._laid(self._still, self._lower[pose])
+        return to_8_bit(_cut(frame, self.lower_lid_crop))
+
+
+def _cut(image: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
+    x, y, width, height = box
+    return image[y : y + height, x : x + width]
+
+
+def _grey(matte: Picture) -> Picture:
+    return np.repeat(matte[..., None], 3, axis=2)

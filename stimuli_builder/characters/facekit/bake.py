@@ -16,13 +16,21 @@ from experiments.errors import InputError
 from stimuli_builder.characters.facekit.assembly import Assembly
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import FaceKit
-from stimuli_builder.characters.facekit.plan import LEVEL_COUNTS, Samples, closures_of, shots
+from stimuli_builder.characters.facekit.plan import (
+    LEVEL_COUNTS,
+    LOWER_LID_AFTER,
+    Samples,
+    closures_of,
+    frame_shot,
+    level_shots,
+    lower_lid_shots,
+)
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
 from stimuli_builder.characters.photorealistic.environment import BPY_VERSION, ensure_blender
 
 # Raise when geometry, textures, materials or lights change: work of another recipe is not resumed.
-RECIPE = 1
+RECIPE = 2
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 
@@ -40,6 +48,7 @@ class FaceOrder:
     levels: int
     rendered: int
     samples: Samples
+    lower_lid: bool
     light: str
     out: Path
     work: Path
@@ -66,9 +75,27 @@ class FaceBake:
         return FaceScene(self.kit, self.order.identity, self.order.framing, self.order.size_px)
 
     @cached_property
+    def frame(self) -> Shot:
+        """The still frame's shot."""
+        return frame_shot(self.work, self.order.size_px, self.order.samples)
+
+    @cached_property
+    def levels(self) -> list[Shot]:
+        """The levels' shots, in the order of rendering."""
+        return level_shots(self.work, self.scene.boxes, self.order.samples, self.order.rendered)
+
+    @cached_property
+    def lower(self) -> list[Shot]:
+        """The shots of the lower lid's poses; none if it was not asked for."""
+        if not self.order.lower_lid:
+            return []
+        return lower_lid_shots(self.work, self.scene.lower_lid_boxes, self.order.samples)
+
+    @property
     def shots(self) -> list[Shot]:
-        """Every shot, in the order of rendering."""
-        return shots(self.work, self.order.size_px, self.scene.boxes, self.order.samples, self.order.rendered)
+        """Every shot in the order of rendering; the lower lid follows the ninth level."""
+        first = [self.frame, *self.levels]
+        return [*first[:LOWER_LID_AFTER], *self.lower, *first[LOWER_LID_AFTER:]]
 
     def run(self, report: Callable[[int, int, str], None]) -> None:
         """Render what is missing and write the atlas; `report(done, total, what)` after each shot.
@@ -96,36 +123,44 @@ class FaceBake:
         order = self.order
         python = ensure_blender(order.blender)
         setup = Setup(python, order.light, order.device, order.threads, self.work / "blender.log")
-        done = len(self.shots) - len(missing)
+        done, whole = len(self.shots) - len(missing), self._whole_generation()
         with Renderer(self.scene, setup) as renderer:
             for shot in missing:
                 renderer.render(shot)
                 done += 1
                 report(done, len(self.shots), f"{shot.file.stem} on {renderer.device}")
-                if done - 1 in LEVEL_COUNTS and done < len(self.shots):
-                    self.write(done - 1)
+                if self._whole_generation() != whole:
+                    whole = self._whole_generation()
+                    self.write()
 
-    def write(self, rendered: int | None = None) -> None:
-        """Write the character from the first `rendered` levels of the plan, or from all that are there.
+    def _whole_generation(self) -> int:
+        """The most levels of an evenly spaced atlas whose every level is rendered."""
+        have = set(self._rendered())
+        return max((count for count in LEVEL_COUNTS if set(closures_of(count)) <= have), default=0)
+
+    def _rendered(self) -> list[float]:
+        return sorted(shot.pose.closure for shot in self.levels if shot.file.exists())
+
+    def write(self) -> None:
+        """Write the character from what is rendered; levels in between are moved, at most seven to a step.
 
         Raises
         ------
         InputError
             Not even the still frame and both ends are rendered.
         """
-        have = [shot.closure for shot in self.shots[1:] if shot.file.exists()]
-        if not self.shots[0].file.exists() or not {0.0, 1.0} <= set(have):
+        rendered = self._rendered()
+        if not self.frame.file.exists() or not {0.0, 1.0} <= set(rendered):
             raise InputError(
                 f"nothing to write: the still frame, the open and the shut level are not all in {self.work}; "
                 "bake them first"
             )
-        grid = set(closures_of(rendered)) if rendered else {0.0, 1.0, *have}
-        assembly = Assembly(self.scene, self.shots, sorted(grid & set(have)))
-        levels = max(min(self.order.levels, 8 * (len(have) - 1) + 1), 2)
-        count = max(count for count in LEVEL_COUNTS if count <= levels)
-        assembly.write(
-            self.order.out, self.order.name, count, self._provenance(count, sorted(grid & set(have)))
-        )
+        bound = min(self.order.levels, 8 * (self._whole_generation() - 1) + 1)
+        count = max(count for count in LEVEL_COUNTS if count <= bound)
+        grid = set(closures_of(count))
+        used = [closure for closure in rendered if closure in grid]
+        assembly = Assembly(self.scene, self.frame, self.levels, self.lower, used)
+        assembly.write(self.order.out, self.order.name, count, self._provenance(count, used))
 
     def _provenance(self, levels: int, rendered: list[float]) -> dict[str, Any]:
         order, width, height = self.order, *self.order.size_px

@@ -10,6 +10,7 @@ import numpy as np
 from stimuli_builder.characters.facekit.identity import Movement
 from stimuli_builder.characters.facekit.kit import Array, FaceKit, Index
 from stimuli_builder.characters.facekit.lid_loops import SIDES, chains, globe_of, lid_loops
+from stimuli_builder.characters.facekit.lower_lid import lower_lid_weight, moved_lower_lid
 from stimuli_builder.characters.facekit.sphere import cartesian, slerp, smooth, spherical, surface_radius
 
 CAMERA_Z_CM = 74.0
@@ -43,7 +44,19 @@ class BlinkPath:
         self._others = {side: self._other_movement(side) for side in SIDES}
         self._blink = {side: self._declared_blink(side) for side in SIDES}
         self._moved = {side: np.abs(self._blink[side]).max(1) > 1e-5 for side in SIDES}
+        self._lower_lids = {side: self._lower_lid(side) for side in SIDES}
         self._shut = {side: self._shut_about_globe(side) for side in SIDES}
+
+    def _lower_lid(self, side: int) -> tuple[Index, Array]:
+        """Vertices round an eye, and the share of the lower lid's movement that each follows."""
+        loops = self.loops[side]
+        near = np.concatenate(loops)
+        loop = np.repeat(np.arange(len(loops), dtype=np.float64), [len(one) for one in loops])
+        nasal, height, slope, length = corner_line(self, side)
+        _, azimuth, elevation = spherical(self.rest[near] - self.globes[side].centre)
+        turned = azimuth * side - nasal
+        below = smooth(0.02, -0.04, elevation - (height + slope * turned))
+        return near, lower_lid_weight(loop, below, turned / length)
 
     def _other_movement(self, side: int) -> Array:
         weights = {"cheekSquint": self.movement.cheek, "eyeSquint": self.movement.squint}
@@ -66,11 +79,14 @@ class BlinkPath:
         angle = np.arccos(np.clip(away @ self.gaze(side, stroke) / np.maximum(radius, 1e-9), -1, 1))
         return np.asarray(radius - surface_radius(angle, globe.radius))
 
-    def at(self, strokes: dict[int, float]) -> Array:
-        """(26719, 3) vertices with each side's lid at its stroke."""
+    def at(self, strokes: dict[int, float], lower_cm: tuple[float, float] = (0.0, 0.0)) -> Array:
+        """(26719, 3) vertices with each side's lid at its stroke, the lower lids moved up and nasally."""
         out = self.rest + sum(strokes[side] * self._others[side] for side in SIDES)
         for side in SIDES:
             out[self._moved[side]] = self._along(side, strokes[side])
+            if any(lower_cm):
+                near, weight = self._lower_lids[side]
+                out[near] = moved_lower_lid(out[near], weight, self.globes[side], side, *lower_cm)
             out = self._off_the_eye(out, side, strokes[side])
         return np.asarray(out)
 
@@ -166,12 +182,12 @@ def _profile(at: Array, azimuth: Array, elevation: Array) -> Array:
     return np.interp(at, azimuth[order], elevation[order])
 
 
-def corner_line(path: BlinkPath, side: int) -> tuple[float, float, float]:
-    """Azimuth and elevation of the nasal corner at rest, and the slope towards the temporal one."""
+def corner_line(path: BlinkPath, side: int) -> tuple[float, float, float, float]:
+    """Azimuth and elevation of the nasal corner at rest, slope and azimuth's way to the temporal one."""
     upper, lower = chains(path.kit, path.loops[side][3], side)
     index = np.concatenate([upper, lower])
     _, azimuth, elevation = spherical(path.rest[index] - path.globes[side].centre)
     turned = azimuth * side
     a, b = int(np.argmin(turned)), int(np.argmax(turned))
     slope = (elevation[b] - elevation[a]) / (turned[b] - turned[a])
-    return float(turned[a]), float(elevation[a]), float(slope)
+    return float(turned[a]), float(elevation[a]), float(slope), float(turned[b] - turned[a])

@@ -145,8 +145,13 @@ def _seam(path: BlinkPath, posed: Array, side: int) -> Mesh:
     upper, lower = (edge_line(path, posed, side, LASH_LOOP, up)[:_SEAM_POINTS] for up in (True, False))
     gap = np.linalg.norm(upper - lower, axis=1)
     met = smooth(0.17, 0.11, gap) * smooth(_SEAM_POINTS - 1, _SEAM_POINTS - 25, np.arange(_SEAM_POINTS))
-    line = (upper + lower) / 2 - np.array([0, 0, 0.035])
-    return _tube(line, 0.002 + 0.040 * met)
+    # The more of it has met, the farther the flesh is pressed out of the groove between the lids.
+    pressed = min(1.0, float(met.mean()) / 0.4)
+    line = (upper + lower) / 2 + np.array([0, 0, -0.035 + 0.085 * pressed])
+    outwards = (line[0] - line[25]) / np.linalg.norm(line[0] - line[25])
+    beyond = line[0] + outwards * np.linspace(0.12, 0.015, 8)[:, None]
+    radius = 0.002 + (0.036 + 0.016 * pressed) * np.concatenate([met[0] * np.linspace(0.3, 1, 8), met])
+    return _tube(np.concatenate([beyond, line]), radius)
 
 
 def _nasal_tip(path: BlinkPath, posed: Array, side: int, loop: int) -> Array:

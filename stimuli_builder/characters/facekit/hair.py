@@ -26,9 +26,11 @@ class Strands:
 
 
 def edge_line(path: BlinkPath, vertices: Array, side: int, loop: int, upper: bool) -> Array:
-    """(200, 3) evenly spaced points along a lid's edge from nose to temple."""
-    points = vertices[chains(path.kit, path.loops[side][loop], side)[0 if upper else 1]]
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    """(200, 3) points along a lid's edge from nose to temple, evenly spaced at rest; they move with it."""
+    chain = chains(path.kit, path.loops[side][loop], side)[0 if upper else 1]
+    points = vertices[chain]
+    steps = np.linalg.norm(np.diff(path.rest[chain], axis=0), axis=1)
+    length = np.concatenate([[0], np.cumsum(steps)])
     at = np.linspace(0, length[-1], _EDGE_POINTS)
     line = np.stack([np.interp(at, length, points[:, k]) for k in range(3)], -1)
     kernel = np.hanning(17) / np.hanning(17).sum()

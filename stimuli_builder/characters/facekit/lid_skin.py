@@ -89,9 +89,9 @@ class FaceSkin:
         """(n, 3) vertices at a closure: the opening at the pupil is (1 - closure) of the open one."""
         return self.at_strokes(self.strokes.of(closure))
 
-    def at_strokes(self, strokes: dict[int, float]) -> Array:
-        """(n, 3) vertices with each side's lid at a stroke."""
-        posed = self.fine(self.path.at(strokes))
+    def at_strokes(self, strokes: dict[int, float], lower_cm: tuple[float, float] = (0.0, 0.0)) -> Array:
+        """(n, 3) vertices with each side's lid at a stroke, the lower lids moved (up, towards the nose)."""
+        posed = self.fine(self.path.at(strokes, lower_cm))
         stroke = np.where(self.coordinates.side > 0, strokes[1], strokes[-1])
         posed = posed + normals(posed, self.fine.quads) * self._relief(stroke)[:, None]
         return self._outside_the_eye(posed, strokes)
@@ -236,7 +236,7 @@ def _coordinates(path: BlinkPath, fine: Subdivision, rest: Array) -> LidCoordina
     for side in SIDES:
         here = (sides == side) & (rest[:, 2] > 4)
         _, turned, elevation = spherical(rest[here] - path.globes[side].centre)
-        nasal, height, slope = corner_line(path, side)
+        nasal, height, slope, _ = corner_line(path, side)
         azimuth[here] = turned * side
         upper[here] = smooth(-0.03, 0.05, elevation - (height + slope * (turned * side - nasal)))
     return LidCoordinates(fine(number), upper, azimuth, sides)

@@ -5,9 +5,13 @@ from pathlib import Path
 
 from experiments.errors import InputError
 from stimuli_builder.characters.facekit.framing import Box
+from stimuli_builder.characters.facekit.lid_pose import OPEN, LidPose
 from stimuli_builder.characters.facekit.renderer import Shot
+from stimuli_builder.characters.photorealistic.plan import HORIZONTAL_MM, VERTICAL_MM
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129)
+LOWER_LID_AFTER = 10
+"""Shots before the lower lid's: the still frame and nine levels."""
 
 
 @dataclass(frozen=True)
@@ -27,21 +31,28 @@ def closures_of(levels: int) -> list[float]:
 
 def frame_shot(work: Path, size_px: tuple[int, int], samples: Samples) -> Shot:
     """The whole frame with open eyes."""
-    return Shot(work / "frame.npz", 0.0, {"frame": (0, 0, *size_px)}, samples.frame)
+    return Shot(work / "frame.npz", OPEN, {"frame": (0, 0, *size_px)}, samples.frame)
 
 
-def level_shot(work: Path, boxes: dict[str, Box], samples: Samples, closure: float) -> Shot:
-    """Both eyes at one closure."""
-    return Shot(work / f"level_{closure:.6f}.npz", closure, boxes, samples.boxes)
-
-
-def shots(
-    work: Path, size_px: tuple[int, int], boxes: dict[str, Box], samples: Samples, levels: int
-) -> list[Shot]:
-    """Everything to render: the still frame, both ends, then closures halfway between those before."""
-    plan, planned = [frame_shot(work, size_px, samples)], set()
+def level_shots(work: Path, boxes: dict[str, Box], samples: Samples, levels: int) -> list[Shot]:
+    """Both eyes at each closure: both ends, then closures halfway between those before."""
+    plan: list[Shot] = []
+    planned: set[float] = set()
     for count in LEVEL_COUNTS[: LEVEL_COUNTS.index(levels) + 1]:
         fresh = [closure for closure in closures_of(count) if closure not in planned]
         planned |= set(fresh)
-        plan += [level_shot(work, boxes, samples, closure) for closure in fresh]
+        plan += [
+            Shot(work / f"level_{closure:.6f}.npz", LidPose(closure), boxes, samples.boxes)
+            for closure in fresh
+        ]
     return plan
+
+
+def lower_lid_shots(work: Path, boxes: dict[str, Box], samples: Samples) -> list[Shot]:
+    """Both lower lids of the open eyes in each position but the resting one."""
+    poses = [LidPose(0.0, v, h) for h in HORIZONTAL_MM for v in VERTICAL_MM]
+    return [
+        Shot(work / f"pose_{pose.vertical_mm:.2f}_{pose.horizontal_mm:.2f}.npz", pose, boxes, samples.boxes)
+        for pose in poses
+        if pose != OPEN
+    ]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError, did_you_mean
 from stimuli_builder.characters.facekit import framing
 from stimuli_builder.characters.facekit.framing import Box
+from stimuli_builder.characters.facekit.lid_pose import OPEN, LidPose
 from stimuli_builder.characters.facekit.scene import FaceScene
 
 WORKER = Path(__file__).with_name("cycles_face_worker.py")
@@ -25,10 +26,10 @@ DEVICES = ("auto", "cpu", "gpu")
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture to render: a closure, which boxes of the frame, and where to."""
+    """One picture to render: a pose, which boxes of the frame, and where to."""
 
     file: Path
-    closure: float
+    pose: LidPose
     boxes: dict[str, Box]
     samples: int
 
@@ -56,7 +57,7 @@ class Renderer:
         self._scene, self._setup = scene, setup
         self._folder = tempfile.TemporaryDirectory(prefix="bake-")
         here = Path(self._folder.name)
-        scene.write(here / "scene.npz", 0.0)
+        scene.write(here / "scene.npz", OPEN)
         scene.write_textures(here / "textures.npz")
         (here / "settings.json").write_text(json.dumps(_settings(scene, setup, here)))
         self._log_file = setup.log.open("a")
@@ -99,7 +100,7 @@ class Renderer:
             Blender failed or ended, say because the GPU went away or the disk is full.
         """
         pose = Path(self._folder.name) / "pose.npz"
-        self._scene.write_pose(pose, shot.closure)
+        self._scene.write_pose(pose, shot.pose)
         job = {"pose": str(pose), "out": str(shot.file.resolve())}
         job |= {"samples": shot.samples, "boxes": shot.boxes}  # type: ignore[dict-item]
         # A process that ended breaks the pipe; its answer below says what happened.

@@ -21,9 +21,11 @@ from stimuli_builder.characters.facekit.hair import Brow, Lashes, Strands
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import Array, FaceKit
 from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.lid_pose import OPEN, SHUT, LidPose
 from stimuli_builder.characters.facekit.lid_skin import FaceSkin, face_part, lid_skin
 from stimuli_builder.characters.facekit.pigments import Pigments
 from stimuli_builder.characters.facekit.subdivision import subdivide
+from stimuli_builder.characters.photorealistic.plan import HORIZONTAL_MM, VERTICAL_MM
 
 SIDE_NAMES = {1: "left", -1: "right"}
 MOVES_CM = 0.004
@@ -82,16 +84,16 @@ class FaceScene:
     def _values(self) -> dict[str, Array]:
         return Pigments(self.skin).values()
 
-    def parts(self, closure: float) -> list[Part]:
-        """Every part at a closure, always in the same order, with what colours it."""
-        first, *others = self.shapes(closure)
+    def parts(self, pose: LidPose) -> list[Part]:
+        """Every part in a pose, always in the same order, with what colours it."""
+        first, *others = self.shapes(pose)
         skin = replace(first.shape, values=self._values) if isinstance(first.shape, Mesh) else first.shape
         return [replace(first, shape=skin), *others]
 
-    def shapes(self, closure: float) -> list[Part]:
+    def shapes(self, pose: LidPose) -> list[Part]:
         """The parts without the skin's colours."""
-        strokes = self.strokes.of(closure)
-        coarse, posed = self.path.at(strokes), self.skin.at(closure)
+        strokes, lower_cm = self.strokes.of(pose.closure), self._lower_cm(pose)
+        coarse, posed = self.path.at(strokes, lower_cm), self.skin.at_strokes(strokes, lower_cm)
         parts = [Part("skin", "skin", Mesh(posed, self.skin.fine.quads))]
         for side, name in SIDE_NAMES.items():
             stroke = strokes[side]
@@ -104,14 +106,17 @@ class FaceScene:
             ]
         return parts + [Part(name, "lash", row.at(coarse)) for name, row in self._lashes]
 
-    def write(self, file: Path, closure: float) -> None:
+    def _lower_cm(self, pose: LidPose) -> tuple[float, float]:
+        return pose.vertical_mm / self.view.mm_per_cm, pose.horizontal_mm / self.view.mm_per_cm
+
+    def write(self, file: Path, pose: LidPose) -> None:
         """Write the whole scene."""
-        parts = self.parts(closure)
+        parts = self.parts(pose)
         self._write(file, parts, [part.arrays() for part in parts])
 
-    def write_pose(self, file: Path, closure: float) -> None:
+    def write_pose(self, file: Path, pose: LidPose) -> None:
         """Write the moving arrays alone."""
-        parts = self.shapes(closure)
+        parts = self.shapes(pose)
         self._write(file, parts, [part.moving() for part in parts])
 
     @staticmethod
@@ -138,11 +143,20 @@ class FaceScene:
     @cached_property
     def boxes(self) -> dict[str, Box]:
         """What a blink changes in the picture, by side of the person."""
-        opened, shut = self.shapes(0.0), self.shapes(1.0)
+        return self._boxes_between(SHUT)
+
+    @cached_property
+    def lower_lid_boxes(self) -> dict[str, Box]:
+        """What the lower lid's greatest movement changes, within `boxes`."""
+        between = self._boxes_between(LidPose(0.0, VERTICAL_MM[-1], HORIZONTAL_MM[-1]))
+        return {name: _overlap(box, self.boxes[name]) for name, box in between.items()}
+
+    def _boxes_between(self, pose: LidPose) -> dict[str, Box]:
+        before, after = self.shapes(OPEN), self.shapes(pose)
         out = {}
         for side, name in SIDE_NAMES.items():
             points = []
-            for a, b in zip(opened, shut, strict=True):
+            for a, b in zip(before, after, strict=True):
                 if a.material == "skin" or (a.material in ("lash", "brow") and a.name.endswith(name)):
                     points.append(_moved_points(a, b, side))
             out[name] = self.view.box_round(np.concatenate(points))
@@ -167,6 +181,13 @@ class FaceScene:
             "brow": float(moved[far & (height > 1.5)].max(initial=0.0)),
             "cheek": float(moved[far & (height < -1.0)].max(initial=0.0)),
         }
+
+
+def _overlap(box: Box, other: Box) -> Box:
+    left, top = max(box[0], other[0]), max(box[1], other[1])
+    right = min(box[0] + box[2], other[0] + other[2])
+    bottom = min(box[1] + box[3], other[1] + other[3])
+    return left, top, right - left, bottom - top
 
 
 def _moved_points(opened: Part, shut: Part, side: int) -> Array:

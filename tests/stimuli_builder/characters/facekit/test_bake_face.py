@@ -18,6 +18,7 @@ from stimuli_builder.characters.facekit.identity import (
     load_identity,
 )
 from stimuli_builder.characters.facekit.kit import FaceKit
+from stimuli_builder.characters.facekit.lid_pose import LidPose
 from stimuli_builder.characters.facekit.plan import Samples, closures_of
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
@@ -36,6 +37,7 @@ def order(tmp_path: Path, levels: int = 9, rendered: int = 3) -> FaceOrder:
         levels=levels,
         rendered=rendered,
         samples=Samples(1, 1),
+        lower_lid=False,
         light="studio",
         out=tmp_path / "out",
         work=tmp_path / "work",
@@ -60,18 +62,18 @@ def pretend_rendered(bake: FaceBake, count: int) -> None:
     """Put grey shots, darker with closure, where a bake of that many shots would have left its renders."""
     bake.work.mkdir(parents=True, exist_ok=True)
     for shot in bake.shots[:count]:
-        grey = 0.3 - 0.1 * shot.closure
+        grey = 0.3 - 0.1 * shot.pose.closure
         np.savez(shot.file, **{k: np.full((b[3], b[2], 3), grey, np.float16) for k, b in shot.boxes.items()})
 
 
 def test_the_plan_bisects_and_renders_each_level_once(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
-    planned = [shot.closure for shot in bake_of(kit, scene, order(tmp_path, 17, 17)).shots]
+    planned = [shot.pose.closure for shot in bake_of(kit, scene, order(tmp_path, 17, 17)).shots]
     assert planned[:6] == [0.0, 0.0, 1.0, 0.5, 0.25, 0.75]
     assert sorted(planned[1:]) == closures_of(17)
 
 
 def test_boxes_hold_all_that_moves(scene: FaceScene) -> None:
-    opened, shut = (scene.shapes(closure)[0].arrays()["vertices"] for closure in (0.0, 1.0))
+    opened, shut = (scene.shapes(LidPose(closure))[0].arrays()["vertices"] for closure in (0.0, 1.0))
     moved = np.abs(opened - shut).max(1) > 0.01
     for points in (opened[moved], shut[moved]):
         at = scene.view.project(points.astype(float))
@@ -92,7 +94,7 @@ def test_the_eyes_lie_60_mm_apart_and_the_rest_holds_still(scene: FaceScene) -> 
 
 
 def test_everything_moves_in_one_fixed_topology(scene: FaceScene) -> None:
-    for opened, shut in zip(scene.parts(0.0), scene.parts(0.6), strict=True):
+    for opened, shut in zip(scene.parts(LidPose(0.0)), scene.parts(LidPose(0.6, 1.0, 3.0)), strict=True):
         assert opened.name == shut.name
         for key, value in opened.arrays().items():
             assert shut.arrays()[key].shape == value.shape
@@ -118,6 +120,23 @@ def test_a_finished_bake_writes_a_character_without_blender(
     assert "ICT-FaceKit" in provenance["geometry"]
     assert atlas.declaration.inter_ocular_mm == 60.0
     assert "Permission is hereby granted" in (tmp_path / "out" / "ICT-FaceKit-LICENSE.txt").read_text()
+
+
+def test_the_lower_lid_follows_the_ninth_level_and_makes_a_full_grid(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path
+) -> None:
+    wanted = FaceOrder(**(order(tmp_path, 17, 17).__dict__ | {"lower_lid": True}))
+    bake = bake_of(kit, scene, wanted)
+    assert [shot.file.name.split("_")[0] for shot in bake.shots] == (
+        ["frame.npz"] + ["level"] * 9 + ["pose"] * 32 + ["level"] * 8
+    )
+    pretend_rendered(bake, 42)
+    bake.write()
+    lower = load_atlas(tmp_path / "out").lower_lid_layer
+    assert lower.changes.shape[:2] == (5, 11)
+    assert np.abs(lower.changes).max() < 0.01
+    covered = [1 - lower.factor_at(k).mean() for k in (0, 16, 32)]
+    assert covered[0] < covered[1] < covered[2]
 
 
 def test_an_interrupted_bake_says_what_lacks_and_keeps_what_is_there(

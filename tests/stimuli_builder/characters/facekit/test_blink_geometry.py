@@ -108,3 +108,18 @@ def test_modes_stay_within_the_documented_range() -> None:
     drawn = np.array([identity_of_seed(seed).weights() for seed in range(1, 200)])
     assert np.abs(drawn).max() == pytest.approx(1.6)
     assert not identity_of_seed(0).weights().any()
+
+
+@pytest.mark.parametrize(("up", "nasal"), [(0.10, 0.0), (0.0, 0.50), (0.10, 0.50)])
+def test_the_lower_lid_goes_as_far_as_told_on_the_globe(kit: FaceKit, up: float, nasal: float) -> None:
+    skin = skin_of(kit, 3)
+    still, moved = skin.at(0.0), skin.at_strokes({1: 0.0, -1: 0.0}, (up, nasal))
+    at = skin.coordinates
+    middle = (np.abs(at.loop - 3) < 0.3) & (at.upper < 0.5) & (np.abs(at.azimuth - 0.12) < 0.12)
+    for side in (1, -1):
+        change = (moved - still)[middle & (at.side == side)]
+        assert np.median(change[:, 1]) == pytest.approx(up, abs=0.03)
+        assert np.median(-change[:, 0] * side) == pytest.approx(nasal, rel=0.12, abs=0.02)
+        assert deepest_cm(skin, moved, side) > 0
+    corners = np.abs(moved - still).max(1)[at.upper > 0.99]
+    assert corners.max() < 0.03
