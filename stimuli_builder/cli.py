@@ -73,6 +73,10 @@ COMMANDS = {
         "stimuli_builder.clips.cli",
         "Write the shipped characters at 33 closures as picture strips, for the dashboard's blinks page.",
     ),
+    "scope": (
+        "stimuli_builder.sync_patch.cli",
+        "Read the sync patch from a film of the screen or a photodiode: missing frames and intervals.",
+    ),
     "verify": (
         "stimuli_builder.clips.cli",
         "Check a folder of clips against its manifest: presence, hashes, frame counts, timing and eyelid "

@@ -27,3 +27,6 @@ class Display(Declaration):
     """Smallest window height, in CSS pixels, in which a run may begin."""
     allow_touch: bool = True
     """False turns away devices that have a touch screen and no mouse: phones and tablets."""
+    sync_patch: bool = False
+    """Draws a square into the clip's lower left corner that codes the frame's number, for a photodiode or a
+    phone's film (`stimuli scope`). For measuring a set-up, not for participants."""

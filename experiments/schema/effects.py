@@ -47,6 +47,7 @@ EFFECTS: Mapping[str, Effect] = {
     "display.minimum_width_px": "wording",
     "display.minimum_height_px": "wording",
     "display.allow_touch": "wording",
+    "display.sync_patch": "measured",
     "session": "wording",
     # A play that counts by the one rule does not by the other.
     "playback": "measured",

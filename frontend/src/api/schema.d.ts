@@ -2329,6 +2329,13 @@ export interface components {
              * @default true
              */
             allow_touch: boolean;
+            /**
+             * Sync Patch
+             * @description Draws a square into the clip's lower left corner that codes the frame's number, for a photodiode or a
+             *     phone's film (`stimuli scope`). For measuring a set-up, not for participants.
+             * @default false
+             */
+            sync_patch: boolean;
         };
         /**
          * Disturbances
@@ -2811,7 +2818,8 @@ export interface components {
              *       "background": "#808080",
              *       "minimum_width_px": 800,
              *       "minimum_height_px": 500,
-             *       "allow_touch": true
+             *       "allow_touch": true,
+             *       "sync_patch": false
              *     }
              */
             display: components["schemas"]["Display"];

@@ -138,7 +138,7 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   if (!kept) keeping.begin({ link, started, run });
   const kind = known ?? (await loadKind(run.trial.kind));
   await loadMessages(run.language);
-  const player = await choosePlayer(run.display.background);
+  const player = await choosePlayer(run.display);
   const session = openSession({ root, link, run, kind, player, outbox, unsent });
   setLanguage(run.language);
   const over = (): Promise<void> => {

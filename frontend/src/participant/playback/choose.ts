@@ -1,4 +1,5 @@
 /** Frame by frame in the worker where that is possible, else the video element. */
+import type { RunState } from "../../api/schema";
 import type { ClipPlayer } from "./player";
 import { WorkerPlayer } from "./worker-player";
 
@@ -23,9 +24,11 @@ export function hasVideo(): boolean {
   return hasWebCodecs() || typeof document.createElement("video").play === "function";
 }
 
+type Display = Pick<RunState["display"], "background" | "sync_patch">;
+
 /** The fallback is fetched only where it is needed: such a browser does without the worker and its decoder. */
-export async function choosePlayer(background: string): Promise<ClipPlayer> {
-  if (hasWebCodecs()) return new WorkerPlayer(background);
+export async function choosePlayer({ background, sync_patch }: Display): Promise<ClipPlayer> {
+  if (hasWebCodecs()) return new WorkerPlayer(background, sync_patch);
   const { VideoPlayer } = await import("./video-player");
   return new VideoPlayer();
 }

@@ -4,7 +4,7 @@ import type { Part } from "./player";
 import type { Evenness } from "./refresh-clock";
 
 export type ToWorker =
-  | { type: "canvas"; canvas: OffscreenCanvas; background: string }
+  | { type: "canvas"; canvas: OffscreenCanvas; background: string; sync_patch: boolean }
   | { type: "prepare"; sha256: string; bytes: ArrayBuffer; fps: number | null }
   | { type: "play"; sha256: string; refresh_ms: number; fixation_ms: number }
   | { type: "compose"; sha256: string; parts: Part[]; width: number; height: number }

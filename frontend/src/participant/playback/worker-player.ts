@@ -21,12 +21,12 @@ export class WorkerPlayer implements ClipPlayer {
   private readonly prepared = new Map<string, Promise<Prepared>>();
   private readonly waiting = new Map<string, Waiting>();
 
-  constructor(background: string) {
+  constructor(background: string, sync_patch: boolean) {
     this.worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.arrived(data);
     this.worker.onerror = (event) => this.broken(event.message || "the worker could not be started");
     const canvas = this.element.transferControlToOffscreen();
-    this.tell({ type: "canvas", canvas, background }, [canvas]);
+    this.tell({ type: "canvas", canvas, background, sync_patch }, [canvas]);
   }
 
   prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared> {

@@ -8,6 +8,7 @@ import type { Part } from "./player";
 import { absoluteNow, type FromWorker, type ToWorker } from "./protocol";
 import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
 import { FrameSchedule } from "./schedule";
+import type { drawSyncPatch } from "./sync-patch";
 
 interface Scope {
   postMessage(message: FromWorker): void;
@@ -23,6 +24,7 @@ const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callbac
 const clips = new Map<string, SingleClip | Composed>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
 let background = "#808080";
+let mark: typeof drawSyncPatch | null = null;
 
 async function prepare(sha256: string, bytes: ArrayBuffer, declared_fps: number | null): Promise<void> {
   try {
@@ -61,6 +63,12 @@ function blank(): void {
   if (!context) return;
   context.fillStyle = background;
   context.fillRect(0, 0, context.canvas.width, context.canvas.height);
+  mark?.(context, null);
+}
+
+async function loadSyncPatch(): Promise<void> {
+  mark = (await import("./sync-patch")).drawSyncPatch;
+  blank();
 }
 
 function cross(): void {
@@ -127,7 +135,9 @@ function showing(sha256: string, clip: SingleClip | Composed, refresh_ms: number
     }
     const index = schedule.next(refresh_at_ms);
     if (index === null || !context) return;
-    if (drawFrame(context, clip, index)) drawn.push([index, absoluteNow()]);
+    if (!drawFrame(context, clip, index)) return;
+    mark?.(context, index);
+    drawn.push([index, absoluteNow()]);
   };
 }
 
@@ -144,6 +154,7 @@ scope.onmessage = ({ data }) => {
     background = data.background;
     context = data.canvas.getContext("2d", { alpha: false });
     blank();
+    if (data.sync_patch) void loadSyncPatch();
   } else if (data.type === "prepare") void prepare(data.sha256, data.bytes, data.fps);
   else if (data.type === "release") release(data.sha256);
   else if (data.type === "blank") resize(data.width, data.height);
