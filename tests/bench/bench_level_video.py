@@ -1,0 +1,50 @@
+"""Levels of `photorealistic` as one video against single lossless pictures: size, loss, and time to read.
+
+`make bench`, or: python -m pytest tests/bench/bench_level_video.py -o python_files='bench_*.py' -s
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stimuli_builder.characters import level_video
+from stimuli_builder.characters.atlas import SHIPPED, load_atlas
+from stimuli_builder.characters.photorealistic.development import psnr_db
+
+
+@pytest.fixture(scope="module")
+def pictures() -> tuple[list[NDArray[np.uint8]], float, float]:
+    """Every level, the megabytes of their files, and the processor-seconds to read them: the baseline."""
+    atlas = load_atlas(SHIPPED / "photorealistic")
+    began = time.process_time()
+    levels = [atlas.level_srgb(number) for number in range(len(atlas.closures))]
+    seconds = time.process_time() - began
+    size = sum((atlas.folder / level.file).stat().st_size for level in atlas.declaration.levels)
+    return levels, size / 1e6, seconds
+
+
+@pytest.mark.parametrize("quantiser", [7, 12, 16])
+def test_levels_in_a_video(
+    pictures: tuple[list[NDArray[np.uint8]], float, float],
+    quantiser: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    levels, megabytes, seconds = pictures
+    monkeypatch.setattr(level_video, "QUANTISER", quantiser)
+    level_video.write_level_video(tmp_path, "levels.mkv", levels)
+    content = (tmp_path / "levels.mkv").read_bytes()
+    began = time.process_time()
+    frames = level_video.decode_level_video(content, "levels", "levels.mkv")
+    took = time.process_time() - began
+    worst = min(psnr_db(a, b) for a, b in zip(frames, levels, strict=True))
+    error = max(int(np.abs(a.astype(int) - b).max()) for a, b in zip(frames, levels, strict=True))
+    sys.stdout.write(
+        f"\nquantiser {quantiser}: {len(content) / 1e6:.1f} MB against {megabytes:.1f} MB, "
+        f"least PSNR {worst:.1f} dB, greatest error {error}; "
+        f"reading takes {took / seconds:.2f} of single pictures' {seconds:.2f} s\n"
+    )
