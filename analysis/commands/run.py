@@ -65,6 +65,10 @@ def run(
     version: Annotated[
         int | None, typer.Option(min=1, help="One version of the study alone.", show_default=False)
     ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(help="One scale of a study that has several; all without it.", show_default=False),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the report; default out/analysis/NAME.", show_default=False)
     ] = None,
@@ -86,6 +90,8 @@ def run(
       analysis run exp2 --database postgresql://me@host/palpebra --study spring
 
       analysis run exp1 --origin pilot --series 2
+
+      analysis run sliders-demo --scale eeriness
 
       analysis run exp3 --csv ratings.csv --runs runs.csv
     """
@@ -118,7 +124,7 @@ def run(
                     database or default_url(), declared, reading, study, report and sensitivity
                 )
             )
-            contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None)
+            contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None, scale)
     except NoRatingsError as error:
         typer.echo(f"nothing to analyse: {error}", err=True)
         raise typer.Exit(1) from None

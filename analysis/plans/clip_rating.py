@@ -1,11 +1,13 @@
 """The analysis of single-clip ratings: cell means, their tests, and models beside them."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
+from analysis.errors import NoRatingsError
 from analysis.plans.plan import Plan
 from analysis.plans.prepare import Prepared, prepare, refuse_unknown, where
 from analysis.plans.result import Analysis, analyse_cells, labels_of
@@ -18,9 +20,9 @@ from analysis.within.cell_means import cell_table
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.scales import RatedScale, scales_of
+from experiments.trials.scales import RatedScale, scale_called, scales_of
 
-READING = Reading(RATINGS, numbers=("response",), further=("exemplar",), beside=("scale",))
+READING = Reading(RATINGS, numbers=("response",), further=("exemplar",), beside=("scale", "not_applicable"))
 
 
 def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
@@ -86,6 +88,15 @@ def contents(prepared: Prepared) -> Contents:
     """What the report says."""
     from analysis.report.within_contents import contents_of
 
+    if prepared.scale is not None:
+        named = scale_called(prepared.experiment, prepared.scale)
+        rows = on_scale(prepared.experiment, prepared.rows, named.name)
+        if rows.empty:
+            raise NoRatingsError(f"{prepared.source} has no ratings on the scale {named.name} yet")
+        prepared = replace(prepared, exclusions=replace(prepared.exclusions, rows=rows))
+        said = f"the scale {named.name} alone, of {len(scales_of(prepared.experiment))}"
+        analysis = analyse(replace(prepared, decisions=(*prepared.decisions, said)), named.name)
+        return contents_of(analysis, partial(_more, analysis))
     if len(scales_of(prepared.experiment)) > 1:
         from analysis.plans.several_scales import contents_of_scales
 

@@ -6,6 +6,7 @@ from typing import assert_never
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from analysis.read.study_answers import StudyAnswers
 from experiments import rules
@@ -52,10 +53,13 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
     rows, aside = _with_run(ratings.rows), list[str]()
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
     main, attention = rows[(kind == "main").to_numpy()], rows[(kind == "attention").to_numpy()]
-    practice = len(rows) - len(main) - len(attention)
+    practice = n_plays(rows[~kind.isin(["main", "attention"]).to_numpy()])
     aside += [f"{practice} practice trials"] if practice else []
     unrated = np.isnan(main["response"].to_numpy())
-    aside += [f"{unrated.sum()} plays without a rating"] if unrated.any() else []
+    not_applicable = unrated & _not_applicable(main)
+    silent = n_plays(main[unrated & ~not_applicable])
+    aside += [f"{silent} plays without a rating"] if silent else []
+    aside += [f"{not_applicable.sum()} answers that the scale does not apply"] if not_applicable.any() else []
     plays, main = main, main[~unrated]
     people = _people(main, rows)
     reasons, not_applied = _participant_reasons(experiment, rows, plays, attention)
@@ -68,6 +72,22 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
     kept = main[~main["run"].isin(list(reasons)).to_numpy()]
     kept, dropped, missing = _drop_trials(experiment, kept)
     return Exclusions(excluded, dropped, tuple(aside), (*not_applied, *missing), len(people), kept)
+
+
+def n_plays(rows: pd.DataFrame) -> int:
+    """How many plays the rows are of: a play rated on several scales has a row a scale."""
+    keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]
+    if "scale" not in rows.columns or "trial_index" not in keys:
+        return len(rows)
+    return int((~rows.duplicated(keys)).sum())
+
+
+def _not_applicable(rows: pd.DataFrame) -> NDArray[np.bool_]:
+    """True where the answer beside the scale was chosen, that it does not apply."""
+    if "not_applicable" not in rows.columns:
+        return np.zeros(len(rows), dtype=bool)
+    said = rows["not_applicable"].astype(str).str.casefold()
+    return said.isin(["1", "1.0", "true", "yes"]).to_numpy()
 
 
 def _with_run(rows: pd.DataFrame) -> pd.DataFrame:
@@ -154,6 +174,6 @@ def _drop_trials(
             continue
         bad = np.array([rule.drops(value) for value in rows[rule.needed].tolist()], dtype=bool)
         if bad.any():
-            dropped.append(DroppedTrials(rule.rule, int(bad.sum()), int(rows["run"][bad].nunique())))
+            dropped.append(DroppedTrials(rule.rule, n_plays(rows[bad]), int(rows["run"][bad].nunique())))
         rows = rows[~bad]
     return rows, tuple(dropped), missing

@@ -15,6 +15,7 @@ from analysis.read.study_answers import StudyAnswers
 from analysis.report.evidence import evidence_section
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
+from experiments.trials.scales import scale_called
 
 if TYPE_CHECKING:
     from analysis.report.contents import Contents
@@ -29,6 +30,8 @@ class Prepared:
     synthetic: bool
     exclusions: Exclusions
     decisions: tuple[str, ...]
+    scale: str | None = None
+    """The scale to analyse, where not all are."""
 
     @property
     def rows(self) -> pd.DataFrame:
@@ -37,12 +40,21 @@ class Prepared:
 
 
 def study_contents(
-    experiment: Experiment, answers: StudyAnswers, pool: Pool = Pool(), runs: RunEvidence | None = None
+    experiment: Experiment,
+    answers: StudyAnswers,
+    pool: Pool = Pool(),
+    runs: RunEvidence | None = None,
+    scale: str | None = None,
 ) -> "Contents":
-    """Analyse a study by the plan of its kind of trial; `runs` are verdicts and signals of a runs file."""
+    """Analyse a study by the plan of its kind of trial.
+
+    `runs` are verdicts and signals of a runs file; `scale` names the one to analyse, where not all are.
+    """
     plan = plan_of(experiment.trial.kind)
+    if scale is not None:
+        scale_called(experiment, scale)
     answers = with_verdicts(answers, runs) if runs else answers
-    contents = plan.analyse(prepare(experiment, plan, answers, pool))
+    contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
     evidence, numbers = evidence_section(pooled(answers.rows, pool, answers.source)[0], runs)
     if evidence is None:
         return contents

@@ -75,3 +75,45 @@ def alpha_of(rows: list[dict[str, object]]) -> float:
     table = np.array(turned)
     k = len(table)
     return k / (k - 1) * (1 - table.var(axis=1, ddof=1).sum() / table.sum(axis=0).var(ddof=1))
+
+
+def report_of(tmp_path, rows, *options):
+    path, out = tmp_path / "r.csv", tmp_path / "n.json"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, RATINGS.csv_header(DEMO.factor_names))
+        writer.writeheader()
+        writer.writerows(rows)
+    done = CliRunner().invoke(
+        app, ["run", "sliders_demo", "--csv", str(path), "--json", str(out), "--no-report", *options]
+    )
+    return done, json.loads(out.read_text(encoding="utf-8")) if done.exit_code == 0 else None
+
+
+def test_one_scale_is_analysed_for_itself_by_its_name(tmp_path, rows) -> None:
+    done, numbers = report_of(tmp_path, rows, "--scale", "eeriness")
+    assert done.exit_code == 0, done.output
+    assert "the scale eeriness alone, of 3" in " ".join(numbers["decisions"])
+    mine = [float(row["response"]) for row in rows if row["scale"] == "eeriness"]
+    main = [mean["mean"] for mean in numbers["marginal_means"] if mean["effect"] == DEMO.factor_names[0]]
+    assert np.mean(main) == pytest.approx(np.mean(mine))
+    _, whole = report_of(tmp_path, rows)
+    of_all = next(one for one in whole["scales"] if one["scale"] == "eeriness")
+    assert of_all["marginal_means"] == numbers["marginal_means"]
+
+
+def test_an_unknown_scale_is_named_with_the_nearest(tmp_path, rows) -> None:
+    done, _ = report_of(tmp_path, rows, "--scale", "eerines")
+    assert done.exit_code != 0
+    assert "has no scale 'eerines'; did you mean 'eeriness'?" in str(done.exception)
+
+
+def test_left_out_counts_plays_and_answers_that_a_scale_does_not_apply(tmp_path, rows) -> None:
+    first = [row for row in rows if row["run"] == "r0"]
+    last = max(int(str(row["trial_index"])) for row in first)
+    for row in first:
+        if row["trial_index"] == 0 and row["scale"] == "tiredness":
+            row |= {"response": "", "not_applicable": 1}
+        if row["trial_index"] == last:
+            row |= {"response": "", "verdict": "failed"}
+    aside = report_of(tmp_path, rows)[1]["exclusions"]["set_aside"]
+    assert aside == ["1 plays without a rating", "1 answers that the scale does not apply"]
