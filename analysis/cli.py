@@ -23,6 +23,7 @@ def _gather() -> None:
     from analysis.commands.reshape import register as register_reshape
     from analysis.commands.run import register as register_run
     from analysis.commands.thresholds import register as register_thresholds
+    from analysis.commands.verify import register as register_verify
 
     register_run(app)
     register_anova(app)
@@ -32,6 +33,7 @@ def _gather() -> None:
     register_thresholds(app)
     register_opinion(app)
     register_agreement(app)
+    register_verify(app)
     register_reshape(app)
 
 

@@ -24,13 +24,24 @@ app = typer.Typer(
 def _gather() -> None:
     from server import cli_database, cli_run
     from server.accounts import cli as accounts
+    from server.capsules import cli as capsules
     from server.export import cli as export
     from server.methods import cli as methods
     from server.operations import cli as operations
     from server.simulation import cli as simulation
     from server.studies import cli as studies
 
-    for group in (cli_run, cli_database, studies, export, methods, simulation, accounts, operations):
+    for group in (
+        cli_run,
+        cli_database,
+        studies,
+        export,
+        capsules,
+        methods,
+        simulation,
+        accounts,
+        operations,
+    ):
         group.register(app)
 
 

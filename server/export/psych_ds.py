@@ -34,11 +34,12 @@ class Folder:
     Attributes
     ----------
     members: path and bytes of each file, tables last; taken once.
-    answers: path of the table of answers. renamed: factors that have another name in this folder.
+    answers, runs: paths of those tables. renamed: factors that have another name in this folder.
     """
 
     members: Iterator[Member]
     answers: str
+    runs: str
     renamed: dict[str, str]
 
 
@@ -70,7 +71,7 @@ def dataset_folder(session: Session, study: Study, made: str, origin: ExportOrig
         *((path, [encoded(text)]) for path, text in texts.items()),
         *((paths[table.name], csv_pieces(table.with_header())) for table in tables),
     )
-    return Folder(iter(members), paths[tables[0].name], renamed)
+    return Folder(iter(members), paths[tables[0].name], paths["runs"], renamed)
 
 
 def _tables(session: Session, study: Study, origin: ExportOrigin, wide: bool) -> list[ExportTable]:

@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import sys
 import threading
 from datetime import timedelta
 from pathlib import Path
@@ -20,13 +19,13 @@ from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.methods.service import methods_of, read_results, write
 from server.models import Job, Study
+from server.reports.process import LONGEST_S, run_analysis
 from server.reports.schemas import NewReport, ReportOut
 from server.studies.lookup import find_study
 from server.studies.series import version_of_series
 from server.tokens import new_public_id
 
 KIND = "report"
-LONGEST_S = 1800
 _one_at_a_time = threading.Lock()
 
 
@@ -143,17 +142,15 @@ def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> i
 
 def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
     """Run the analysis; return its own error line where it failed, else an empty text."""
-    program = Path(sys.executable).with_name("analysis")
-    command = [str(program), "run", str(inputs / "definition.toml"), "--csv", str(inputs / "answers.csv")]
-    command += ["--runs", str(inputs / "runs.csv")]
-    command += ["--origin", wanted.origin, "--series", str(series), "--out", str(folder)]
-    command += [] if wanted.sensitivity else ["--no-sensitivity"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603
-    if done.returncode == 0:
-        return ""
-    lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
-    shutil.rmtree(folder, ignore_errors=True)
-    return (lines[-1] if lines else f"the analysis ended with code {done.returncode}")[:500]
+    return run_analysis(
+        inputs / "definition.toml",
+        inputs / "answers.csv",
+        folder,
+        origin=wanted.origin,
+        series=series,
+        sensitivity=wanted.sensitivity,
+        runs=inputs / "runs.csv",
+    )
 
 
 def _add_methods(services: Services, name: str, folder: Path, wanted: NewReport, series: int) -> None:

@@ -1,0 +1,157 @@
+"""Build a capsule: Psych-DS folder, clips, report, software versions and RO-Crate, then the zip of all."""
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from sqlalchemy.orm import Session
+
+from experiments.capsule.declaration import CAPSULE_FILE, REPORT_FOLDER, Capsule, ReportSource
+from experiments.capsule.packing import listed_files, pack, report_input
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.files import whole_file
+from experiments.json import json_text
+from experiments.manifest import Manifest
+from experiments.software import present_software
+from server.capsules.crate import CRATE_FILE, crate_metadata
+from server.clock import now
+from server.context import Services
+from server.export.psych_ds import Folder, dataset_folder
+from server.methods.service import methods_of, read_results, write
+from server.models import Study, StudyVersion
+from server.reports.process import run_analysis
+from server.storage.clips import ClipStore
+from server.studies.lookup import active_version, definition_of, find_study
+
+CapsuleOrigin = Literal["participant", "pilot", "simulated"]
+Progress = Callable[[float, str], None]
+ANSWERS = "answers.csv"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a capsule holds.
+
+    Attributes
+    ----------
+    clips: whether the clips are in it; their hashes are in the manifest always.
+    sensitivity: whether the report has the parts that take long.
+    """
+
+    origin: CapsuleOrigin = "participant"
+    clips: bool = True
+    sensitivity: bool = True
+
+
+def build_capsule(
+    services: Services, name: str, wanted: Wanted, target: Path, progress: Progress = lambda _, __: None
+) -> Capsule:
+    """Write the capsule of a study to `target`, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        There is nothing to analyse, or a clip is missing from the store.
+    """
+    made = now().date().isoformat()
+    with tempfile.TemporaryDirectory(prefix=".capsule-", dir=target.parent) as temporary:
+        folder, work = Path(temporary) / "capsule", Path(temporary) / "work"
+        folder.mkdir()
+        work.mkdir()
+        progress(0.05, "exporting")
+        with services.database.snapshot() as session:
+            study = find_study(session, name)
+            version = active_version(session, study)
+            source = _write_study(session, study, version, folder, made, wanted)
+            experiment = definition_of(version)
+            if wanted.clips:
+                progress(0.15, "copying clips")
+                _copy_clips(services.clips, Manifest.model_validate(version.manifest), folder)
+            progress(0.3, "analysing")
+            source = _report(session, study, source, folder, work)
+        progress(0.9, "packing")
+        capsule = _list(study.name, experiment, source, folder, made)
+        with whole_file(target) as unfinished:
+            pack(folder, unfinished)
+    return capsule
+
+
+def _write_study(
+    session: Session, study: Study, version: StudyVersion, folder: Path, made: str, wanted: Wanted
+) -> ReportSource:
+    exported: Folder = dataset_folder(session, study, made, wanted.origin)
+    for path, pieces in exported.members:
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        with (folder / path).open("wb") as stream:
+            for piece in pieces:
+                stream.write(piece)
+    experiment = definition_of(version)
+    texts = {
+        "materials/manifest.json": json_text(version.manifest),
+        "analysis/plan.json": json_text(_plan(experiment)),
+        "documentation/software.json": json_text(present_software().model_dump(mode="json")),
+    }
+    for path, text in texts.items():
+        (folder / path).write_text(text, encoding="utf-8")
+    return ReportSource(
+        definition=f"materials/{experiment.name}.toml",
+        answers=exported.answers,
+        runs=exported.runs,
+        origin=wanted.origin,
+        series=version.series,
+        sensitivity=wanted.sensitivity,
+        renamed=exported.renamed,
+        rebuilt=(),
+    )
+
+
+def _plan(experiment: Experiment) -> dict[str, object]:
+    """What was fixed of the analysis, for people and programs that do not read TOML."""
+    return experiment.model_dump(
+        mode="json", include={"analysis", "exclusions", "attention", "screening", "playback", "participants"}
+    )
+
+
+def _copy_clips(store: ClipStore, manifest: Manifest, folder: Path) -> None:
+    clips = folder / "materials" / "clips"
+    clips.mkdir(parents=True)
+    for clip in manifest.clips:
+        target, size = clips / clip.file, store.size(clip.sha256)
+        if size is None:
+            raise InputError(f"clip {clip.file} is missing from the clip store; run: server doctor")
+        with target.open("wb") as stream:
+            for piece in store.read(clip.sha256, 0, size):
+                stream.write(piece)
+
+
+def _report(session: Session, study: Study, source: ReportSource, folder: Path, work: Path) -> ReportSource:
+    """Make the report from the capsule's own table, so that it can be made from it again."""
+    answers, results = work / ANSWERS, folder / REPORT_FOLDER
+    report_input(folder / source.answers, answers, source.renamed)
+    message = run_analysis(
+        folder / source.definition,
+        answers,
+        results,
+        origin=source.origin,
+        series=source.series,
+        sensitivity=source.sensitivity,
+        runs=folder / source.runs,
+        seal=folder / source.seal if source.seal else None,
+    )
+    if message:
+        raise InputError(f"a capsule holds the report, which could not be made: {message}")
+    rebuilt = tuple(sorted(path.name for path in results.iterdir()))
+    write(results, methods_of(session, study, source.origin, source.series, read_results(results)))
+    return source.model_copy(update={"rebuilt": rebuilt})
+
+
+def _list(study: str, experiment: Experiment, source: ReportSource, folder: Path, made: str) -> Capsule:
+    software = present_software()
+    crate = crate_metadata(study, experiment, listed_files(folder), source, software, made)
+    (folder / CRATE_FILE).write_text(crate, encoding="utf-8")
+    capsule = Capsule(study=study, made=made, report=source, software=software, files=listed_files(folder))
+    (folder / CAPSULE_FILE).write_text(capsule.text(), encoding="utf-8")
+    return capsule

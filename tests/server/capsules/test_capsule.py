@@ -1,0 +1,269 @@
+"""The capsule of exp3 with 20 runs: verified in another folder, and refused once anything in it differs."""
+
+import json
+import shutil
+import subprocess
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import HealthCheck, given, settings, strategies
+from typer.testing import CliRunner
+
+from analysis.cli import app as analysis
+from experiments.capsule.declaration import CAPSULE_FILE
+from experiments.capsule.opening import CapsuleError, open_capsule
+from experiments.errors import InputError
+from experiments.load import FOLDER
+from server.app import create_app
+from server.capsules.build import Wanted, build_capsule
+from server.context import Services, open_services
+from server.settings import Settings
+from tests.helpers.studies import Participant, add_study
+from tests.server.export.test_psych_ds import VALIDATOR
+
+RUNS = 20
+CREDIT = """
+[dataset]
+licence = "CC-BY-4.0"
+
+[[dataset.creators]]
+name = "Jane Doe"
+orcid = "0000-0002-1825-0097"
+affiliation = "University of Examples"
+"""
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory, sqlite_template: Path) -> Iterator[Services]:
+    """exp3 with 20 complete runs, the answers following the lower lid so that there is something to find."""
+    folder = tmp_path_factory.mktemp("capsule")
+    shutil.copy(sqlite_template, folder / "test.sqlite")
+    address = f"sqlite:///{folder / 'test.sqlite'}"
+    services = open_services(Settings(data_folder=folder, database_url=address, secret_key="test key"))
+    text = (FOLDER / "exp3.toml").read_text(encoding="utf-8") + CREDIT
+    study = add_study(services, folder / "clips", text)
+    app = create_app(services.settings)
+    app.state.services = services
+    with TestClient(app) as client:
+        for number in range(RUNS):
+            _take_part(Participant(client, study.link_token), number)
+    yield services
+    services.database.close()
+
+
+def _take_part(person: Participant, number: int) -> None:
+    person.agree()
+    for form in person.state()["forms"]:
+        answers = {"age": 20 + number, "gender": "other", "vision": "normal"}
+        known = {field["name"] for field in form["fields"]}
+        given = {name: value for name, value in answers.items() if name in known}
+        assert person.request("PUT", f"/forms/{form['name']}", {"answers": given}).status_code == 200
+    for trial in person.state()["trials"]:
+        asked = [int(word) for word in (trial["prompt"] or "").replace("*", " ").split() if word.isdigit()]
+        shown = sum(map(ord, trial["clip_sha256"] or "")) % 3
+        response = asked[0] if asked else 2 + (number + trial["trial_index"] * 7 + shown) % 5
+        assert person.rate(trial, response).status_code == 201
+    assert person.request("POST", "/complete").status_code == 200
+
+
+@pytest.fixture(scope="module")
+def capsule(opened: Services) -> Path:
+    target = opened.settings.data_folder / "exp3-capsule.zip"
+    build_capsule(opened, "exp3", Wanted(sensitivity=False), target)
+    return target
+
+
+@pytest.fixture
+def unpacked(capsule: Path, tmp_path: Path) -> Path:
+    with zipfile.ZipFile(capsule) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    return tmp_path / "unpacked"
+
+
+def verify(place: Path, *options: str) -> tuple[int, str]:
+    result = CliRunner().invoke(analysis, ["verify", str(place), *options])
+    if isinstance(result.exception, InputError):
+        return 2, str(result.exception)
+    return result.exit_code, result.output
+
+
+def test_it_is_verified_in_another_folder(capsule: Path, tmp_path: Path) -> None:
+    elsewhere = shutil.copy(capsule, tmp_path / "from a friend.zip")
+    code, said = verify(Path(elsewhere))
+    assert code == 0, said
+    assert "every one as listed" in said
+    assert "verified: every table as printed, every figure byte for byte" in said
+
+
+def test_it_holds_what_the_study_is_made_of(unpacked: Path) -> None:
+    present = {str(path.relative_to(unpacked)) for path in unpacked.rglob("*") if path.is_file()}
+    assert {
+        "README.md", "dataset_description.json", "ro-crate-metadata.json", CAPSULE_FILE,
+        "materials/exp3.toml", "materials/manifest.json", "documentation/codebook.md",
+        "documentation/software.json", "analysis/plan.json", "analysis/analysis.R", "analysis/analysis.py",
+        "results/report.html", "results/tables.tex", "results/results.json", "results/methods.txt",
+    } <= present  # fmt: skip
+    manifest = json.loads((unpacked / "materials/manifest.json").read_text(encoding="utf-8"))
+    assert {f"materials/clips/{clip['file']}" for clip in manifest["clips"]} <= present
+    numbers = json.loads((unpacked / "results/results.json").read_text(encoding="utf-8"))
+    assert numbers["n_participants"] == RUNS
+    versions = json.loads((unpacked / "documentation/software.json").read_text(encoding="utf-8"))
+    assert {"numpy", "matplotlib", "palpebra", "scipy"} <= set(versions["packages"])
+
+
+@pytest.mark.parametrize(
+    "path", ["data/study-exp3_description-ratings_data.csv", "results/tables.tex", "materials/exp3.toml"]
+)
+def test_a_changed_byte_is_refused_with_the_files_name(unpacked: Path, path: str) -> None:
+    content = bytearray((unpacked / path).read_bytes())
+    content[len(content) // 2] ^= 1
+    (unpacked / path).write_bytes(content)
+    code, said = verify(unpacked)
+    assert code == 2
+    assert said.startswith(f"{path}: its bytes were changed: expected sha256")
+    assert "\n" not in said
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(at=strategies.floats(0, 1, exclude_max=True), bit=strategies.integers(0, 7))
+def test_no_changed_byte_of_the_zip_changes_a_file_unseen(
+    capsule: Path, tmp_path_factory: pytest.TempPathFactory, at: float, bit: int
+) -> None:
+    content = bytearray(capsule.read_bytes())
+    content[int(at * len(content))] ^= 1 << bit
+    folder = tmp_path_factory.mktemp("changed")
+    (folder / "c.zip").write_bytes(content)
+    (folder / "files").mkdir()
+    try:
+        open_capsule(folder / "c.zip", folder / "files")
+    except CapsuleError:
+        return
+    # A date or a comment of the zip itself: what was unpacked is the same, file by file.
+    with zipfile.ZipFile(capsule) as archive:
+        for name in archive.namelist():
+            assert (folder / "files" / name).read_bytes() == archive.read(name)
+
+
+def test_a_changed_list_is_refused(unpacked: Path) -> None:
+    listed = (unpacked / CAPSULE_FILE).read_text(encoding="utf-8")
+    (unpacked / CAPSULE_FILE).write_text(listed.replace('"study": "exp3"', '"study": "exp4"'))
+    code, said = verify(unpacked)
+    assert (code, said.split(":")[0]) == (2, CAPSULE_FILE)
+
+
+def test_a_missing_file_is_named(unpacked: Path) -> None:
+    (unpacked / "results/tables.tex").unlink()
+    assert verify(unpacked) == (
+        2, "results/tables.tex: missing from the capsule; download it anew",
+    )  # fmt: skip
+
+
+def test_a_foreign_file_is_named(unpacked: Path, capsule: Path, tmp_path: Path) -> None:
+    (unpacked / "data/mine.csv").write_text("a,b\n")
+    code, said = verify(unpacked)
+    assert (code, said.split(":")[0]) == (2, "data/mine.csv")
+    assert "foreign" in said
+    for name in ("../outside.txt", "/etc/outside", "mine.txt"):
+        added = Path(shutil.copy(capsule, tmp_path / "added.zip"))
+        with zipfile.ZipFile(added, "a") as archive:
+            archive.writestr(name, "x")
+        assert verify(added)[0] == 2
+        assert not (tmp_path / "outside.txt").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 and no more", b"no zip at all" * 99])
+def test_what_is_no_capsule_gets_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "c.zip").write_bytes(content)
+    code, said = verify(tmp_path / "c.zip")
+    assert code == 2
+    assert said.startswith("c.zip: expected the zip of a capsule")
+    assert "found nothing there" in verify(tmp_path / "nowhere.zip")[1]
+
+
+def relist(folder: Path) -> None:
+    """Write the list anew, as somebody would who means to deceive, or to correct."""
+    from experiments.capsule.declaration import Capsule
+    from experiments.capsule.packing import listed_files
+
+    data = json.loads((folder / CAPSULE_FILE).read_text(encoding="utf-8"))
+    data.pop("sha256")
+    known = Capsule.model_validate(data)
+    changed = known.model_copy(update={"files": listed_files(folder)})
+    (folder / CAPSULE_FILE).write_text(changed.text(), encoding="utf-8")
+
+
+def test_a_report_that_the_data_do_not_give_is_not_verified(unpacked: Path) -> None:
+    tables = unpacked / "results/tables.tex"
+    tables.write_text(tables.read_text(encoding="utf-8").replace("0.", "9.", 1), encoding="utf-8")
+    relist(unpacked)
+    code, said = verify(unpacked)
+    assert code == 1
+    assert "tables.tex: line" in said
+    assert "NOT verified: tables differ" in said
+
+
+def test_other_versions_are_named_where_a_figure_differs(unpacked: Path) -> None:
+    data = json.loads((unpacked / CAPSULE_FILE).read_text(encoding="utf-8"))
+    data["software"]["packages"]["matplotlib"] = "3.0.0"
+    (unpacked / CAPSULE_FILE).write_text(json.dumps(data), encoding="utf-8")
+    figure = next((unpacked / "results").glob("*.svg"))
+    figure.write_bytes(figure.read_bytes() + b"\n")
+    relist(unpacked)
+    code, said = verify(unpacked)
+    assert code == 0, said
+    assert f"{figure.name}: " in said
+    assert "matplotlib 3.0.0 became " in said
+    assert "verified: every table as printed" in said
+
+
+def test_the_psych_ds_validator_agrees(unpacked: Path) -> None:
+    if not VALIDATOR.is_file():
+        pytest.skip("the official validator is not in ../shared/tools/psych-ds-validator")
+    asked = ["node", str(VALIDATOR), str(unpacked)]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False, timeout=120)
+    assert "VALID true" in done.stdout.splitlines(), done.stdout + done.stderr
+    described = json.loads((unpacked / "dataset_description.json").read_text(encoding="utf-8"))
+    assert described["license"] == "https://spdx.org/licenses/CC-BY-4.0"
+    assert described["creator"][0]["identifier"] == "https://orcid.org/0000-0002-1825-0097"
+
+
+def test_the_crate_says_what_each_file_is(unpacked: Path) -> None:
+    crate = json.loads((unpacked / "ro-crate-metadata.json").read_text(encoding="utf-8"))
+    assert crate["@context"] == "https://w3id.org/ro/crate/1.2/context"
+    entities = {entity["@id"]: entity for entity in crate["@graph"]}
+    assert entities["ro-crate-metadata.json"]["conformsTo"] == {"@id": "https://w3id.org/ro/crate/1.2"}
+    root = entities["./"]
+    assert {"name", "description", "datePublished", "license", "author", "hasPart"} <= set(root)
+    assert root["license"] == {"@id": "https://spdx.org/licenses/CC-BY-4.0"}
+    parts = {unquote(part["@id"]) for part in root["hasPart"]}
+    present = {str(path.relative_to(unpacked)) for path in unpacked.rglob("*") if path.is_file()}
+    assert parts == present - {"ro-crate-metadata.json"}
+    from experiments.manifest import file_sha256
+
+    for part in parts - {CAPSULE_FILE}:
+        assert entities[part]["sha256"] == file_sha256(unpacked / part)
+    mentioned = [one["@id"] for one in entities["#analysis"]["object"]]
+    assert mentioned == [
+        "materials/exp3.toml",
+        "data/study-exp3_description-ratings_data.csv",
+        "data/study-exp3_description-runs_data.csv",
+    ]
+
+
+def test_the_clips_can_stay_out(opened: Services, tmp_path: Path) -> None:
+    target = tmp_path / "small.zip"
+    build_capsule(opened, "exp3", Wanted(clips=False, sensitivity=False), target)
+    with zipfile.ZipFile(target) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".mp4")]
+        assert len(json.loads(archive.read("materials/manifest.json"))["clips"][0]["sha256"]) == 64
+    assert verify(target, "--no-report")[0] == 0
+
+
+def test_a_study_without_answers_has_no_capsule(opened: Services, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the report, which could not be made"):
+        build_capsule(opened, "exp3", Wanted(origin="pilot"), tmp_path / "none.zip")
+    assert list(tmp_path.iterdir()) == []
