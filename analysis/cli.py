@@ -17,6 +17,7 @@ def _gather() -> None:
     from analysis.commands.agreement import register as register_agreement
     from analysis.commands.anova import register as register_anova
     from analysis.commands.check_paper import register as register_check_paper
+    from analysis.commands.convert import register as register_convert
     from analysis.commands.models import register as register_models
     from analysis.commands.opinion import register as register_opinion
     from analysis.commands.pairs import register as register_pairs
@@ -34,6 +35,7 @@ def _gather() -> None:
     register_opinion(app)
     register_agreement(app)
     register_verify(app)
+    register_convert(app)
     register_reshape(app)
 
 

@@ -20,7 +20,7 @@ from server.capsules.crate import CRATE_FILE, crate_metadata
 from server.clock import now
 from server.context import Services
 from server.export.psych_ds import Folder, dataset_folder
-from server.methods.service import methods_of, read_results, write
+from server.methods.service import methods_of, read_results, write_beside
 from server.models import Study, StudyVersion
 from server.reports.process import run_analysis
 from server.storage.clips import ClipStore
@@ -144,7 +144,7 @@ def _report(session: Session, study: Study, source: ReportSource, folder: Path, 
     if message:
         raise InputError(f"a capsule holds the report, which could not be made: {message}")
     rebuilt = tuple(sorted(path.name for path in results.iterdir()))
-    write(results, methods_of(session, study, source.origin, source.series, read_results(results)))
+    write_beside(results, methods_of(session, study, source.origin, source.series, read_results(results)))
     return source.model_copy(update={"rebuilt": rebuilt})
 
 

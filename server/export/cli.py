@@ -33,9 +33,10 @@ def export(
         typer.Option(
             "--format",
             help="csv: one row a play; wide: one row a visit and a column a cell; runs: one row a visit with "
-            "its answers to forms; raw: JSON lines with every drawn frame; codebook: Markdown; psych-ds: a "
-            "zip of the de-identified dataset folder; identities: recruiters' ids beside the pseudonyms, "
-            "noted in the audit log.",
+            "its answers to forms; spss, parquet: the table of csv; spss-wide, parquet-wide: that of wide; "
+            "raw: JSON lines with every drawn frame; codebook: Markdown; columns: those of csv as JSON; "
+            "psych-ds: a zip of the de-identified dataset folder; identities: recruiters' ids beside the "
+            "pseudonyms, noted in the audit log.",
         ),
     ] = "csv",
     origin: Annotated[
@@ -64,6 +65,8 @@ def export(
       server export exp3 --out exp3.csv
 
       server export exp3 --format wide --bom --guard --out exp3-wide.csv
+
+      server export exp3 --format spss-wide --out exp3.sav
 
       server export exp3 --format psych-ds --out exp3.zip
 

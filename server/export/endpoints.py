@@ -1,7 +1,7 @@
 """Downloads of a study's data, of one origin unless all are asked for; streamed in constant memory."""
 
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
@@ -138,3 +138,20 @@ def download_codebook(services: ServicesDep, _who: Viewer, study: str) -> Respon
         text = b"".join(FORMATS["codebook"](session, find_study(session, study), "all"))
     headers = {"content-disposition": f'attachment; filename="{study}-codebook.md"'}
     return Response(text, media_type="text/markdown; charset=utf-8", headers=headers)
+
+
+@router.get("/{table}.{ending}", response_class=StreamingResponse)
+def download_converted(
+    services: ServicesDep,
+    who: Exporter,
+    study: str,
+    table: Literal["ratings", "wide"],
+    ending: Literal["sav", "parquet"],
+    origin: ExportOrigin = "participant",
+) -> StreamingResponse:
+    """One row a play, or the wide table, for SPSS or as Parquet: with labels of variables and levels."""
+    # The last route of this file: its path would stand in for those of the other downloads.
+    long: dict[str, Format] = {"sav": "spss", "parquet": "parquet"}
+    wide: dict[str, Format] = {"sav": "spss-wide", "parquet": "parquet-wide"}
+    form = (long if table == "ratings" else wide)[ending]
+    return _stream(services, who, study, form, origin, "application/octet-stream", f"{table}.{ending}")

@@ -8,17 +8,21 @@ from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.export import codebook, identities, psych_ds, runs
+from server.export.converted import columns_json, converted
 from server.export.excel import guarded, marked
 from server.export.origins import ExportOrigin
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.ratings_csv import rating_count
-from server.export.tables import runs_table, wide_table
+from server.export.tables import answers_table, runs_table, wide_table
 from server.export.wide import cells_of
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
 from server.text import encoded
 
-Format = Literal["csv", "wide", "runs", "raw", "codebook", "psych-ds", "identities"]
+Format = Literal[
+    "csv", "wide", "runs", "raw", "codebook", "psych-ds", "identities",
+    "spss", "spss-wide", "parquet", "parquet-wide", "columns",
+]  # fmt: skip
 Pieces = Callable[[Session, Study, ExportOrigin], Iterator[bytes]]
 
 
@@ -72,6 +76,11 @@ FORMATS: dict[Format, Pieces] = {
     "codebook": codebook_markdown,
     "psych-ds": psych_ds_zip,
     "identities": identities_csv,
+    "spss": lambda *of: converted(answers_table(*of), "sav"),
+    "spss-wide": lambda *of: converted(wide_table(*of), "sav"),
+    "parquet": lambda *of: converted(answers_table(*of), "parquet"),
+    "parquet-wide": lambda *of: converted(wide_table(*of), "parquet"),
+    "columns": lambda *of: iter([columns_json(answers_table(*of).columns)]),
 }
 
 
@@ -90,7 +99,7 @@ def row_count(form: Format, session: Session, study: Study, origin: ExportOrigin
     """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
     if form == "identities":
         return identities.identity_count(session, study)
-    if form == "wide":
+    if form in ("wide", "spss-wide", "parquet-wide"):
         cells_of(active_definition(session, study))  # refuses a kind without ratings before a download begins
-    count = rating_count if form in ("csv", "psych-ds") else runs.run_count
+    count = rating_count if form in ("csv", "psych-ds", "spss", "parquet") else runs.run_count
     return count(session, study, origin)

@@ -48,6 +48,11 @@ def write(folder: Path, methods: Methods) -> None:
     written = page.read_text(encoding="utf-8").replace(PLACE, methods.html(), 1)
     with whole_file(page) as temporary:
         temporary.write_text(written, encoding="utf-8")
+    write_beside(folder, methods)
+
+
+def write_beside(folder: Path, methods: Methods) -> None:
+    """Put the paragraph into a folder as text, as LaTeX, and with its numbers as JSON."""
     for name, content in (("txt", methods.text()), ("tex", methods.latex()), ("json", methods.json())):
         (folder / f"methods.{name}").write_text(content, encoding="utf-8")
 

@@ -1327,6 +1327,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/data/{table}.{ending}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Converted
+         * @description One row a play, or the wide table, for SPSS or as Parquet: with labels of variables and levels.
+         */
+        get: operations["download_converted"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/reports": {
         parameters: {
             query?: never;
@@ -10332,6 +10352,48 @@ export interface operations {
             header?: never;
             path: {
                 study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    download_converted: {
+        parameters: {
+            query?: {
+                origin?: "participant" | "pilot" | "simulated" | "all";
+            };
+            header?: never;
+            path: {
+                study: string;
+                table: "ratings" | "wide";
+                ending: "sav" | "parquet";
             };
             cookie?: never;
         };

@@ -9,6 +9,9 @@ const FILES: [file: string, title: string, words: string][] = [
   ["ratings.csv", "Answers", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
   ["wide.csv", "Wide table", "One row a visit, as SPSS and JASP want it: a column a cell of the design, with its mean rating."],
   ["runs.csv", "Runs", "One row a visit: times, version, seed, exclusions, and a column a question of the forms."],
+  ["ratings.sav", "Answers for SPSS", "One row a play, with labels of variables and levels."],
+  ["wide.sav", "Wide table for SPSS", "One row a visit, with labels of variables and of the answers to forms."],
+  ["ratings.parquet", "Answers as Parquet", "One row a play, with types and levels: for pandas, Polars, Arrow and DuckDB."],
   ["analysis.R", "Script for R", "Analyses the answers with afex, emmeans and lme4. Save it beside the answers."],
   ["analysis.py", "Script for Python", "Analyses the answers with pandas and pingouin. Save it beside the answers."],
   [
@@ -38,7 +41,7 @@ export function DataTab() {
   const [excel, setExcel] = useState(false);
   const rated = detail?.definition.trial.kind === "clip_rating";
   const mine = useMay("owner") ? [...FILES, IDENTITIES] : FILES;
-  const files = mine.filter(([file]) => rated || file !== "wide.csv");
+  const files = mine.filter(([file]) => rated || !file.startsWith("wide."));
   const version = detail?.summary.version ?? 1;
   const chosen = (file: string) => {
     const options = new URLSearchParams();
