@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 from server.accounts.passwords import PasswordWork
 from server.accounts.throttle import SignInThrottle
 from server.clock import now
-from server.db import Database, open_database
+from server.db import REQUEST_BUSY_S, Database, open_database
 from server.evidence.clip_bytes import ClipBytes
 from server.evidence.intake import Intake
 from server.group_commit import GroupCommit
@@ -55,7 +55,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
 
     rehearses: simulated runs are held to what people are held to, and say what time it is.
     """
-    database = open_database(settings)
+    database = open_database(settings, REQUEST_BUSY_S)
     clips = open_s3(settings) if settings.s3_bucket else FolderStore(settings.clip_folder)
     return Services(
         settings=settings,

@@ -20,9 +20,27 @@ from server.settings import Settings
 
 DRIVERS = ("sqlite", "sqlite+pysqlite", "postgresql+psycopg")
 BUSY_TIMEOUT_S = 30
+"""How long a command waits for a turn to write."""
+REQUEST_BUSY_S = 4
+"""How long a request does: twice this, in the queue and at the file, is less than the 10 s pages wait."""
 SQLITE_AWAY = frozenset(
     (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 )
+
+
+class _Turns:
+    """One writer at a time; who gets no turn in `wait_s` is told so as by an exhausted pool."""
+
+    def __init__(self, wait_s: float) -> None:
+        self._lock = threading.Lock()
+        self._wait_s = wait_s
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(timeout=self._wait_s):
+            raise PoolTimeout(f"no turn to write within {self._wait_s:g} s")
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
 
 
 class Database:
@@ -31,13 +49,13 @@ class Database:
     One request uses one of them, and it ends before the answer is sent: what is acknowledged is committed.
     """
 
-    def __init__(self, url: str, *, pool: int = 20) -> None:
+    def __init__(self, url: str, *, pool: int = 20, busy_s: float = BUSY_TIMEOUT_S) -> None:
         self.url = checked_url(url)
         self.is_sqlite = self.url.get_backend_name() == "sqlite"
-        self.engine = _sqlite_engine(url, pool) if self.is_sqlite else _postgres_engine(url, pool)
+        self.engine = _sqlite_engine(url, pool, busy_s) if self.is_sqlite else _postgres_engine(url, pool)
         self._write_engine = self.engine.execution_options(immediate=True)
         # SQLite lets one writer in and makes the others poll; queueing them here keeps the wait short.
-        self._writer = threading.Lock() if self.is_sqlite else nullcontext()
+        self._writer = _Turns(busy_s) if self.is_sqlite else nullcontext()
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -108,16 +126,27 @@ def is_away(error: BaseException) -> bool:
         # 40: rolled back for the sake of another transaction.
         code = error.orig.sqlstate
         return code is None or code[:2] in ("08", "40", "53", "57")
+    return error.connection_invalidated or _sqlite_code(error) in SQLITE_AWAY
+
+
+def is_busy(error: BaseException) -> bool:
+    """True where the database is there, and another program or request has kept it for too long."""
+    if isinstance(error, PoolTimeout):
+        return True
+    return isinstance(error, DBAPIError) and _sqlite_code(error) == sqlite3.SQLITE_BUSY
+
+
+def _sqlite_code(error: DBAPIError) -> int:
     # Extended codes, such as SQLITE_BUSY_SNAPSHOT, have the primary one in their lowest byte.
-    return error.connection_invalidated or getattr(error.orig, "sqlite_errorcode", -1) & 0xFF in SQLITE_AWAY
+    return int(getattr(error.orig, "sqlite_errorcode", -1)) & 0xFF
 
 
-def open_database(settings: Settings) -> Database:
+def open_database(settings: Settings, busy_s: float = BUSY_TIMEOUT_S) -> Database:
     """The database of these settings; the folder of a SQLite file is made."""
     url = checked_url(settings.resolved_database_url)
     if url.get_backend_name() == "sqlite" and url.database:
         Path(url.database).parent.mkdir(parents=True, exist_ok=True)
-    return Database(settings.resolved_database_url, pool=settings.database_pool)
+    return Database(settings.resolved_database_url, pool=settings.database_pool, busy_s=busy_s)
 
 
 def _postgres_engine(url: str, pool: int) -> Engine:
@@ -131,14 +160,14 @@ def _postgres_engine(url: str, pool: int) -> Engine:
     )
 
 
-def _sqlite_engine(url: str, pool: int) -> Engine:
+def _sqlite_engine(url: str, pool: int, busy_s: float) -> Engine:
     engine = create_engine(
         url,
         pool_size=pool,
         max_overflow=2 * pool,
         pool_timeout=BUSY_TIMEOUT_S,
         hide_parameters=True,
-        connect_args={"timeout": BUSY_TIMEOUT_S, "check_same_thread": False},
+        connect_args={"timeout": busy_s, "check_same_thread": False},
     )
     event.listen(engine, "connect", _prepare_sqlite)
     event.listen(engine, "begin", _begin_sqlite)

@@ -13,7 +13,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 from starlette.exceptions import HTTPException
 
 from experiments.errors import InputError
-from server.db import is_away
+from server.db import is_away, is_busy
 from server.logs import described
 
 log = logging.getLogger("palpebra")
@@ -145,6 +145,10 @@ async def _out_of_range(_request: Request, _error: Exception) -> JSONResponse:
 async def _database(_request: Request, error: Exception) -> JSONResponse:
     if not is_away(error):
         raise error
+    if is_busy(error):
+        log.error("the database is busy: %s", described(error))
+        message = "Another program keeps the database busy; nothing was stored, please try again."
+        return error_response(503, "database_busy", message, headers={"retry-after": "2"})
     log.error("the database is away: %s", described(error))
     message = "The server cannot reach its database at the moment; please try again."
     return error_response(503, "database_away", message, headers={"retry-after": "2"})

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection
 
-from server.db import Database
+from server.db import Database, is_busy
 from server.errors import ApiError
 
 T = TypeVar("T")
@@ -146,8 +146,9 @@ class GroupCommit:
                 for work in batch:
                     work.attempt(connection)
         except Exception as error:
-            if len(batch) == 1:
-                batch[0].error = error
+            if len(batch) == 1 or is_busy(error):
+                for work in batch:
+                    work.error = error
                 return
             # One of them broke the transaction of all: each gets one of its own.
             for work in batch:

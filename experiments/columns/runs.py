@@ -12,6 +12,62 @@ def _amount(signal: str, description: str, unit: str | None = None) -> Column:
     return Column(f"evidence_{signal}", "number", description, unit=unit, minimum=0)
 
 
+CALIBRATION_COLUMNS = (
+    Column(
+        "calibration_method",
+        "text",
+        "What the size was measured with; empty where it was not.",
+        values=("card", "ruler"),
+    ),
+    Column(
+        "calibration_repeats",
+        "integer",
+        "Measurements of the size, those included that differed too much from the others.",
+        minimum=1,
+    ),
+    Column(
+        "calibration_spread",
+        "number",
+        "Quality of the size: largest less smallest of the measurements that count, of their mean.",
+        unit="%",
+        minimum=0,
+    ),
+    Column(
+        "calibration_ruler",
+        "text",
+        "What the participant said of a line of known length, measured with a ruler after the card.",
+        values=("agrees", "no_ruler", "differs"),
+    ),
+    Column(
+        "calibration_recheck",
+        "number",
+        "Largest difference that a look at the size in mid-run found; empty where none was declared.",
+        unit="%",
+        minimum=0,
+    ),
+    Column(
+        "distance_method",
+        "text",
+        "How the viewing distance was had; empty where it was not asked.",
+        values=("blind_spot", "typed"),
+    ),
+    Column(
+        "distance_spread_mm",
+        "number",
+        "Quality of the viewing distance: standard deviation of the rounds of the blind-spot test.",
+        unit="mm",
+        minimum=0,
+    ),
+    Column(
+        "distance_typed_mm",
+        "number",
+        "Viewing distance as the participant typed it, where it was typed.",
+        unit="mm",
+        minimum=0,
+    ),
+)
+"""Of the latest calibration; `calibration_recheck` is of all."""
+
 EVIDENCE_COLUMNS = (
     _share("tickets", "Share of answers with a good ticket of the server."),
     _share("digests", "Share of rated clips shown to have been fetched, of those that could be checked."),
@@ -73,4 +129,5 @@ RUN_COLUMNS: tuple[Column, ...] = (
     ),
     Column("evidence_points", "number", "Points of all signals together, on which the verdict rests."),
     *EVIDENCE_COLUMNS,
+    *CALIBRATION_COLUMNS,
 )

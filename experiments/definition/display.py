@@ -15,6 +15,12 @@ class Display(Declaration):
     calibrate: Literal["required", "optional", "off"] = "required"
     """Whether the participant fits a card's outline to learn the screen's pixels per mm. Without it clips are
     shown pixel by pixel and `px_per_mm` is empty in the data."""
+    calibration_repeats: Annotated[int, Field(ge=2, le=6)] = 2
+    """How often the size is measured, each time from another one; what differs too much is measured up to
+    twice more. The spread of the repeats is `calibration_spread` in the data."""
+    recheck_size: bool = False
+    """Asks for one more measurement in each break; one that differs by more than 4% leads to a new
+    calibration."""
     viewing_distance: bool = False
     """Adds the blind-spot test, which estimates `viewing_distance_mm` from where a dot vanishes."""
     full_screen: bool = True

@@ -41,6 +41,8 @@ EFFECTS: Mapping[str, Effect] = {
     # How large, on what ground and how steadily a clip is seen; but not which devices are turned away.
     "display.inter_ocular_mm": "measured",
     "display.calibrate": "measured",
+    "display.calibration_repeats": "wording",
+    "display.recheck_size": "wording",
     "display.viewing_distance": "wording",
     "display.full_screen": "measured",
     "display.background": "measured",

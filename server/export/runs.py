@@ -14,7 +14,7 @@ from server.clock import iso
 from server.evidence.service import judge_run
 from server.export.origins import ExportOrigin, of_origin
 from server.models import NO_SLOT, FormAnswer, Study, StudyRun
-from server.runs import service
+from server.runs import repository, service
 
 AT_ONCE = 100
 
@@ -75,7 +75,26 @@ def _values(session: Session, run: StudyRun, forms: Sequence[FormColumn]) -> dic
         "device": _json(run.device),
         "run_origin": run.origin,
         "data_series": run.version.series,
+        **_calibration(session, run),
     } | _evidence(session, run)
+
+
+def _calibration(session: Session, run: StudyRun) -> dict[str, Any]:
+    """How the latest size and distance were measured; nothing where none were, or by a page of before."""
+    every = repository.calibrations(session, run)
+    rechecks = [one.recheck_percent for one in every if one.recheck_percent is not None]
+    latest = every[-1] if every else None
+    values = {
+        "calibration_method": latest and latest.method,
+        "calibration_repeats": latest and latest.repeats,
+        "calibration_spread": latest and latest.spread_percent,
+        "calibration_ruler": latest and latest.ruler_check,
+        "calibration_recheck": max(rechecks, default=None),
+        "distance_method": latest and latest.distance_method,
+        "distance_spread_mm": latest and latest.distance_spread_mm,
+        "distance_typed_mm": latest and latest.distance_typed_mm,
+    }
+    return {name: "" if value is None else value for name, value in values.items()}
 
 
 def _evidence(session: Session, run: StudyRun) -> dict[str, Any]:

@@ -291,10 +291,20 @@ class FormAnswer(Base):
 
 
 class Calibration(Base):
-    """One size calibration of a run; every one is kept, the latest counts."""
+    """One size calibration of a run; every one is kept, the latest counts.
+
+    occasion: why it was made. repeats, spread_percent: how many measurements there were, how well they agree.
+    ruler_check: what a ruler said of a card's size. distance_spread_mm: standard deviation of the blind-spot
+    rounds. recheck_percent: how far a look in mid-run was off.
+    """
 
     __tablename__ = "calibrations"
-    __table_args__ = (one_of("method", "card", "ruler"),)
+    __table_args__ = (
+        one_of("method", "card", "ruler"),
+        one_of("occasion", "first", "screen_changed", "zoom", "recheck"),
+        one_of("ruler_check", "agrees", "no_ruler", "differs"),
+        one_of("distance_method", "blind_spot", "typed"),
+    )
 
     id: Mapped[int] = mapped_column(primary_key=True)
     study_run_id: Mapped[int] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"), index=True)
@@ -308,3 +318,11 @@ class Calibration(Base):
     window_height_px: Mapped[int]
     zoom: Mapped[float]
     saved_at: Mapped[datetime] = mapped_column(default=now)
+    occasion: Mapped[str] = mapped_column(String(14), default="first", server_default="first")
+    repeats: Mapped[int | None]
+    spread_percent: Mapped[float | None]
+    ruler_check: Mapped[str | None] = mapped_column(String(10))
+    distance_method: Mapped[str | None] = mapped_column(String(10))
+    distance_spread_mm: Mapped[float | None]
+    distance_typed_mm: Mapped[float | None]
+    recheck_percent: Mapped[float | None]

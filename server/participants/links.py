@@ -83,6 +83,7 @@ def link_state(services: Services, session: Session, token: str) -> LinkState:
         kind=link.kind,
         resumable=resumable,
         screens_devices=screens_devices(experiment),
+        way_back=recruiter_of(link).way_back(),
         gates=_gates(experiment.display),
     )
 

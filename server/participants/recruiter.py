@@ -3,6 +3,8 @@
 A study's (or link's) `recruiter` is an object with these keys, all but `kind` optional:
 kind: prolific, sona, mturk or generic. id_parameter: which address parameter names the participant.
 redirect_url: where to go at the end; {code}, {run} and {any address parameter} are filled in.
+redirect_declined: where to go who takes no part: does not agree, or has no device that will do; without it
+Prolific's own page, elsewhere none.
 redirect_screened_out: where to go when screened out; on Prolific redirect_url, where there is a code for it.
 code_complete, code_failed_check: completion codes; one is made for each run where absent.
 code_screened_out: of who is screened out; without it none is shown, so that nobody is paid by mistake.
@@ -22,6 +24,7 @@ ID_PARAMETERS = {
     "generic": "participant",
 }
 WEB_ADDRESS = r"^(https?://.*)?$"
+PROLIFIC_HOME = "https://app.prolific.com/"
 PROLIFIC_URL = "https://app.prolific.com/submissions/complete?cc={code}"
 
 
@@ -33,6 +36,7 @@ class Recruiter(BaseModel):
     kind: Literal["prolific", "sona", "mturk", "generic"] = "generic"
     id_parameter: Code = ""
     redirect_url: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
+    redirect_declined: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
     redirect_screened_out: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
     code_complete: Code = ""
     code_failed_check: Code = ""
@@ -51,6 +55,10 @@ class Recruiter(BaseModel):
         """The address to go to with this code; None where there is none."""
         address = self.redirect_url or (PROLIFIC_URL if self.kind == "prolific" else "")
         return _filled_in(address, code, run, parameters)
+
+    def way_back(self) -> str | None:
+        """The address for who takes no part, {address parameters} not filled in; None where there is none."""
+        return self.redirect_declined or (PROLIFIC_HOME if self.kind == "prolific" else None)
 
     def redirect_screened_out_to(self, run: str, parameters: Mapping[str, str]) -> str | None:
         """The address for who is screened out. Never the ordinary one of itself: it may grant a credit."""

@@ -34,6 +34,8 @@ Key = Annotated[str, StringConstraints(max_length=100)]
 LanguageTag = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}(-[A-Z]{2})?$")]
 EventType = Annotated[str, StringConstraints(pattern=r"^[a-z_]{1,30}$")]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Percent = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)]
+Millimetres = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)]
 Pixels = Annotated[int, Field(ge=0, le=100_000)]
 
 
@@ -68,6 +70,9 @@ class LinkState(BaseModel):
     kind: Literal["general", "personal", "preview"]
     resumable: bool = Field(description="A run of this personal link is under way and can be taken up again.")
     screens_devices: bool = Field(description="A closed gate ends the visit as screened out.")
+    way_back: str | None = Field(
+        description="The recruiter's address for who takes no part, its {address parameters} not filled in."
+    )
     gates: Gates
 
 
@@ -105,6 +110,11 @@ class BlockInfo(BaseModel):
     trials: int
 
 
+Occasion = Literal["first", "screen_changed", "zoom", "recheck"]
+RulerCheck = Literal["agrees", "no_ruler", "differs"]
+DistanceMethod = Literal["blind_spot", "typed"]
+
+
 class CalibrationState(BaseModel):
     """The latest calibration."""
 
@@ -117,6 +127,14 @@ class CalibrationState(BaseModel):
     window_width_px: int
     window_height_px: int
     zoom: float
+    occasion: Occasion
+    repeats: int | None
+    spread_percent: float | None
+    ruler_check: RulerCheck | None
+    distance_method: DistanceMethod | None
+    distance_spread_mm: float | None
+    distance_typed_mm: float | None
+    recheck_percent: float | None
 
 
 class RunState(BaseModel):
@@ -160,7 +178,10 @@ class Consent(BaseModel):
 
 
 class CalibrationResult(BaseModel):
-    """One size calibration; each is kept, the latest counts."""
+    """One size calibration; each is kept, the latest counts.
+
+    What has a default was not sent by the pages of before.
+    """
 
     px_per_mm: Annotated[float, Field(gt=0, le=200, allow_inf_nan=False)]
     method: Literal["card", "ruler"]
@@ -171,6 +192,26 @@ class CalibrationResult(BaseModel):
     window_width_px: Pixels
     window_height_px: Pixels
     zoom: Positive = 1.0
+    occasion: Occasion = Field(default="first", description="Why it was made.")
+    repeats: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        default=None, description="Measurements made, those included that differed too much."
+    )
+    spread_percent: Percent | None = Field(
+        default=None, description="Largest less smallest of those that count, of their mean."
+    )
+    ruler_check: RulerCheck | None = Field(
+        default=None, description="What a ruler said of the card's size; null where none was asked."
+    )
+    distance_method: DistanceMethod | None = None
+    distance_spread_mm: Millimetres | None = Field(
+        default=None, description="Standard deviation of the rounds of the blind-spot test."
+    )
+    distance_typed_mm: Millimetres | None = Field(
+        default=None, description="The distance as it was typed in, where it was."
+    )
+    recheck_percent: Percent | None = Field(
+        default=None, description="By how much a later measurement differed from the one before."
+    )
 
 
 class StageChange(BaseModel):

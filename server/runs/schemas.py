@@ -138,6 +138,14 @@ class TimelineCalibration(BaseModel):
     viewing_distance_mm: float | None
     zoom: float
     saved_at: datetime
+    occasion: str
+    repeats: int | None
+    spread_percent: float | None
+    ruler_check: str | None
+    distance_method: str | None
+    distance_spread_mm: float | None
+    distance_typed_mm: float | None
+    recheck_percent: float | None
 
 
 class Timeline(BaseModel):

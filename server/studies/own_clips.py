@@ -45,7 +45,7 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
 def _texts(asked: OwnClips) -> dict[str, str]:
     return {
         "consent": f"# {asked.title}\n\nYou will watch short clips and rate each of them. "
-        "Taking part is voluntary; you can stop at any time by closing the page. "
+        "Taking part is voluntary: you may choose *I do not agree*, and stop at any time with *Stop*. "
         "Your name and internet address are not stored.\n",
         "instructions": "# What you will do\n\nPress **Space** or **Enter** to start a clip. "
         "You see it **once**. "

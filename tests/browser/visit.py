@@ -51,7 +51,7 @@ class Visit:
         """Card, ruler and distance."""
         page = self.page
         for selector, name, press in (
-            (".card", "card", "text=It fits"),
+            (".card", "card", ""),
             (".ruler-line", "ruler check", "text=It is, within"),
             (".blind-field", "distance", "text=Enter the distance"),
             ("input.short", "distance typed", ".primary"),
@@ -59,8 +59,9 @@ class Visit:
             page.wait_for_selector(selector)
             self.look(name)
             if selector == ".card":
-                touch_card(page)
-            page.click(press)
+                fit_card(page)
+            else:
+                page.click(press)
         return self
 
     def instructions(self) -> "Visit":
@@ -127,10 +128,16 @@ class Visit:
         return self.page.inner_text(".code output")
 
 
-def touch_card(page: Page) -> None:
-    """Make the drawn card larger and smaller again: one that nobody has touched is refused."""
-    page.click("text=Larger")
-    page.click("text=Smaller")
+CARD_PX = 324
+"""The card's long side on a screen of 96 pixels an inch."""
+
+
+def fit_card(page: Page, *widths: int) -> None:
+    """Measure the card, twice unless told otherwise, each time from the size that it begins with."""
+    for number, width in enumerate(widths or (CARD_PX, CARD_PX), start=1):
+        page.wait_for_selector(f".card-area[data-round='{number}']")
+        page.fill(".card-area input", str(width))
+        page.click("text=It fits")
 
 
 def _gone(element: ElementHandle | None) -> None:

@@ -1,6 +1,9 @@
 """A database that is away is told by 503, so that pages send again, and by one line in the log."""
 
 import logging
+import sqlite3
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -8,6 +11,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
+from server import context
 from server.app import create_app
 from server.context import Services
 from server.db import Database, is_away
@@ -53,3 +57,27 @@ def test_after_every_connection_was_cut_ratings_go_on(services: Services, partic
         cut = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid() "
         connection.execute(text(cut + "AND datname = current_database()"))
     assert participant.rate(second).status_code == 201
+
+
+@pytest.fixture
+def soon_busy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A server whose requests wait for a locked database for a moment only; to be named before `client`."""
+    monkeypatch.setattr(context, "REQUEST_BUSY_S", 0.5)
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+@pytest.mark.usefixtures("soon_busy")
+def test_a_locked_database_is_told_apart_and_nobody_waits_in_a_queue(
+    services: Services, participant: Participant
+) -> None:
+    participant.agree()
+    trials = participant.state()["trials"][:4]
+    path = services.settings.database_url.removeprefix("sqlite:///")
+    with closing(sqlite3.connect(path, isolation_level=None)) as other, ThreadPoolExecutor(4) as pool:
+        other.execute("BEGIN IMMEDIATE")
+        ratings = list(pool.map(participant.rate, trials))
+        consent = participant.request("PUT", "/consent", {"agreed": True})
+    for answer in (*ratings, consent):
+        assert (answer.status_code, answer.json()["error"]["code"]) == (503, "database_busy")
+        assert int(answer.headers["retry-after"]) > 0
+    assert [participant.rate(trial).status_code for trial in trials] == [201] * 4

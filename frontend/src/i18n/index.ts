@@ -1,13 +1,14 @@
 /** The message catalogue: every sentence the page itself says. Study texts come from the declaration. */
-import type { Messages } from "./languages/en";
+import type { AnyMessages, Messages } from "./languages/en";
+import { formOf } from "./message";
 
 export type MessageKey = keyof Messages;
 export type Translate = (key: MessageKey, values?: Record<string, string | number>) => string;
 
 /** A file a language, named by its tag: nothing else needs to know of it. A page loads those it speaks. */
-const files = import.meta.glob<Messages>("./languages/*.ts", { import: "messages" });
+const files = import.meta.glob<AnyMessages>("./languages/*.ts", { import: "messages" });
 const loaders = Object.fromEntries(Object.entries(files).map(([path, load]) => [tagIn(path), load]));
-const catalogues: Partial<Record<string, Messages>> = {};
+const catalogues: Partial<Record<string, AnyMessages>> = {};
 
 /** Languages that the page speaks itself. English first: it stands in for all others. */
 export const SHIPPED = ["en", ...Object.keys(loaders).filter((tag) => tag !== "en")];
@@ -39,8 +40,11 @@ export async function loadMessages(language: string): Promise<void> {
 
 /** Messages in `language` as `loadMessages` has fetched them; those of another language where it could not. */
 export function translator(language: string): Translate {
-  const messages = catalogues[shipped(language)] ?? Object.values(catalogues)[0];
-  return (key, values = {}) => (messages?.[key] ?? key).replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
+  const tag = catalogues[shipped(language)] ? shipped(language) : (Object.keys(catalogues)[0] ?? "en");
+  const messages = catalogues[tag];
+  const rules = new Intl.PluralRules(tag);
+  return (key, values = {}) =>
+    formOf(messages?.[key] ?? key, values, rules).replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
 }
 
 export function direction(language: string): "rtl" | "ltr" {

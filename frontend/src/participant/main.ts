@@ -6,10 +6,21 @@ import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Tra
 import { setLanguage, setSurround } from "./flow/appearance";
 import { fetchFirst } from "./flow/blocks";
 import { ended } from "./flow/ended";
-import { abilities, type Abilities, findings, type GateFinding } from "./flow/gates";
+import { abilities, type Abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
 import { type Kept, KeptVisit } from "./flow/kept-visit";
-import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGate, showRefusal, startRun } from "./flow/link";
+import {
+  fetchRun,
+  passGates,
+  persistently,
+  reach,
+  screenOutDevice,
+  showClosedGate,
+  showRefusal,
+  startRun,
+  waitForRoom,
+  wayBack,
+} from "./flow/link";
 import { describeDevice, flush, openSession } from "./flow/open-session";
 import { asksForCode, type Claim } from "./flow/resume-code";
 import { serveOffline } from "./flow/serve-offline";
@@ -69,12 +80,12 @@ export async function main(root: HTMLElement): Promise<void> {
 }
 
 async function visit(entry: Entry): Promise<void> {
-  const { root, t, link_token, link, language, kept } = entry;
+  const { root, t, link_token, link, language, keeping, kept } = entry;
   const identity = new Identity(link_token, link.kind, location.search);
   // A visit that this browser or this personal link has begun may go on though no new one may begin.
   const returns = kept !== null || identity.isKnown || link.resumable;
   if (link.status !== "open" && !returns) {
-    showRefusal(root, t, link.status);
+    showRefusal(root, t, link.status, "", wayBack(t, link));
     return;
   }
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
@@ -82,10 +93,37 @@ async function visit(entry: Entry): Promise<void> {
   const list = findings(found, link.gates);
   if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], found);
   await passGates(root, t, list);
-  if (!(await oneTab(root, t, link_token))) return;
+  const lack = returns ? null : lackOfRoom(link.gates, measures(link.gates));
+  if (lack && !(await waitForRoom(root, t, link))) return turnedAway(entry, identity, returns, lack, found);
+  const tab = await oneTab(root, t, link_token);
+  if (tab === "left") return;
+  if (tab === "first" && !(await goesOn(entry, identity))) {
+    anotherPerson(keeping, identity);
+    return;
+  }
   const chosen = returns ? { language, has_code: false } : await startPage(root, link, language);
   const started = kept?.started ?? (await begun(entry, identity, chosen));
   await enter(entry, identity, store, started, list);
+}
+
+/**
+ * On a computer that several people use, the visit begun here may be another person's: a tab that has not shown it
+ * yet asks first. True where the visit is to go on.
+ */
+async function goesOn({ root, t, link, language }: Entry, identity: Identity): Promise<boolean> {
+  if (link.kind !== "general" || identity.isNamed || !identity.isKnown || identity.isOfThisTab) return true;
+  return new Promise((resolve) => {
+    const go = { label: t("return_go_on"), press: (): void => resolve(true) };
+    const other = { label: t("new_visit"), press: (): void => resolve(false) };
+    showNotice(root, { title: titleOf(link, language), text: t("return_begun"), actions: [go, other] });
+  });
+}
+
+/** Begin anew, as somebody whom this browser does not know. */
+function anotherPerson(keeping: KeptVisit, identity: Identity): void {
+  keeping.forget();
+  identity.forget();
+  location.reload();
 }
 
 /** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
@@ -109,7 +147,7 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
 /** A closed gate: explained; where the study screens devices, a visit that has not got further ends here with a way back. */
 async function turnedAway(entry: Entry, identity: Identity, returns: boolean, closed: GateFinding, found: Abilities): Promise<void> {
   const { root, t, link_token, link, language, kept } = entry;
-  const explain = (): void => showClosedGate(root, t, link_token, closed, found);
+  const explain = (): void => showClosedGate(root, t, link_token, closed, found, wayBack(t, link));
   // A run begun in another browser is left to that one: starting it here would take it over.
   const elsewhere = returns && !identity.isKnown;
   if (!link.screens_devices || kept || elsewhere) {
@@ -124,7 +162,7 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
   }
   if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, found));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
-  await ended(root, t, run, started, identity, t(closed.reason, closed.values));
+  await ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
 }
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
@@ -137,13 +175,16 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   const run = kept?.run ?? (await persistently(root, t, () => fetchRun(started.run_token)));
   if (!kept) keeping.begin({ link, started, run });
   const kind = known ?? (await loadKind(run.trial.kind));
+  identity.keepTab();
   await loadMessages(run.language);
   const player = await choosePlayer(run.display);
   const session = openSession({ root, link, run, kind, player, outbox, unsent });
   setLanguage(run.language);
   const over = (): Promise<void> => {
     keeping.forget();
-    return persistently(root, session.t, () => fetchRun(started.run_token)).then((now) => ended(root, session.t, now, started, identity));
+    return persistently(root, session.t, () => fetchRun(started.run_token)).then((now) =>
+      ended(root, session.t, now, started, identity, wayBack(session.t, link)),
+    );
   };
   if (run.status !== "active") return over();
   root.addEventListener(
@@ -186,19 +227,19 @@ function statusIn(body: unknown): RunState["status"] | undefined {
   return answer?.receipt?.status ?? answer?.status;
 }
 
-/** False where another tab has the study and the participant leaves it there. */
-async function oneTab(root: HTMLElement, t: Translate, link_token: string): Promise<boolean> {
+/** Whether this tab has the study as the first one, has taken it from another tab as it was asked to, or left it there. */
+async function oneTab(root: HTMLElement, t: Translate, link_token: string): Promise<"first" | "taken" | "left"> {
   const taken = (): void => void root.dispatchEvent(new CustomEvent("tab-taken"));
   const reload = { label: t("reload"), press: () => location.reload() };
   root.addEventListener("tab-taken", () => showNotice(root, { title: t("taken_over_title"), text: t("taken_over") }));
   root.addEventListener("taken-over", () =>
     showNotice(root, { title: t("taken_over_title"), text: t("taken_over_device"), actions: [reload] }),
   );
-  if ((await claimTab(`palpebra ${link_token}`, false, taken)) === "held") return true;
+  if ((await claimTab(`palpebra ${link_token}`, false, taken)) === "held") return "first";
   await new Promise<void>((resolve) => {
     showNotice(root, { title: t("second_tab_title"), text: t("second_tab"), actions: [{ label: t("second_tab_take"), press: resolve }] });
   });
-  return (await claimTab(`palpebra ${link_token}`, true, taken)) === "held";
+  return (await claimTab(`palpebra ${link_token}`, true, taken)) === "held" ? "taken" : "left";
 }
 
 /** `hasTrials` is called where an answer in this visit decides the group, and with it the trials. */

@@ -63,6 +63,9 @@ export function isTemporary(status: number): boolean {
   return status >= 500 || status === 408 || status === 425 || status === 429;
 }
 
+/** The server is there, and something else keeps its database: it says so by this code. */
+export const BUSY = "database_busy";
+
 export function refusalOf(answer: Answer): Refused {
   const body = answer.body as { error?: { code?: string; message?: string; details?: unknown } } | null;
   const error = body?.error;

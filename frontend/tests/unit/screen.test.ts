@@ -1,11 +1,12 @@
 import { describe, expect, it } from "vitest";
-import type { TrialInfo } from "../../src/api/schema";
+import type { Gates, TrialInfo } from "../../src/api/schema";
 import { luminance } from "../../src/participant/flow/appearance";
-import { findings, type Abilities } from "../../src/participant/flow/gates";
+import { findings, lackOfRoom, type Abilities, type Measures } from "../../src/participant/flow/gates";
 import { owed, Replays } from "../../src/participant/flow/replays";
 import { refreshRate } from "../../src/participant/screen/refresh-rate";
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
-import { distanceFrom } from "../../src/participant/screens/distance";
+import { deviation, randomStart, settled, spreadPercent } from "../../src/participant/calibration/spread";
+import { distanceFrom } from "../../src/participant/calibration/distance";
 import { keyFor, valueOf } from "../../src/participant/trials/shared/scale-keys";
 
 const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
@@ -144,7 +145,49 @@ it("ink on the surround is chosen by luminance", () => {
   expect(luminance("#ffffff")).toBeCloseTo(1);
 });
 
+describe("repeated measurements", () => {
+  it("count where they agree, else are followed by one more, at most two", () => {
+    expect(settled([3.7], 2)).toBeNull();
+    expect(settled([3.7, 3.75], 2)).toEqual([3.7, 3.75]);
+    expect(settled([3.7, 4.1], 2)).toBeNull();
+    expect(settled([3.7, 4.1, 4.12], 2)).toEqual([4.1, 4.12]);
+    expect(settled([3.7, 4.1, 3.7, 4.1], 2)).toEqual([3.7, 4.1]);
+  });
+  it("have a spread in percent of their mean, and a standard deviation", () => {
+    expect(spreadPercent([95, 105])).toBeCloseTo(10);
+    expect(deviation([600, 610, 620])).toBeCloseTo(10);
+    expect(deviation([600])).toBe(0);
+  });
+  it("begin anywhere but where the last one ended", () => {
+    const starts = Array.from({ length: 500 }, () => randomStart(180, 510, 324));
+    expect(Math.min(...starts.map((start) => Math.abs(start - 324)))).toBeGreaterThan(32);
+    expect(Math.min(...starts)).toBeGreaterThanOrEqual(180);
+    expect(Math.max(...starts)).toBeLessThanOrEqual(510);
+    expect(new Set(starts).size).toBeGreaterThan(400);
+  });
+});
+
+describe("room for the clips before anything has begun", () => {
+  const gates = { minimum_width_px: 800, minimum_height_px: 500 } as Gates;
+  const window = { inner: [1_280, 700], outer: [1_280, 760], screen: [1_280, 800], full_screen: false } satisfies Measures;
+  it("is there, or the window is too small, or the page is enlarged", () => {
+    expect(lackOfRoom(gates, window)).toBeNull();
+    expect(lackOfRoom(gates, { ...window, inner: [700, 600], outer: [700, 660] })?.reason).toBe("window_small");
+    expect(lackOfRoom(gates, { ...window, inner: [640, 350] })?.reason).toBe("gate_zoom");
+  });
+  it("is the screen's where the page will fill it, in enlarged pixels", () => {
+    expect(lackOfRoom(gates, { ...window, inner: [700, 400], outer: [700, 460], full_screen: true })).toBeNull();
+    const lack = lackOfRoom(gates, { ...window, inner: [640, 350], full_screen: true });
+    expect([lack?.reason, lack?.values["have_width"]]).toEqual(["gate_zoom", 640]);
+  });
+});
+
 describe("plausible sizes", () => {
+  it("a screen more than a metre wide is none, but for one twice as wide as high", () => {
+    const wide = { device_pixel_ratio: 1, screen_width_px: 5_120, screen_height_px: 1_440 };
+    expect(isPlausible(5_120 / 1_190, wide)).toBe(true);
+    expect(isPlausible(2_560 / 1_030, { ...wide, screen_width_px: 2_560 })).toBe(false);
+  });
   it.each([
     [1_280 / 1_030, false],
     [1_920 / 1_030, false],
@@ -152,6 +195,6 @@ describe("plausible sizes", () => {
     [160 / 25.4, true],
     [1_920 / 24, false],
   ])("%f px/mm: %s", (px_per_mm, plausible) => {
-    expect(isPlausible(px_per_mm)).toBe(plausible);
+    expect(isPlausible(px_per_mm, { device_pixel_ratio: 1, screen_width_px: 1_280, screen_height_px: 720 })).toBe(plausible);
   });
 });

@@ -57,9 +57,12 @@ def test_a_phone_goes_through_everything_by_tapping(
     for selector in ("text=Normal without", ".likert .step >> nth=6", ".primary"):
         tap(selector)
     page.wait_for_selector(".card-upright")  # a card lying down is wider than a phone
-    tap("text=Larger")
-    for selector in ("text=It fits", "text=It is, within"):
-        tap(selector)
+    for number in (1, 2):
+        page.wait_for_selector(f".card-area[data-round='{number}']")
+        page.fill(".card-area input", "300")
+        tap("text=Larger")
+        tap("text=It fits")
+    tap("text=It is, within")
     page.wait_for_selector("text=in centimetres")  # the blind spot lies outside so small a screen
     tap(".primary")
     for selector in (".prose ol >> xpath=ancestor::section//button[1]", "text=Continue"):
@@ -84,7 +87,7 @@ def test_a_phone_goes_through_everything_by_tapping(
     rows = server.rows("SELECT response FROM ratings WHERE kind = 'main'")
     assert [row["response"] for row in rows] == [6] * 6
     measured = server.rows("SELECT px_per_mm, viewing_distance_mm FROM calibrations")[0]
-    assert measured["px_per_mm"] == pytest.approx(96 / 25.4 + 1 / 85.6, abs=0.001)
+    assert measured["px_per_mm"] == pytest.approx(301 / 85.6, abs=0.001)
     assert measured["viewing_distance_mm"] == 600
 
 

@@ -7,7 +7,7 @@ from playwright.sync_api import Browser, Page, Route
 
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, STUDY, without
-from tests.browser.visit import Visit, axe_violations, touch_card
+from tests.browser.visit import Visit, axe_violations, fit_card
 
 pytestmark = pytest.mark.browser
 EVENTS = "SELECT type, data FROM run_events"
@@ -197,8 +197,7 @@ def test_a_clip_too_large_for_the_window_is_refused(
     server.start()
     Visit(page, server.address).open(study.link_token).begin()
     page.wait_for_selector(".card")
-    touch_card(page)
-    page.click("text=It fits")
+    fit_card(page)
     page.click("text=It is, within")
     page.wait_for_selector("text=The clip does not fit")
     assert axe_violations(page) == []
@@ -212,8 +211,7 @@ def test_zoom_keeps_the_size_and_another_screen_asks_again(
     )
     server.start()
     visit = Visit(page, server.address).open(study.link_token).begin()
-    touch_card(page)
-    page.click("text=It fits")
+    fit_card(page)
     page.click("text=It is, within")
     visit.instructions().practice()
     page.wait_for_selector(".ready, .attention")
@@ -251,7 +249,5 @@ def test_a_card_that_nobody_has_touched_and_an_impossible_screen_are_refused(
     page.fill(".card-area input", "120")
     page.click("text=It fits")
     page.wait_for_selector("text=your screen would be 91 cm wide")
-    touch_card(page)
-    page.fill(".card-area input", "323")
-    page.click("text=It fits")
+    fit_card(page)
     page.wait_for_selector("text=It is, within")

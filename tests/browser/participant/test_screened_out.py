@@ -6,7 +6,7 @@ from playwright.sync_api import Browser, Page
 
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, STUDY, without
-from tests.browser.visit import Visit, axe_violations, touch_card
+from tests.browser.visit import Visit, axe_violations, fit_card
 
 TOO_OLD = """
 [[screening]]
@@ -100,8 +100,7 @@ def test_a_clip_that_cannot_fit_screens_out_on_request(
     study = server.add_study(tmp_path / "clips", wide)
     server.start()
     Visit(page, server.address).open(study.link_token).begin()
-    touch_card(page)
-    page.click("text=It fits")
+    fit_card(page)
     page.click("text=It is, within")
     page.wait_for_selector("text=The clip does not fit")
     assert axe_violations(page) == []

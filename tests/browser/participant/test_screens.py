@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page
 
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, STUDY, without
-from tests.browser.visit import Visit, axe_violations, touch_card
+from tests.browser.visit import CARD_PX, Visit, axe_violations, fit_card
 
 pytestmark = pytest.mark.browser
 PICTURES_OF = {"width": 1280, "height": 800}
@@ -19,13 +19,12 @@ SEPARATION_PX = """() => {
   return square.x + square.width / 2 - (dot.x + dot.width / 2);
 }"""
 TAN_13_5_DEGREES = 0.2400787
-CARD_PX_PER_MM = 96 / 25.4
+CARD_PX_PER_MM = CARD_PX / 85.6
 
 
 def to_the_blind_spot(visit: Visit) -> Page:
     page = visit.begin().page
-    touch_card(page)
-    page.click("text=It fits")
+    fit_card(page)
     page.click("text=It is, within")
     page.wait_for_selector(".blind-field")
     return page
@@ -230,12 +229,16 @@ def test_the_whole_visit_by_keyboard_alone(server: ServerProcess, tmp_path: Path
     press(page, "input[value=normal]", " ")
     press(page, ".likert input", "ArrowRight")
     press(page, ".primary", " ")
-    page.wait_for_selector(".card")
-    tab_to(page, "input[type=range]")
-    before = page.evaluate("document.querySelector('.card').offsetWidth")
-    page.keyboard.press("ArrowRight")
-    assert page.evaluate("document.querySelector('.card').offsetWidth") == before + 1
-    press(page, ".primary")
+    for number in (1, 2):
+        page.wait_for_selector(f".card-area[data-round='{number}']")
+        tab_to(page, "input[type=range]")
+        page.keyboard.press("Home")
+        for _ in range(4):
+            page.keyboard.press("PageUp")
+        before = page.evaluate("document.querySelector('.card').offsetWidth")
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("document.querySelector('.card').offsetWidth") == before + 1
+        press(page, ".primary")
     page.wait_for_selector(".ruler-line")
     press(page, ".primary")
     page.wait_for_selector(".blind-field")

@@ -85,6 +85,7 @@ def test_a_personal_link_goes_on_from_another_device(client: TestClient, study: 
         "kind": "personal",
         "resumable": True,
         "screens_devices": False,
+        "way_back": None,
     }
     assert second.start().status_code == 200
     assert second.run_id == first.run_id

@@ -183,7 +183,7 @@ export const CONSENTS: Record<string, Record<string, string>> = {
 
 You are invited to a study on [topic]. You will watch short clips and rate them. It takes about [minutes] minutes.
 
-- Taking part is voluntary. You can stop at any time by closing the page, without giving a reason.
+- Taking part is voluntary. If you would rather not, choose *I do not agree*. You can stop at any time with *Stop*, without giving a reason.
 - We store your answers, how the clips were shown on your screen, and what you enter in questionnaires.
 - We store neither your name nor your internet address.
 
@@ -193,7 +193,7 @@ Responsible: [name, institution, e-mail]. Ethics approval: [number].
 
 You are invited to a study on [topic]. You will watch short clips and rate them. It takes about [minutes] minutes.
 
-- Taking part is voluntary. You can stop at any time by closing the page; tell us the code of your run and we delete what it holds.
+- Taking part is voluntary. If you would rather not, choose *I do not agree*. You can stop at any time with *Stop*; tell us the code of your run and we delete what it holds.
 - Answers are published in a public archive, without anything that names you. What is published cannot be taken back.
 - We store neither your name nor your internet address.
 
@@ -215,7 +215,7 @@ Responsible: [name, institution, e-mail]. Ethics approval: [number].
 
 Sie sind zu einer Studie über [Thema] eingeladen. Sie sehen kurze Filme und bewerten sie. Das dauert etwa [Minuten] Minuten.
 
-- Die Teilnahme ist freiwillig. Sie können jederzeit ohne Angabe von Gründen aufhören, indem Sie die Seite schließen.
+- Die Teilnahme ist freiwillig. Wenn Sie nicht möchten, wählen Sie *Ich bin nicht einverstanden*. Mit *Aufhören* können Sie jederzeit ohne Angabe von Gründen aufhören.
 - Wir speichern Ihre Antworten, wie die Filme auf Ihrem Bildschirm gezeigt wurden und Ihre Angaben in Fragebögen.
 - Wir speichern weder Ihren Namen noch Ihre Internetadresse.
 

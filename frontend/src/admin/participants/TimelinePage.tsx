@@ -1,13 +1,31 @@
 import { Anchor, Card, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link, useParams } from "@tanstack/react-router";
-import { api, unwrap } from "../api";
+import { api, type Schemas, unwrap } from "../api";
 import { useMay } from "../queries";
 import { Answer } from "../ui/Answer";
 import { plain, when, words } from "../ui/format";
 import { IdentityButton } from "./IdentityButton";
 import { RunActions } from "./RunActions";
 import { TrialTable } from "./TrialTable";
+
+/** A calibration as it is shown: what was not measured is left out. */
+function calibrationFacts(one: Schemas["TimelineCalibration"]): Record<string, string | number> {
+  const facts = {
+    "px per mm": one.px_per_mm.toFixed(2),
+    method: one.method,
+    why: words(one.occasion),
+    measurements: one.repeats,
+    "spread, %": one.spread_percent,
+    "ruler says": one.ruler_check && words(one.ruler_check),
+    "off at a later look, %": one.recheck_percent,
+    "distance, mm": one.viewing_distance_mm,
+    "distance by": one.distance_method && words(one.distance_method),
+    "distance spread, mm": one.distance_spread_mm,
+    zoom: one.zoom,
+  };
+  return Object.fromEntries(Object.entries(facts).filter((fact): fact is [string, string | number] => fact[1] !== null));
+}
 
 export function TimelinePage() {
   const { study = "", run = "" } = useParams({ strict: false });
@@ -47,11 +65,7 @@ export function TimelinePage() {
                 <Facts key={form.form} title={`Form “${words(form.form)}”`} values={form.answers} />
               ))}
               {data.calibrations.map((one) => (
-                <Facts
-                  key={one.saved_at}
-                  title="Calibration"
-                  values={{ "px per mm": one.px_per_mm.toFixed(2), method: one.method, zoom: one.zoom }}
-                />
+                <Facts key={one.saved_at} title="Calibration" values={calibrationFacts(one)} />
               ))}
               <Facts title="Device" values={data.device} />
             </Group>

@@ -13,6 +13,7 @@ const FIELDS = {
   code_screened_out: ["Code where screened out", "empty: none is shown"],
   code_failed_check: ["Code where checks failed", "empty: the completion code"],
   redirect_screened_out: ["Address for who is screened out", "empty: none, on Prolific by the code"],
+  redirect_declined: ["Address for who takes no part", "empty: none, on Prolific its start page"],
   id_parameter: ["Address parameter of their id", "empty: the recruiter's usual one"],
 } as const;
 type Field = keyof typeof FIELDS;
@@ -26,6 +27,7 @@ function textsOf(recruiter: Record<string, unknown> | null): Record<Field | "red
     code_complete: text("code_complete"),
     code_screened_out: text("code_screened_out"),
     redirect_screened_out: text("redirect_screened_out"),
+    redirect_declined: text("redirect_declined"),
     code_failed_check: text("code_failed_check"),
     id_parameter: text("id_parameter"),
     redirect_url: text("redirect_url"),

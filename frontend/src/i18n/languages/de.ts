@@ -15,6 +15,7 @@ export const messages: Messages = {
   declined_title: "Sie nehmen nicht teil",
   declined: "Die Studie endet hier. Es wurden keine Antworten gespeichert. Sie können diese Seite schließen.",
   saving: "Wird gespeichert …",
+  saving_busy: "Der Server ist gerade überlastet. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald er Zeit hat.",
   saving_offline:
     "Gerade besteht keine Verbindung. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald sie wieder da ist.",
   not_saved: "Der Server hat das nicht angenommen: {message}",
@@ -22,7 +23,7 @@ export const messages: Messages = {
   form_required: "erforderlich",
   form_missing: "Bitte beantworten Sie diese Frage.",
   form_number: "Bitte geben Sie eine ganze Zahl von {minimum} bis {maximum} ein.",
-  form_length: "Bitte höchstens {maximum} Zeichen.",
+  form_length: { by: "maximum", one: "Bitte höchstens {maximum} Zeichen.", other: "Bitte höchstens {maximum} Zeichen." },
   form_fix: "Bitte sehen Sie sich die markierten Fragen an.",
 
   screen_title: "Ihr Bildschirm",
@@ -38,6 +39,14 @@ export const messages: Messages = {
   card_title: "Wie groß ist Ihr Bildschirm?",
   card_text:
     "Die Augen erscheinen so groß wie in einem wirklichen Gesicht. Halten Sie eine Bankkarte (oder eine Karte dieser Größe) an den Bildschirm. Machen Sie das Bild genau so groß wie die Karte.",
+  card_why:
+    "Warum: Bildschirme sind verschieden, und nur mit einer Karte zeigt Ihrer die Augen so groß wie in einem wirklichen Gesicht. Von der Karte wird nichts gelesen oder gespeichert.",
+  card_picture: "Eine Hand hält eine Bankkarte flach an den Bildschirm, auf die gezeichnete Karte.",
+  size_round: "Messung {round} von {times}",
+  size_again: "Noch einmal, von einer anderen Größe aus: Zwei Messungen zeigen, wie genau die Größe ist.",
+  size_differs: "Die beiden Größen weichen um {percent} % voneinander ab. Bitte messen Sie noch einmal.",
+  recheck_title: "Stimmt die Größe noch?",
+  recheck_differs: "Diese Größe weicht um {percent} % von der früheren ab. Bitte messen Sie neu.",
   card_slider: "Größe der Karte auf dem Bildschirm",
   card_smaller: "Kleiner",
   card_larger: "Größer",
@@ -66,8 +75,12 @@ export const messages: Messages = {
     "Die Seite ist auf einem anderen Bildschirm, oder er wurde neu eingestellt. Bitte messen Sie noch einmal, damit die Größe stimmt.",
 
   distance_title: "Wie weit weg sitzen Sie?",
-  distance_text:
-    "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
+  distance_text: {
+    by: "times",
+    one: "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
+    other:
+      "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
+  },
   distance_start: "Beginnen (Leertaste)",
   distance_gone: "Der Punkt ist weg (Leertaste)",
   distance_round: "{round} von {times}",
@@ -79,7 +92,7 @@ export const messages: Messages = {
 
   preload_title: "Die Filme werden geholt",
   preload_text: "Sie werden vorher geladen, damit jeder ohne Stocken läuft.",
-  preload_progress: "{done} von {total} Filmen",
+  preload_progress: { by: "total", one: "{done} von {total} Film", other: "{done} von {total} Filmen" },
   preload_failed_title: "Einige Filme konnten nicht geladen werden",
   preload_failed:
     "Die Verbindung scheint unterbrochen zu sein. Was Sie bisher getan haben, bleibt erhalten. Versuchen Sie es noch einmal, oder kommen Sie später mit demselben Link wieder.",
@@ -88,11 +101,21 @@ export const messages: Messages = {
   practice_title: "Übung",
   practice_note: "Übung {number} von {total}",
   practice_done_title: "Das war die Übung",
-  practice_done: "Von jetzt an zählen Ihre Antworten. Es sind {trials} Filme, in Teilen von etwa {block} mit Pausen dazwischen.",
+  practice_done: {
+    by: "trials",
+    one: "Von jetzt an zählen Ihre Antworten. Es ist {trials} Film.",
+    other: "Von jetzt an zählen Ihre Antworten. Es sind {trials} Filme, in Teilen von etwa {block} mit Pausen dazwischen.",
+  },
   feedback_good: "Gut: Sie haben bis zum Ende zugesehen und dann geantwortet.",
   feedback_key: "Sie haben eine Taste gedrückt, während der Film lief. Sehen Sie bis zum Ende zu; dann erscheint die Skala.",
   feedback_focus: "Die Seite wurde verlassen, während der Film lief. Bitte bleiben Sie auf der Seite.",
-  feedback_slow: "Sie haben {seconds} Sekunden gebraucht. Antworten Sie nach dem ersten Eindruck.",
+  feedback_slow: {
+    by: "seconds",
+    one: "Sie haben {seconds} Sekunde gebraucht. Antworten Sie nach dem ersten Eindruck.",
+    other: "Sie haben {seconds} Sekunden gebraucht. Antworten Sie nach dem ersten Eindruck.",
+  },
+
+  feedback_again: "Bitte versuchen Sie es mit diesem noch einmal.",
 
   ready: "Leertaste startet den Film",
   ready_again: "Leertaste zeigt ihn noch einmal ({view} von {views})",
@@ -123,22 +146,32 @@ export const messages: Messages = {
   comment: "Bemerkung (wenn Sie möchten)",
   attention_title: "Eine Frage zwischendurch",
 
-  break_progress: "{done} von {total} Filmen erledigt",
+  break_progress: { by: "total", one: "{done} von {total} Film erledigt", other: "{done} von {total} Filmen erledigt" },
   break_part: "Als Nächstes kommt Teil {block} von {blocks}",
   break_wait: "In {seconds} s können Sie weitermachen.",
   break_ready: "Sie können weitermachen, wann Sie möchten.",
   break_go_on: "Weiter",
   welcome_back_title: "Willkommen zurück",
-  welcome_back: "Sie machen dort weiter, wo Sie aufgehört haben: {done} von {total} Filmen sind erledigt.",
+  welcome_back: {
+    by: "total",
+    one: "Sie machen dort weiter, wo Sie aufgehört haben: {done} von {total} Film ist erledigt.",
+    other: "Sie machen dort weiter, wo Sie aufgehört haben: {done} von {total} Filmen sind erledigt.",
+  },
 
   finishing_title: "Ihre letzten Antworten werden gespeichert",
-  finishing_wait: "Noch {count} zu senden. Bitte lassen Sie diese Seite offen.",
+  finishing_wait: {
+    by: "count",
+    one: "Noch {count} Antwort ist zu senden. Bitte lassen Sie diese Seite offen.",
+    other: "Noch {count} Antworten sind zu senden. Bitte lassen Sie diese Seite offen.",
+  },
   done_code: "Ihr Abschlusscode",
   out_code: "Ihr Code",
   done_copy: "Kopieren",
   done_copied: "Kopiert",
   done_return: "Zurück dorthin, wo Sie sich angemeldet haben",
   done_close: "Alles ist gespeichert. Sie können diese Seite schließen.",
+  return_begun: "Jemand hat diese Studie auf diesem Gerät begonnen. Wenn Sie das waren, machen Sie dort weiter, wo Sie aufgehört haben.",
+  return_go_on: "Das war ich: weitermachen",
   new_visit: "Eine andere Person nimmt an diesem Gerät teil",
 
   stop: "Aufhören",
@@ -177,6 +210,8 @@ export const messages: Messages = {
 
   no_answer_title: "Der Server ist nicht erreichbar",
   no_answer: "Bitte prüfen Sie Ihre Verbindung. Die Seite versucht es alle paar Sekunden von selbst wieder.",
+  busy_title: "Die Studie ist gerade überlastet",
+  busy: "Der Server ist da, kommt aber gerade nicht an seine Daten. Die Seite versucht es alle paar Sekunden von selbst wieder.",
   problem_title: "Etwas ist schiefgegangen",
   problem:
     "Was Sie bisher getan haben, bleibt erhalten. Laden Sie die Seite neu; wenn es wiederkommt, schreiben Sie bitte der Person, die Sie eingeladen hat: {detail}",
@@ -207,6 +242,8 @@ export const messages: Messages = {
     "Diesem Browser scheint der H.264-Decoder zu fehlen, den die meisten Filme brauchen. Bitte öffnen Sie den Link in Chrome, Edge oder Safari, oder in Firefox mit den Codecs Ihres Systems. Wenn Sie hier weitermachen, werden die Filme vielleicht nicht gezeigt.",
   gate_screen:
     "Der Bildschirm dieses Geräts ist zu klein: Die Studie braucht {width} mal {height} Pixel, dieser hat {have_width} mal {have_height}. Bitte nehmen Sie einen Computer oder ein größeres Tablet.",
+  gate_zoom:
+    "Die Seite ist vergrößert, sodass die Filme nicht hineinpassen: Die Studie braucht {width} mal {height} Pixel, bei diesem Zoom sind es {have_width} mal {have_height}. Bitte stellen Sie den Zoom auf 100 % (Strg und 0).",
   gate_touch: "Diese Studie braucht eine Tastatur. Bitte öffnen Sie den Link auf einem Computer.",
   gate_storage:
     "Dieser Browser lässt die Seite nichts aufbewahren, vielleicht wegen eines privaten Fensters. Sie können weitermachen, aber jede Antwort muss den Server erreichen, bevor der nächste Film kommt; dazu braucht es eine gute Verbindung. Ein normales Fenster ist besser.",

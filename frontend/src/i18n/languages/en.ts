@@ -1,4 +1,6 @@
 /** The page's own sentences. Every other language file has the same keys, or does not compile. */
+import type { Message, Plural } from "../message";
+
 export const messages = {
   continue: "Continue",
   try_again: "Try again",
@@ -14,13 +16,14 @@ export const messages = {
   declined_title: "You are not taking part",
   declined: "The study ends here. No answers have been stored. You can close this page.",
   saving: "Saving …",
+  saving_busy: "The server is busy at the moment. Your answers are safe on this device and will be sent as soon as it has time.",
   saving_offline: "There is no connection at the moment. Your answers are safe on this device and will be sent as soon as it is back.",
   not_saved: "The server did not accept this: {message}",
 
   form_required: "required",
   form_missing: "Please answer this question.",
   form_number: "Please enter a whole number from {minimum} to {maximum}.",
-  form_length: "Please use at most {maximum} characters.",
+  form_length: { by: "maximum", one: "Please use at most {maximum} character.", other: "Please use at most {maximum} characters." },
   form_fix: "Please look at the marked questions.",
 
   screen_title: "Your screen",
@@ -37,6 +40,14 @@ export const messages = {
   card_title: "How large is your screen?",
   card_text:
     "The eyes are shown at the size of a real face. Hold a bank card (or any card of that size) against the screen. Make the picture exactly as large as the card.",
+  card_why:
+    "Why: screens differ, and only by a card does yours show the eyes as large as in a real face. Nothing of the card is read or stored.",
+  card_picture: "A hand holds a bank card flat against the screen, over the drawn card.",
+  size_round: "Measurement {round} of {times}",
+  size_again: "Once more, from another size: two measurements tell how exact the size is.",
+  size_differs: "The two sizes differ by {percent}%. Please measure once more.",
+  recheck_title: "Is the size still right?",
+  recheck_differs: "This size differs from the earlier one by {percent}%. Please measure anew.",
   card_slider: "Size of the card on the screen",
   card_smaller: "Smaller",
   card_larger: "Larger",
@@ -64,8 +75,12 @@ export const messages = {
   screen_changed: "The page is on another screen, or the screen was set up anew. Please measure again, so that the size is right.",
 
   distance_title: "How far away do you sit?",
-  distance_text:
-    "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} times.",
+  distance_text: {
+    by: "times",
+    one: "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} time.",
+    other:
+      "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} times.",
+  },
   distance_start: "Start (Space)",
   distance_gone: "The dot is gone (Space)",
   distance_round: "{round} of {times}",
@@ -76,7 +91,7 @@ export const messages = {
 
   preload_title: "Getting the clips",
   preload_text: "They are loaded beforehand, so that each one runs smoothly.",
-  preload_progress: "{done} of {total} clips",
+  preload_progress: { by: "total", one: "{done} of {total} clip", other: "{done} of {total} clips" },
   preload_failed_title: "Some clips could not be loaded",
   preload_failed:
     "The connection seems to be interrupted. What you have done so far is kept. Try again, or come back later with the same link.",
@@ -85,11 +100,21 @@ export const messages = {
   practice_title: "Practice",
   practice_note: "Practice {number} of {total}",
   practice_done_title: "That was the practice",
-  practice_done: "From now on your answers count. There are {trials} clips, in parts of about {block} with breaks between them.",
+  practice_done: {
+    by: "trials",
+    one: "From now on your answers count. There is {trials} clip.",
+    other: "From now on your answers count. There are {trials} clips, in parts of about {block} with breaks between them.",
+  },
   feedback_good: "Good: you watched to the end and then answered.",
   feedback_key: "You pressed a key while the clip was running. Watch it to the end; the scale appears then.",
   feedback_focus: "The page was left while the clip was running. Please stay on the page.",
-  feedback_slow: "You took {seconds} seconds. Answer by your first impression.",
+  feedback_slow: {
+    by: "seconds",
+    one: "You took {seconds} second. Answer by your first impression.",
+    other: "You took {seconds} seconds. Answer by your first impression.",
+  },
+
+  feedback_again: "Please try this one once more.",
 
   ready: "Press Space to start the clip",
   ready_again: "Press Space to see it again ({view} of {views})",
@@ -120,22 +145,32 @@ export const messages = {
   comment: "Comment (if you like)",
   attention_title: "One question in between",
 
-  break_progress: "{done} of {total} clips done",
+  break_progress: { by: "total", one: "{done} of {total} clip done", other: "{done} of {total} clips done" },
   break_part: "Part {block} of {blocks} comes next",
   break_wait: "You can go on in {seconds} s.",
   break_ready: "You can go on whenever you like.",
   break_go_on: "Go on",
   welcome_back_title: "Welcome back",
-  welcome_back: "You go on where you stopped: {done} of {total} clips are done.",
+  welcome_back: {
+    by: "total",
+    one: "You go on where you stopped: {done} of {total} clip is done.",
+    other: "You go on where you stopped: {done} of {total} clips are done.",
+  },
 
   finishing_title: "Saving your last answers",
-  finishing_wait: "{count} still to be sent. Please keep this page open.",
+  finishing_wait: {
+    by: "count",
+    one: "{count} answer is still to be sent. Please keep this page open.",
+    other: "{count} answers are still to be sent. Please keep this page open.",
+  },
   done_code: "Your completion code",
   out_code: "Your code",
   done_copy: "Copy",
   done_copied: "Copied",
   done_return: "Go back to where you signed up",
   done_close: "Everything is saved. You can close this page.",
+  return_begun: "Somebody has begun this study on this device. If that was you, go on where you stopped.",
+  return_go_on: "That was me: go on",
   new_visit: "Another person takes part on this device",
 
   stop: "Stop",
@@ -174,6 +209,8 @@ export const messages = {
 
   no_answer_title: "The server cannot be reached",
   no_answer: "Please check your connection. The page tries again by itself every few seconds.",
+  busy_title: "The study is busy at the moment",
+  busy: "The server is there, but it cannot get at its data just now. The page tries again by itself every few seconds.",
   problem_title: "Something went wrong",
   problem:
     "What you have done so far is kept. Load the page again; if this comes back, please write to the person who invited you: {detail}",
@@ -204,10 +241,16 @@ export const messages = {
     "This browser seems to lack the H.264 decoder that most clips need. Please open the link in Chrome, Edge or Safari, or in Firefox with the codecs of your system installed. If you go on here, the clips may not be shown.",
   gate_screen:
     "The screen of this device is too small: the study needs {width} by {height} pixels, this one has {have_width} by {have_height}. Please use a computer or a larger tablet.",
+  gate_zoom:
+    "The page is enlarged, so that the clips would not fit: the study needs {width} by {height} pixels, and at this zoom there are {have_width} by {have_height}. Please set the zoom to 100% (Ctrl and 0).",
   gate_touch: "This study needs a keyboard. Please open the link on a computer.",
   gate_storage:
     "This browser does not let the page keep anything, perhaps because of a private window. You can go on, but each answer must reach the server before the next clip, so a good connection is needed. A normal window is better.",
   gate_continue: "Go on all the same",
 };
 
-export type Messages = Record<keyof typeof messages, string>;
+type English = typeof messages;
+/** What counts something in English has the forms of the language's own plural in every other one. */
+export type Messages = { [Key in keyof English]: English[Key] extends string ? string : Plural };
+/** Every language's own, whatever its plurals. */
+export type AnyMessages = Record<keyof English, Message>;

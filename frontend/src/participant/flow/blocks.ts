@@ -2,7 +2,7 @@
 import type { TrialInfo } from "../../api/schema";
 import { trial, type Node } from "../jspsych";
 import { blockBreak } from "../screens/block-break";
-import { calibration } from "../screens/calibration";
+import { calibration, loadCalibration } from "../screens/calibration";
 import { preloadPage, sourcesOf } from "../screens/preload";
 import { needsScreenSetup, screenSetup } from "../screens/screen-setup";
 import { settle } from "../screens/settle";
@@ -12,9 +12,13 @@ import { trialNode } from "../trials";
 import { enterStage } from "./stages";
 
 const RECEIPTS_WITHIN_MS = 10_000;
+/** Trials of a block whose clips are here before it begins; a trial lasts longer than the next clip takes to come. */
+const CLIPS_FIRST = 3;
+const PRACTICE = 0;
 
 /** What is shown first is fetched while consent and questions are read; what fails is fetched again in its turn. */
 export function fetchFirst(session: Session): void {
+  if (session.run.display.calibrate !== "off") void loadCalibration().catch(() => {});
   const open = session.run.trials.filter((one) => !one.answered);
   const first = open.find((one) => one.kind !== "practice")?.block;
   // Practice is of block 0, and comes first in the run's order.
@@ -32,7 +36,7 @@ export function practiceNodes(session: Session): Node[] {
   return [
     trial(textPage(session), { eyebrow: "", text, action: t("continue"), remarks: "" }),
     {
-      timeline: [preloadNode(session, trials), ...trialNodes(session, trials)],
+      timeline: trialNodes(session, trials, [onceMore(session, PRACTICE)]),
       on_timeline_start: () => {
         enterStage(session, "practice");
         fetchAhead(session, trials, first);
@@ -43,8 +47,12 @@ export function practiceNodes(session: Session): Node[] {
 }
 
 export function restNodes(session: Session, block: number): Node[] {
-  const { blocks, break_seconds_min } = session.run;
-  return [trial(blockBreak(session), { block, blocks: blocks.length, seconds_min: break_seconds_min })];
+  const { blocks, break_seconds_min, display } = session.run;
+  const looksAgain: Node = {
+    timeline: [trial(calibration(session), { eyebrow: "", occasion: "recheck" })],
+    conditional_function: () => display.recheck_size && session.screen.calibration !== null,
+  };
+  return [trial(blockBreak(session), { block, blocks: blocks.length, seconds_min: break_seconds_min }), looksAgain];
 }
 
 export function blockNodes(session: Session, block: number, next: number | null): Node[] {
@@ -52,7 +60,7 @@ export function blockNodes(session: Session, block: number, next: number | null)
   const open = trials.filter((one) => !one.answered && one.plays_done === 0);
   return [
     {
-      timeline: [preloadNode(session, trials), ...trialNodes(session, open), ...repetitions(session, block)],
+      timeline: [...trialNodes(session, open), ...repetitions(session, block)],
       on_timeline_start: () => {
         enterStage(session, "trials");
         fetchAhead(session, trials, next);
@@ -65,9 +73,12 @@ function trialsOf({ run }: Session, block: number): TrialInfo[] {
   return run.trials.filter((one) => one.block === block && one.kind !== "practice");
 }
 
-/** A block keeps all its clips, since any of them may be wanted again. */
+/** A block begins when its first clips are here; the others come while these are shown, and are waited for in their turn. */
 function preloadNode(session: Session, trials: TrialInfo[]): Node {
-  return trial(preloadPage(session), { eyebrow: "", trials });
+  return {
+    timeline: [trial(preloadPage(session), { eyebrow: "", trials })],
+    conditional_function: () => !session.clips.hasAll(sourcesOf(trials)),
+  };
 }
 
 function fetchAhead(session: Session, trials: TrialInfo[], next: number | null): void {
@@ -78,12 +89,13 @@ function fetchAhead(session: Session, trials: TrialInfo[], next: number | null):
   void session.clips.load(now).then(() => session.clips.load(ahead));
 }
 
-function trialNodes(session: Session, trials: TrialInfo[]): Node[] {
+function trialNodes(session: Session, trials: TrialInfo[], after: Node[] = []): Node[] {
   return trials.flatMap((one, place) => {
     const next = trials[place + 1] ?? null;
     const node = trialNode(session, one.kind, () => ({ trial: one, play: 1, next }));
     // An adaptive series may have ended before this trial has its turn.
-    return [{ timeline: [...checks(session), node], conditional_function: () => !one.answered }];
+    const clips = preloadNode(session, trials.slice(place, place + (place === 0 ? CLIPS_FIRST : 1)));
+    return [{ timeline: [...checks(session), clips, node, ...after], conditional_function: () => !one.answered }];
   });
 }
 
@@ -95,7 +107,7 @@ function checks(session: Session): Node[] {
     conditional_function: () => needsScreenSetup(session),
   };
   const measure: Node = {
-    timeline: [trial(calibration(session), { eyebrow: "", changed: true })],
+    timeline: [trial(calibration(session), { eyebrow: "", occasion: "screen_changed" })],
     conditional_function: () => {
       const change = screen.change();
       const calibrated = change === "zoom" ? screen.afterZoom() : null;
@@ -116,6 +128,11 @@ function checks(session: Session): Node[] {
 
 function repetitions(session: Session, block: number): Node[] {
   const waits = trial(settle(session), { limit_ms: RECEIPTS_WITHIN_MS });
+  return [waits, onceMore(session, block, [waits])];
+}
+
+/** What waits to be shown again, as long as something does; `after` each of them. */
+function onceMore(session: Session, block: number, after: Node[] = []): Node {
   const wanted = (): boolean => session.replays.peek(block) !== null;
   const again = trialNode(session, "main", () => {
     const next = session.replays.peek(block);
@@ -123,6 +140,10 @@ function repetitions(session: Session, block: number): Node[] {
     return { ...next, next: null };
   });
   const taken: Node = { timeline: [], on_timeline_start: () => session.replays.shift(block) };
-  const loop: Node = { timeline: [...checks(session), again, taken, waits], conditional_function: wanted, loop_function: wanted };
-  return [waits, loop];
+  const waited = (): TrialInfo[] => [session.replays.peek(block)?.trial].filter((one) => one !== undefined);
+  const clips: Node = {
+    timeline: [trial(preloadPage(session), { eyebrow: "", trials: waited })],
+    conditional_function: () => !session.clips.hasAll(sourcesOf(waited())),
+  };
+  return { timeline: [...checks(session), clips, again, taken, ...after], conditional_function: wanted, loop_function: wanted };
 }

@@ -3,7 +3,7 @@ import type { RunStarted, RunState } from "../../api/schema";
 import type { Translate } from "../../i18n";
 import { button } from "../../ui/page";
 import { completed, showCompletion } from "../screens/finish";
-import { emptied, showNotice } from "../screens/notice";
+import { emptied, type Back, showNotice } from "../screens/notice";
 import type { Identity } from "./identity";
 import { persistently } from "./link";
 
@@ -14,15 +14,19 @@ export async function ended(
   run: RunState,
   started: RunStarted,
   identity: Identity,
+  back: Back,
   why = "",
 ): Promise<void> {
-  if (run.status === "withdrawn") return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn") });
-  const done = await persistently(root, t, () => completed(started.run_token));
   // On a laboratory's computer the next person comes by the same link.
   const anew = (): void => {
     identity.forget();
     location.reload();
   };
+  if (run.status === "withdrawn") {
+    const actions = identity.isNamed ? [] : [{ label: t("new_visit"), press: anew }];
+    return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn"), actions, back });
+  }
+  const done = await persistently(root, t, () => completed(started.run_token));
   const next = identity.isNamed ? [] : [button(t("new_visit"), anew, "plain")];
   showCompletion({ t, run }, emptied(root), done, next, why);
 }

@@ -56,6 +56,45 @@ export function findings(found: Abilities, gates: Gates): GateFinding[] {
   return list.sort((a, b) => Number(b.closed) - Number(a.closed));
 }
 
+/** What a window measures at this moment, all in CSS px. */
+export interface Measures {
+  inner: [number, number];
+  outer: [number, number];
+  screen: [number, number];
+  /** The page can fill the screen, and the study wants it to. */
+  full_screen: boolean;
+}
+
+export function measures(gates: Gates): Measures {
+  return {
+    inner: [window.innerWidth, window.innerHeight],
+    outer: [window.outerWidth, window.outerHeight],
+    screen: [screen.width, screen.height],
+    full_screen: gates.full_screen && document.fullscreenEnabled,
+  };
+}
+
+const ZOOMED = 1.1;
+
+/** Why there is no room for the clips at this moment, by the window or by the page's zoom; null where there is. */
+export function lackOfRoom(gates: Gates, now: Measures): GateFinding | null {
+  // The frame of a window is a few pixels wide: a page twice as large shows half as many in the same window.
+  const zoom = now.outer[0] > 0 ? Math.max(1, now.outer[0] / now.inner[0]) : 1;
+  const zoomed = zoom > ZOOMED;
+  // In full screen the page has all of the screen, in its own enlarged pixels.
+  const [have_width, have_height] = now.full_screen ? now.screen.map((side) => Math.round(zoomed ? side / zoom : side)) : now.inner;
+  const [width, height] = [gates.minimum_width_px, gates.minimum_height_px];
+  const fits = (scale: number): boolean => (have_width ?? 0) * scale >= width && (have_height ?? 0) * scale >= height;
+  if (fits(1)) return null;
+  return {
+    reason: zoomed && fits(zoom) ? "gate_zoom" : "window_small",
+    closed: false,
+    values: { width, height, have_width, have_height } as Values,
+  };
+}
+
+type Values = GateFinding["values"];
+
 function tooSmall(found: Abilities, gates: Gates): boolean {
   const long = Math.max(found.screen_width_px, found.screen_height_px);
   const short = Math.min(found.screen_width_px, found.screen_height_px);

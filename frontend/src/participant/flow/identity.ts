@@ -11,6 +11,12 @@ export function recruiterQuery(search: string): Record<string, string> {
   return Object.fromEntries(entries.map(([key, value]) => [key.slice(0, LONGEST_VALUE), value.slice(0, LONGEST_VALUE)]));
 }
 
+/** The recruiter's address with the parameters of this page's address in their places. */
+export function filledIn(address: string, search: string): string {
+  const query = recruiterQuery(search);
+  return address.replace(/\{(\w+)\}/g, (_, name: string) => encodeURIComponent(query[name] ?? ""));
+}
+
 /** What this browser keeps of one link, and of one person where the address names one. */
 export function storageKey(what: string, link_token: string, search: string): string {
   return `${what} ${link_token} ${JSON.stringify(recruiterQuery(search))}`;
@@ -37,6 +43,23 @@ export class Identity {
 
   get isNamed(): boolean {
     return Object.keys(recruiterQuery(this.search)).length > 0;
+  }
+
+  /** True where this tab has shown the visit before: who reloads it is the same person. */
+  get isOfThisTab(): boolean {
+    try {
+      return storageOf("sessionStorage")?.getItem(`${this.key} tab`) === this.read();
+    } catch {
+      return false;
+    }
+  }
+
+  keepTab(): void {
+    try {
+      storageOf("sessionStorage")?.setItem(`${this.key} tab`, this.client_id());
+    } catch {
+      // Full or blocked: the next page asks again.
+    }
   }
 
   client_id(): string {

@@ -1,10 +1,11 @@
 /** From the link to a run: is it open, can this browser show it, and which visit is it? */
 import type { LinkState, RunStarted, RunState } from "../../api/schema";
-import { call, NetworkError, Refused, isTemporary, request } from "../request";
+import { BUSY, call, NetworkError, Refused, isTemporary, request } from "../request";
 import type { MessageKey, Translate } from "../../i18n";
 import { backoff } from "../outbox/backoff";
-import { showNotice } from "../screens/notice";
-import type { Abilities, GateFinding } from "./gates";
+import { type Back, showNotice } from "../screens/notice";
+import { type Abilities, type GateFinding, lackOfRoom, measures } from "./gates";
+import { filledIn } from "./identity";
 import type { Kept } from "./kept-visit";
 import { withoutPractice } from "./placed";
 
@@ -18,7 +19,8 @@ export async function persistently<Body>(root: HTMLElement, t: Translate, ask: (
       return await ask();
     } catch (error) {
       if (!isNoAnswer(error)) throw error;
-      if (failures > 1) showNotice(root, { title: t("no_answer_title"), text: t("no_answer") });
+      const what = error instanceof Refused && error.code === BUSY ? "busy" : "no_answer";
+      if (failures > 1) showNotice(root, { title: t(`${what}_title`), text: t(what) });
       await new Promise((resolve) => setTimeout(resolve, backoff(failures)));
     }
   }
@@ -55,16 +57,28 @@ const REFUSALS: Record<string, MessageKey> = {
   used: "link_used",
 };
 
+/** The way back to the recruiter for who takes no part. A visit that an earlier page has kept knows none. */
+export function wayBack(t: Translate, { way_back }: Partial<Pick<LinkState, "way_back">>): Back {
+  return way_back ? { label: t("done_return"), href: filledIn(way_back, location.search) } : null;
+}
+
 /** Tell why this link leads nowhere: by the link's status or the server's refusal. */
-export function showRefusal(root: HTMLElement, t: Translate, code: string, message = ""): void {
+export function showRefusal(root: HTMLElement, t: Translate, code: string, message = "", back: Back = null): void {
   const key = REFUSALS[code];
   const title = t(code === "link_unknown" ? "link_unknown_title" : "link_title");
-  showNotice(root, { title, text: key ? t(key) : message || t("link_closed") });
+  showNotice(root, { title, text: key ? t(key) : message || t("link_closed"), back });
 }
 
 /** Tell why this browser cannot show the study, and tell the server. */
-export function showClosedGate(root: HTMLElement, t: Translate, link_token: string, closed: GateFinding, found: Abilities): void {
-  showNotice(root, { title: t("gate_title"), text: t(closed.reason, closed.values) });
+export function showClosedGate(
+  root: HTMLElement,
+  t: Translate,
+  link_token: string,
+  closed: GateFinding,
+  found: Abilities,
+  back: Back,
+): void {
+  showNotice(root, { title: t("gate_title"), text: t(closed.reason, closed.values), back });
   // Nothing waits for this: the participant reads the page, the experimenter the count.
   void request("POST", "/api/unsupported", { body: { link_token, reason: closed.reason, data: found } }).catch(() => {});
 }
@@ -91,6 +105,28 @@ export async function screenOutDevice(run_token: string, closed: GateFinding, fo
   // Asked twice, where the first answer was lost, the run is closed already.
   await call("POST", "/api/run/screen-out", { token: run_token, body }).catch((error: unknown) => {
     if (!(error instanceof Refused && error.code === "run_closed")) throw error;
+  });
+}
+
+/**
+ * Wait until the window has room for the clips, before anything has begun. True as soon as it has; false where the
+ * study screens devices and the participant has no other one.
+ */
+export function waitForRoom(root: HTMLElement, t: Translate, link: LinkState): Promise<boolean> {
+  return new Promise((resolve) => {
+    const look = (): void => {
+      const lack = lackOfRoom(link.gates, measures(link.gates));
+      if (lack) return draw(lack);
+      window.removeEventListener("resize", look);
+      resolve(true);
+    };
+    const draw = ({ reason, values }: GateFinding): void => {
+      const actions = [{ label: t("try_again"), press: look }];
+      if (link.screens_devices) actions.push({ label: t("no_device"), press: () => resolve(false) });
+      showNotice(root, { title: t("window_small_title"), text: t(reason, values), actions, back: wayBack(t, link) });
+    };
+    window.addEventListener("resize", look);
+    look();
   });
 }
 

@@ -42,7 +42,7 @@ function screenNode(session: Session, eyebrow: string): Node {
     conditional_function: () => needsScreenSetup(session),
   };
   const measure: Node = {
-    timeline: [trial(calibration(session), { eyebrow, changed: false })],
+    timeline: [trial(calibration(session), { eyebrow, occasion: "first" })],
     conditional_function: () => run.display.calibrate !== "off" && screen.calibration === null,
   };
   return stageNode(session, "calibration", { timeline: [setup, measure] });

@@ -4,7 +4,7 @@
  * `put` resolves when the item is kept. `receipt` resolves when the server has answered for good. Requests may
  * be repeated without harm, because the server stores each id once.
  */
-import { isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../request";
+import { BUSY, isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../request";
 import { backoff } from "./backoff";
 import { events, type Batch, nextBatch } from "./batch";
 import type { OutboxItem, OutboxStore } from "./store";
@@ -17,6 +17,8 @@ export interface Sent {
 export interface OutboxState {
   pending: number;
   failures: number;
+  /** The last try reached a server that was busy: the connection is good. */
+  busy: boolean;
 }
 type Send = (method: string, path: string, options: { token: string; body: unknown }) => Promise<Answer>;
 
@@ -36,6 +38,7 @@ export class Outbox {
   private readonly waiting = new Map<string, (outcome: Outcome) => void>();
   private sequence = 0;
   private failures = 0;
+  private busy = false;
   private running = false;
   private stopped = false;
   /** The disk is full or was taken away: what is put from now on lives in memory, and must be acknowledged. */
@@ -54,7 +57,7 @@ export class Outbox {
   }
 
   get state(): OutboxState {
-    return { pending: this.queue.filter((item) => item.kind === "write").length, failures: this.failures };
+    return { pending: this.queue.filter((item) => item.kind === "write").length, failures: this.failures, busy: this.busy };
   }
 
   /** Take up what an earlier visit left unsent, and begin to send. */
@@ -137,7 +140,7 @@ export class Outbox {
     try {
       const send = this.options.send ?? request;
       const answer = await send(batch.method, batch.path, { token: batch.token, body: batch.body });
-      if (isTemporary(answer.status)) return this.failed(answer.retry_after_s);
+      if (isTemporary(answer.status)) return this.failed(answer.retry_after_s, refusalOf(answer).code === BUSY);
       this.failures = 0;
       await this.settle(batch, answer);
       return 0;
@@ -147,8 +150,9 @@ export class Outbox {
     }
   }
 
-  private failed(retry_after_s: number | null): number {
+  private failed(retry_after_s: number | null, busy = false): number {
     this.failures += 1;
+    this.busy = busy;
     return Math.max(backoff(this.failures), (retry_after_s ?? 0) * 1000);
   }
 

@@ -12,12 +12,23 @@ type Fetch = (source: ClipSource, options: { signal?: AbortSignal }) => Promise<
 
 export class ClipCache {
   private readonly bytes = new Map<string, ArrayBuffer>();
+  private readonly without = new Set<string>();
   private readonly loading = new Map<string, Promise<void>>();
 
   constructor(private readonly fetchOne: Fetch = fetchClip) {}
 
   get(sha256: string): ArrayBuffer | undefined {
     return this.bytes.get(sha256);
+  }
+
+  /** True where none of these must be waited for. */
+  hasAll(sources: ClipSource[]): boolean {
+    return sources.every(({ clip_sha256 }) => this.bytes.has(clip_sha256) || this.without.has(clip_sha256));
+  }
+
+  /** Go on without a clip that cannot be had. */
+  giveUp(sha256: string): void {
+    this.without.add(sha256);
   }
 
   /** Fetch what is missing; resolves with the clips that could not be had, after all others are here. */

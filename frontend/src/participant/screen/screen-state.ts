@@ -24,7 +24,7 @@ export class ScreenState {
     if (!this.calibration) return null;
     const px_per_mm = zoomed(this.calibration.px_per_mm, this.calibration, now);
     const window_size = { window_width_px: window.innerWidth, window_height_px: window.innerHeight };
-    this.calibration = { ...this.calibration, ...now, ...window_size, px_per_mm };
+    this.calibration = { ...this.calibration, ...now, ...window_size, px_per_mm, occasion: "zoom", recheck_percent: null };
     return this.calibration;
   }
 

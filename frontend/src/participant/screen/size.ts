@@ -46,15 +46,25 @@ export function clipHeight(trial: TrialInfo, width: number): number {
   return trial.width_px && trial.height_px ? (width * trial.height_px) / trial.width_px : width / 2;
 }
 
-export function calibrationBody(
-  px_per_mm: number,
-  method: CalibrationState["method"],
-  viewing_distance_mm: number | null,
-): CalibrationState {
+/** What was measured of the screen itself. */
+export type Measured = Pick<CalibrationState, "px_per_mm" | "method" | "repeats" | "spread_percent" | "ruler_check">;
+/** Of the viewing distance. */
+export type Distance = Pick<CalibrationState, "viewing_distance_mm" | "distance_method" | "distance_spread_mm" | "distance_typed_mm">;
+
+export const NO_DISTANCE: Distance = {
+  viewing_distance_mm: null,
+  distance_method: null,
+  distance_spread_mm: null,
+  distance_typed_mm: null,
+};
+
+export function calibrationBody(measured: Measured, distance: Distance, occasion: CalibrationState["occasion"]): CalibrationState {
   return {
-    px_per_mm: Math.round(px_per_mm * 10_000) / 10_000,
-    method,
-    viewing_distance_mm: viewing_distance_mm === null ? null : Math.round(viewing_distance_mm),
+    ...measured,
+    ...distance,
+    occasion,
+    recheck_percent: null,
+    px_per_mm: Math.round(measured.px_per_mm * 10_000) / 10_000,
     ...screenShape(),
     window_width_px: window.innerWidth,
     window_height_px: window.innerHeight,
@@ -66,7 +76,11 @@ export function calibrationBody(
 /** CSS pixels per millimetre that screens have: 48 to 254 an inch, from a large television to a telephone. */
 const PLAUSIBLE_PX_PER_MM = [1.9, 10] as const;
 
+/** Widest screen that somebody rates at, and the same where it is twice as wide as high or more. */
+const WIDEST_MM = [1_000, 1_300] as const;
+
 /** False where a card or ruler cannot have been held against the screen: it would be a metre wide, or as small as a stamp. */
-export function isPlausible(px_per_mm: number): boolean {
-  return px_per_mm >= PLAUSIBLE_PX_PER_MM[0] && px_per_mm <= PLAUSIBLE_PX_PER_MM[1];
+export function isPlausible(px_per_mm: number, { screen_width_px: width, screen_height_px: height } = screenShape()): boolean {
+  const widest = WIDEST_MM[width >= 2 * height ? 1 : 0];
+  return px_per_mm >= PLAUSIBLE_PX_PER_MM[0] && px_per_mm <= PLAUSIBLE_PX_PER_MM[1] && width / px_per_mm <= widest;
 }

@@ -3,6 +3,7 @@ import { h, uniqueId } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { alertLine, button, showPage, statusLine } from "../../ui/page";
 import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
+import { wayBack } from "../flow/link";
 import { showNotice } from "./notice";
 import type { Session } from "../session";
 import { saveShown } from "./support";
@@ -57,5 +58,5 @@ async function decline(session: Session, status: HTMLElement): Promise<void> {
   const outcome = await saveShown(session, status, session.api.decline());
   if (!outcome.accepted) return;
   over.abort();
-  showNotice(root, { title: t("declined_title"), text: t("declined") });
+  showNotice(root, { title: t("declined_title"), text: t("declined"), back: wayBack(t, session.link) });
 }

@@ -9,6 +9,7 @@ import { backoff } from "../outbox/backoff";
 import { STRING, plugin, type PluginClass } from "../jspsych";
 import { leaveFullScreen } from "../screen/full-screen";
 import type { Session } from "../session";
+import { trouble } from "./support";
 
 interface Parameters {
   token: string;
@@ -45,7 +46,7 @@ async function complete(session: Session, display: HTMLElement, token: string): 
   showPage(display, { title: t("finishing_title"), body: [count] });
   const tell = setInterval(() => {
     const { pending, failures } = session.outbox.state;
-    count.textContent = (pending ? t("finishing_wait", { count: pending }) : "") + (failures > 1 ? ` ${t("saving_offline")}` : "");
+    count.textContent = (pending ? t("finishing_wait", { count: pending }) : "") + (failures > 1 ? ` ${trouble(session)}` : "");
   }, 500);
   await session.outbox.drained();
   const done = await completed(token);

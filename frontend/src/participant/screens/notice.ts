@@ -2,10 +2,14 @@
 import { h, type Child } from "../../ui/element";
 import { button, showPage } from "../../ui/page";
 
+/** Where the recruiter wants those who take no part, and what leads there. */
+export type Back = { label: string; href: string } | null;
+
 export interface Notice {
   title: string;
   text: string;
   more?: Child[];
+  back?: Back;
   actions?: { label: string; press: () => void }[];
 }
 
@@ -18,7 +22,13 @@ export function emptied(root: HTMLElement): HTMLElement {
 
 export function showNotice(root: HTMLElement, notice: Notice): HTMLElement {
   const display = emptied(root);
+  const { back } = notice;
+  const leads = back ? h("a", { class: "button quiet", href: back.href, rel: "noreferrer" }, back.label) : null;
   const buttons = (notice.actions ?? []).map(({ label, press }, place) => button(label, press, place ? "quiet" : "primary"));
-  showPage(display, { title: notice.title, body: [h("p", { role: "alert" }, notice.text), ...(notice.more ?? [])], actions: buttons });
+  showPage(display, {
+    title: notice.title,
+    body: [h("p", { role: "alert" }, notice.text), ...(notice.more ?? [])],
+    actions: [...buttons, leads],
+  });
   return display;
 }

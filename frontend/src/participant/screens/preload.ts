@@ -50,10 +50,12 @@ export function preloadPage(session: Session): PluginClass<Parameters> {
 async function waitForClips(session: Session, display: HTMLElement, eyebrow: string, sources: ClipSource[]): Promise<Data> {
   const started = performance.now();
   const result = (failed: number): Data => ({ clips: sources.length, failed, waited_ms: Math.round(performance.now() - started) });
-  if (sources.every((source) => session.clips.get(source.clip_sha256))) return result(0);
+  if (session.clips.hasAll(sources)) return result(0);
   for (;;) {
     const failed = await loadShown(session, display, eyebrow, sources);
-    if (failed.length === 0 || !(await askAgain(session, display, failed))) return result(failed.length);
+    if (failed.length > 0 && (await askAgain(session, display, failed))) continue;
+    failed.forEach(({ sha256 }) => session.clips.giveUp(sha256));
+    return result(failed.length);
   }
 }
 

@@ -3,6 +3,7 @@ import { h } from "../../ui/element";
 import { showPage } from "../../ui/page";
 import { BOOL, INT, plugin, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
+import { trouble } from "./support";
 
 interface Parameters {
   limit_ms: number;
@@ -20,7 +21,7 @@ export function settle(session: Session): PluginClass<Parameters> {
     async show(display, { limit_ms }) {
       const say = setTimeout(
         () => {
-          showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, session.t("saving_offline"))] });
+          showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, trouble(session))] });
         },
         SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8),
       );

@@ -1,6 +1,7 @@
 /** Pausing or withdrawing, asked for once more. */
 import { h } from "../../ui/element";
 import { button } from "../../ui/page";
+import { wayBack } from "../flow/link";
 import { showNotice } from "./notice";
 import { codeNote } from "./support";
 import type { Session } from "../session";
@@ -40,5 +41,6 @@ function end(session: Session, what: "paused" | "withdrawn"): void {
   const { t } = session;
   session.over.abort();
   const more = what === "paused" ? [h("p", {}, codeNote(session))] : [];
-  showNotice(session.root, { title: t(`${what}_title`), text: t(what), more });
+  const back = what === "withdrawn" ? wayBack(t, session.link) : null;
+  showNotice(session.root, { title: t(`${what}_title`), text: t(what), more, back });
 }

@@ -7,6 +7,7 @@ import type { Session } from "../session";
 
 const SLOW_MS = 400;
 const OFFLINE_MS = 4_000;
+const LOOK_MS = 500;
 
 /** A signal for listeners of one screen: ends with `done`, and with the whole visit. */
 export function screenSignal(session: Session): { signal: AbortSignal; done: () => void } {
@@ -38,15 +39,30 @@ export function choose<Value>(session: Session, footer: HTMLElement, choices: Ch
   });
 }
 
+/** What keeps answers from the server, in a word: it was not reached, or is busy; empty where it has answered or was not tried yet. */
+export function trouble({ outbox, t }: Pick<Session, "outbox" | "t">): string {
+  const { failures, busy } = outbox.state;
+  if (failures === 0 && navigator.onLine) return "";
+  return t(busy ? "saving_busy" : "saving_offline");
+}
+
 /** Wait for the server's answer to a write and say so in `status` where it takes long. */
 export async function saveShown(session: Session, status: HTMLElement, saving: Promise<Outcome>): Promise<Outcome> {
-  const slow = setTimeout(() => (status.textContent = session.t("saving")), SLOW_MS);
-  const offline = setTimeout(() => (status.textContent = session.t("saving_offline")), OFFLINE_MS);
+  const began = performance.now();
+  const tell = setInterval(() => {
+    const waited = performance.now() - began;
+    const why = waited > OFFLINE_MS ? trouble(session) : "";
+    if (waited > SLOW_MS) say(status, why || session.t("saving"));
+  }, LOOK_MS);
   const outcome = await saving;
-  clearTimeout(slow);
-  clearTimeout(offline);
+  clearInterval(tell);
   status.textContent = outcome.accepted ? "" : session.t("not_saved", { message: outcome.refused.message });
   return outcome;
+}
+
+/** Change a line only where it says something else: what is written again may be spoken again. */
+function say(line: HTMLElement, text: string): void {
+  if (line.textContent !== text) line.textContent = text;
 }
 
 /** Where the study screens devices: the choice of who has no larger window or screen. */

@@ -92,7 +92,7 @@ async function watchAndRate(session: Session, place: Stage, parameters: ClipRati
   if (next) void prepareClip(session, next, null).catch(() => {});
   const rated = await rating;
   const body = ratingBody(session, parameters, showings, rated);
-  if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
+  if (trial.kind === "practice") await procedureFeedback(session, place, { trial, play, showings, rt_ms: body.rt ?? 0 });
   return body;
 }
 
@@ -111,7 +111,7 @@ async function watch(
     const touch = matchMedia("(pointer: coarse)").matches;
     const first = t(touch ? "ready_touch" : "ready");
     const prompt = view > 1 ? t(touch ? "ready_again_touch" : "ready_again", { view, views }) : first;
-    const note = play > 1 ? t("ready_replay") : t(key, { number, total });
+    const note = play > 1 && trial.kind !== "practice" ? t("ready_replay") : t(key, { number, total });
     const key_at_ms = await waitForStart(session, place, prompt, note, pointer_delay_ms);
     const ledger = beginView(session, trial, play);
     const shown = showOnce(session, place, sha256, key_at_ms, start === "fixation" ? fixation_ms : 0, ledger.kept);

@@ -87,7 +87,7 @@ async function watchAndCompare(session: Session, display: HTMLElement, parameter
   const compared = await compare(session, place, layout.arrangement);
   const body = bodyOf(session, parameters, layout.arrangement, shown, compared);
   const showings = shown.map(({ showing }) => showing);
-  if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
+  if (trial.kind === "practice") await procedureFeedback(session, place, { trial, play, showings, rt_ms: body.rt ?? 0 });
   return body;
 }
 
@@ -113,7 +113,9 @@ function readyText({ t }: Session): string {
 }
 
 function note({ t }: Session, { play, trial, number, total }: ComparisonParameters): string {
-  return play > 1 ? t("pair_replay") : t(trial.kind === "practice" ? "practice_note" : "trial_of", { number, total });
+  return play > 1 && trial.kind !== "practice"
+    ? t("pair_replay")
+    : t(trial.kind === "practice" ? "practice_note" : "trial_of", { number, total });
 }
 
 async function compare(session: Session, place: Stage, arrangement: Arrangement): Promise<Compared> {

@@ -108,7 +108,7 @@ async function watchAndAnswer(session: Session, display: HTMLElement, parameters
   const answered = await askResponse(session, place.below, question);
   const body = bodyOf(session, parameters, shown, answered);
   const showings = shown.map(({ showing }) => showing);
-  if (trial.kind === "practice") await procedureFeedback(session, place, showings, body.rt ?? 0);
+  if (trial.kind === "practice") await procedureFeedback(session, place, { trial, play, showings, rt_ms: body.rt ?? 0 });
   return body;
 }
 
@@ -164,7 +164,7 @@ function readyText({ t }: Session, trial: TrialInfo): string {
 }
 
 function note({ t }: Session, { play, trial, number, total }: ThresholdParameters): string {
-  if (play > 1) return t(trial.clips.length > 1 ? "pair_replay" : "ready_replay");
+  if (play > 1 && trial.kind !== "practice") return t(trial.clips.length > 1 ? "pair_replay" : "ready_replay");
   return t(trial.kind === "practice" ? "practice_note" : "trial_of", { number, total });
 }
 

@@ -1,15 +1,18 @@
 /** A line of known pixels to be measured, or of known millimetres to be checked. */
 import type { Translate } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
+import { randomStart } from "./spread";
 
 const MEASURED_LINE_PX = 378;
 export const CHECK_LINE_MM = 100;
+const SHORTEST_SHARE = 0.6;
 const SHORTEST_MM = 20;
 const LONGEST_MM = 400;
 
-/** Length of the line to be measured: with its end marks inside the window, also on a phone. */
-export function measuredLinePx(): number {
-  return Math.min(MEASURED_LINE_PX, window.innerWidth - 80);
+/** Length of a line to be measured, another one each time: with its end marks inside the window, also on a phone. */
+export function measuredLinePx(last: number | null): number {
+  const longest = Math.min(MEASURED_LINE_PX, window.innerWidth - 80);
+  return Math.round(randomStart(SHORTEST_SHARE * longest, longest, last));
 }
 
 export function rulerLine(length_px: number): HTMLElement {

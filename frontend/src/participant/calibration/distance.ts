@@ -6,7 +6,8 @@ import { h, uniqueId } from "../../ui/element";
 import { isStartKey, listenKeys } from "../../ui/keys";
 import { button, showPage, statusLine } from "../../ui/page";
 import type { Session } from "../session";
-import { choose, screenSignal, stopButton } from "./support";
+import { deviation } from "./spread";
+import { choose, screenSignal, stopButton } from "../screens/support";
 
 const BLIND_SPOT_DEGREES = 13.5;
 const ROUNDS = 5;
@@ -23,8 +24,17 @@ export function distanceFrom(separation_px: number, px_per_mm: number): number {
   return separation_px / px_per_mm / Math.tan((BLIND_SPOT_DEGREES * Math.PI) / 180);
 }
 
-/** Distance from the eyes to the screen in mm: median of the rounds, or as typed in, where the window is too narrow at once. */
-export async function measureDistance(session: Session, display: HTMLElement, px_per_mm: number): Promise<number> {
+/** Distance from the eyes to the screen, in mm. */
+export interface Distance {
+  viewing_distance_mm: number;
+  distance_method: "blind_spot" | "typed";
+  /** Standard deviation of the rounds; null where it was typed in. */
+  distance_spread_mm: number | null;
+  distance_typed_mm: number | null;
+}
+
+/** The median of the rounds, or as typed in, where the window is too narrow at once. */
+export async function measureDistance(session: Session, display: HTMLElement, px_per_mm: number): Promise<Distance> {
   if (distanceFrom(window.innerWidth - SIDES_PX, px_per_mm) < NEEDED_MM) return typed(session, display);
   const found: number[] = [];
   for (let remark = ""; found.length < ROUNDS;) {
@@ -35,7 +45,9 @@ export async function measureDistance(session: Session, display: HTMLElement, px
     if (counts) found.push(distance);
     remark = counts ? "" : session.t("distance_missed");
   }
-  return found.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0;
+  const viewing_distance_mm = Math.round(found.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0);
+  const distance_spread_mm = Math.round(deviation(found) * 10) / 10;
+  return { viewing_distance_mm, distance_method: "blind_spot", distance_spread_mm, distance_typed_mm: null };
 }
 
 async function oneRound(
@@ -101,7 +113,7 @@ function moveDot(session: Session, dot: HTMLElement, field: HTMLElement, footer:
   });
 }
 
-async function typed(session: Session, display: HTMLElement): Promise<number> {
+async function typed(session: Session, display: HTMLElement): Promise<Distance> {
   const { t } = session;
   const id = uniqueId("distance");
   const fault = h("p", { class: "fault", id: `${id}-fault`, role: "alert" });
@@ -113,7 +125,11 @@ async function typed(session: Session, display: HTMLElement): Promise<number> {
     footer.replaceChildren();
     await choose(session, footer, [{ label: t("continue"), value: true }]);
     const distance_mm = Number(input.value.trim().replace(",", ".")) * 10;
-    if (distance_mm >= NEAREST_MM && distance_mm <= FURTHEST_MM) return distance_mm;
+    if (distance_mm >= NEAREST_MM && distance_mm <= FURTHEST_MM) return asTyped(Math.round(distance_mm));
     fault.textContent = t("distance_bad", { minimum: NEAREST_MM / 10, maximum: FURTHEST_MM / 10 });
   }
+}
+
+export function asTyped(distance_mm: number): Distance {
+  return { viewing_distance_mm: distance_mm, distance_method: "typed", distance_spread_mm: null, distance_typed_mm: distance_mm };
 }

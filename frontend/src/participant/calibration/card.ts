@@ -1,6 +1,7 @@
 /** A bank card drawn on the screen, to be made as large as a real one: gives CSS pixels per millimetre. */
 import type { Translate } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
+import { randomStart } from "./spread";
 import { button } from "../../ui/page";
 
 /** ISO/IEC 7810 ID-1. */
@@ -9,7 +10,10 @@ const CARD_HEIGHT_MM = 53.98;
 const SHAPE = CARD_HEIGHT_MM / CARD_WIDTH_MM;
 const SMALLEST_PX = 120;
 const LARGEST_PX = 1_600;
-const START_PX = (CARD_WIDTH_MM * 96) / 25.4;
+/** Shown lengths begin between these: a card on screens of 54 to 152 pixels an inch. */
+const START_PX = [180, 510] as const;
+/** What a screen of 96 pixels an inch needs. */
+export const USUAL_PX = (CARD_WIDTH_MM * 96) / 25.4;
 /** A narrower window (a phone) cannot hold a card lying down, so there it stands upright. */
 const UPRIGHT_BELOW_PX = 600;
 
@@ -20,11 +24,12 @@ export interface CardView {
   touched: () => boolean;
 }
 
-export function cardView(t: Translate, start_px_per_mm: number | null): CardView {
+/** The card of measurement `round`, in a size of its own: what an earlier one (`last`, px a mm) ended with is not shown again. */
+export function cardView(t: Translate, round: number, last: number | null): CardView {
   const upright = window.innerWidth < UPRIGHT_BELOW_PX;
   const largest = upright ? (window.innerWidth - 60) / SHAPE : Math.min(LARGEST_PX, window.innerWidth - 110);
   /** Of the long side. */
-  let length = start_px_per_mm ? start_px_per_mm * CARD_WIDTH_MM : START_PX;
+  let length = randomStart(START_PX[0], Math.min(START_PX[1], largest), last === null ? null : last * CARD_WIDTH_MM);
   let touched = false;
   const id = uniqueId("card");
   const slider = h("input", { type: "range", id, min: SMALLEST_PX, max: Math.round(largest), step: 1 });
@@ -59,7 +64,7 @@ export function cardView(t: Translate, start_px_per_mm: number | null): CardView
   );
   const element = h(
     "div",
-    { class: "card-area" },
+    { class: "card-area", "data-round": round },
     h("div", { class: "card-space" }, card),
     h("label", { for: id, class: "help" }, t("card_slider")),
     row,
