@@ -1755,6 +1755,8 @@ export interface components {
         /**
          * CalibrationResult
          * @description One size calibration; each is kept, the latest counts.
+         *
+         *     What has a default was not sent by the pages of before.
          */
         CalibrationResult: {
             /** Px Per Mm */
@@ -1781,6 +1783,45 @@ export interface components {
              * @default 1
              */
             zoom?: number;
+            /**
+             * Occasion
+             * @description Why it was made.
+             * @default first
+             * @enum {string}
+             */
+            occasion?: "first" | "screen_changed" | "zoom" | "recheck";
+            /**
+             * Repeats
+             * @description Measurements made, those included that differed too much.
+             */
+            repeats?: number | null;
+            /**
+             * Spread Percent
+             * @description Largest less smallest of those that count, of their mean.
+             */
+            spread_percent?: number | null;
+            /**
+             * Ruler Check
+             * @description What a ruler said of the card's size; null where none was asked.
+             */
+            ruler_check?: ("agrees" | "no_ruler" | "differs") | null;
+            /** Distance Method */
+            distance_method?: ("blind_spot" | "typed") | null;
+            /**
+             * Distance Spread Mm
+             * @description Standard deviation of the rounds of the blind-spot test.
+             */
+            distance_spread_mm?: number | null;
+            /**
+             * Distance Typed Mm
+             * @description The distance as it was typed in, where it was.
+             */
+            distance_typed_mm?: number | null;
+            /**
+             * Recheck Percent
+             * @description By how much a later measurement differed from the one before.
+             */
+            recheck_percent?: number | null;
         };
         /**
          * CalibrationState
@@ -1808,6 +1849,25 @@ export interface components {
             window_height_px: number;
             /** Zoom */
             zoom: number;
+            /**
+             * Occasion
+             * @enum {string}
+             */
+            occasion: "first" | "screen_changed" | "zoom" | "recheck";
+            /** Repeats */
+            repeats: number | null;
+            /** Spread Percent */
+            spread_percent: number | null;
+            /** Ruler Check */
+            ruler_check: ("agrees" | "no_ruler" | "differs") | null;
+            /** Distance Method */
+            distance_method: ("blind_spot" | "typed") | null;
+            /** Distance Spread Mm */
+            distance_spread_mm: number | null;
+            /** Distance Typed Mm */
+            distance_typed_mm: number | null;
+            /** Recheck Percent */
+            recheck_percent: number | null;
         };
         /**
          * CellPair
@@ -2313,6 +2373,20 @@ export interface components {
              * @enum {string}
              */
             calibrate: "required" | "optional" | "off";
+            /**
+             * Calibration Repeats
+             * @description How often the size is measured, each time from another one; what differs too much is measured up to
+             *     twice more. The spread of the repeats is `calibration_spread` in the data.
+             * @default 2
+             */
+            calibration_repeats: number;
+            /**
+             * Recheck Size
+             * @description Asks for one more measurement in each break; one that differs by more than 4% leads to a new
+             *     calibration.
+             * @default false
+             */
+            recheck_size: boolean;
             /**
              * Viewing Distance
              * @description Adds the blind-spot test, which estimates `viewing_distance_mm` from where a dot vanishes.
@@ -2833,6 +2907,8 @@ export interface components {
              * @default {
              *       "inter_ocular_mm": 60,
              *       "calibrate": "required",
+             *       "calibration_repeats": 2,
+             *       "recheck_size": false,
              *       "viewing_distance": false,
              *       "full_screen": true,
              *       "background": "#808080",
@@ -3471,6 +3547,11 @@ export interface components {
              * @description A closed gate ends the visit as screened out.
              */
             screens_devices: boolean;
+            /**
+             * Way Back
+             * @description The recruiter's address for who takes no part, its {address parameters} not filled in.
+             */
+            way_back: string | null;
             gates: components["schemas"]["Gates"];
         };
         /**
@@ -4758,6 +4839,11 @@ export interface components {
              * @default
              */
             redirect_url?: string;
+            /**
+             * Redirect Declined
+             * @default
+             */
+            redirect_declined?: string;
             /**
              * Redirect Screened Out
              * @default
@@ -6393,6 +6479,22 @@ export interface components {
              * Format: date-time
              */
             saved_at: string;
+            /** Occasion */
+            occasion: string;
+            /** Repeats */
+            repeats: number | null;
+            /** Spread Percent */
+            spread_percent: number | null;
+            /** Ruler Check */
+            ruler_check: string | null;
+            /** Distance Method */
+            distance_method: string | null;
+            /** Distance Spread Mm */
+            distance_spread_mm: number | null;
+            /** Distance Typed Mm */
+            distance_typed_mm: number | null;
+            /** Recheck Percent */
+            recheck_percent: number | null;
         };
         /**
          * TimelineEvent

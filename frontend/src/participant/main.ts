@@ -35,7 +35,6 @@ import { MemoryStore, type OutboxStore } from "./outbox/store";
 import { claimTab } from "./screen/one-tab";
 import { AnswersMissing, showCompletion } from "./screens/finish";
 import { emptied, showNotice } from "./screens/notice";
-import { openStopDialog } from "./screens/stop-dialog";
 import type { Session } from "./session";
 import { loadKind } from "./trials";
 import { saveInterrupted } from "./trials/save-rating";
@@ -254,7 +253,9 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
     end();
   });
   root.addEventListener("taken-over", end);
-  root.addEventListener("stop", () => openStopDialog(session));
+  // Asked for now, so that it is here when it is wanted, also without a connection.
+  const dialog = import("./screens/stop-dialog");
+  root.addEventListener("stop", () => void dialog.then(({ openStopDialog }) => openStopDialog(session)));
   watch(session);
   fetchFirst(session);
   void describeDevice(session, durable);

@@ -8,7 +8,6 @@ import { placed } from "../flow/placed";
 import { plugin, OBJECT, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 import { fieldView, type FieldView } from "./fields";
-import { simulatedAnswer, fillIn } from "./simulated-form";
 import { saveShown, stopButton } from "./support";
 
 interface Parameters {
@@ -29,13 +28,14 @@ export function formPage(session: Session): PluginClass<Parameters> {
     data: { answers: { type: OBJECT, description: "answers by field name, null where left open" } },
     show: (display, { form, eyebrow }) => new Promise((resolve) => showForm(session, display, form, eyebrow, resolve)),
     async simulate({ form }) {
+      const { simulatedAnswer } = await import("./simulated-form");
       const answers = Object.fromEntries(form.fields.map((field) => [field.name, simulatedAnswer(field)]));
       const outcome = await session.api.form(form.name, answers);
       if (outcome.accepted) placed(session.run, outcome.body);
       return { answers };
     },
-    act(display) {
-      fillIn(display);
+    async act(display) {
+      (await import("./simulated-form")).fillIn(display);
       display.querySelector<HTMLButtonElement>(".primary")?.click();
     },
   });
