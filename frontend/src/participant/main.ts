@@ -93,7 +93,8 @@ async function visit(entry: Entry): Promise<void> {
   if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], found);
   await passGates(root, t, list);
   const lack = returns ? null : lackOfRoom(link.gates, measures(link.gates));
-  if (lack && !(await waitForRoom(root, t, link))) return turnedAway(entry, identity, returns, lack, found);
+  if (lack && !(await (await import("./flow/room-page")).waitForRoom(root, t, link)))
+    return turnedAway(entry, identity, returns, lack, found);
   const tab = await oneTab(root, t, link_token);
   if (tab === "left") return;
   if (tab === "first" && !(await goesOn(entry, identity))) {

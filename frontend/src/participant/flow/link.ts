@@ -4,7 +4,7 @@ import { BUSY, call, NetworkError, Refused, isTemporary, request } from "../requ
 import type { MessageKey, Translate } from "../../i18n";
 import { backoff } from "../outbox/backoff";
 import { type Back, showNotice } from "../screens/notice";
-import { type Abilities, type GateFinding, lackOfRoom, measures } from "./gates";
+import type { Abilities, GateFinding } from "./gates";
 import { filledIn } from "./identity";
 import type { Kept } from "./kept-visit";
 import { withoutPractice } from "./placed";
@@ -105,28 +105,6 @@ export async function screenOutDevice(run_token: string, closed: GateFinding, fo
   // Asked twice, where the first answer was lost, the run is closed already.
   await call("POST", "/api/run/screen-out", { token: run_token, body }).catch((error: unknown) => {
     if (!(error instanceof Refused && error.code === "run_closed")) throw error;
-  });
-}
-
-/**
- * Wait until the window has room for the clips, before anything has begun. True as soon as it has; false where the
- * study screens devices and the participant has no other one.
- */
-export function waitForRoom(root: HTMLElement, t: Translate, link: LinkState): Promise<boolean> {
-  return new Promise((resolve) => {
-    const look = (): void => {
-      const lack = lackOfRoom(link.gates, measures(link.gates));
-      if (lack) return draw(lack);
-      window.removeEventListener("resize", look);
-      resolve(true);
-    };
-    const draw = ({ reason, values }: GateFinding): void => {
-      const actions = [{ label: t("try_again"), press: look }];
-      if (link.screens_devices) actions.push({ label: t("no_device"), press: () => resolve(false) });
-      showNotice(root, { title: t("window_small_title"), text: t(reason, values), actions, back: wayBack(t, link) });
-    };
-    window.addEventListener("resize", look);
-    look();
   });
 }
 
