@@ -9,18 +9,7 @@ import { ended } from "./flow/ended";
 import { abilities, type Abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
 import { type Kept, KeptVisit } from "./flow/kept-visit";
-import {
-  fetchRun,
-  passGates,
-  persistently,
-  reach,
-  screenOutDevice,
-  showClosedGate,
-  showRefusal,
-  startRun,
-  waitForRoom,
-  wayBack,
-} from "./flow/link";
+import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGate, showRefusal, startRun, wayBack } from "./flow/link";
 import { describeDevice, flush, openSession } from "./flow/open-session";
 import { asksForCode, type Claim } from "./flow/resume-code";
 import { serveOffline } from "./flow/serve-offline";
