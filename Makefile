@@ -51,6 +51,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@for size in 960x360 1920x720; do PYTHONPATH=. $(BIN)/python tests/bench/clip_memory.py $$size; done
 	@PYTHONPATH=. $(BIN)/python tests/bench/performance_memory.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_server.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_evidence.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_workers.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_labels.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_lid_events.py $(BLINK_SERIES)

@@ -13,9 +13,25 @@ MAX_CLIP_BYTES = 32 << 20
 """Digests of larger clips stay unchecked: a rating does not wait so long."""
 
 
-def clip_digest(ticket: str, clip: bytes) -> str:
-    """The digest that shows that `clip` was there when the ticket was used: 64 hexadecimal digits."""
-    return hmac.digest(ticket.encode(), clip, hashlib.sha256).hex()
+MAX_HASHES = 200_000
+
+
+def clip_hash(clip: bytes) -> bytes:
+    """SHA-512 of a clip: nothing tells it to who has not its bytes, and each clip needs it but once."""
+    return hashlib.sha512(clip).digest()
+
+
+def clip_digest(ticket: str, *hashes: bytes) -> str:
+    """The digest that shows that the clips of these hashes were there when the ticket was used.
+
+    64 hexadecimal digits of HMAC-SHA-256(ticket, SHA-512(first clip) || SHA-512(second clip) ...).
+    """
+    return hmac.digest(ticket.encode(), b"".join(hashes), hashlib.sha256).hex()
+
+
+def older_digest(ticket: str, clips: bytes) -> str:
+    """As pages make it that were open before: of the clips' bytes themselves, which takes longer."""
+    return hmac.digest(ticket.encode(), clips, hashlib.sha256).hex()
 
 
 class ClipBytes:
@@ -26,6 +42,7 @@ class ClipBytes:
         self._local = isinstance(store, FolderStore)
         self._kept: OrderedDict[str, bytes] = OrderedDict()
         self._bytes = 0
+        self._hashes: dict[str, bytes] = {}
         self._lock = Lock()
         self._fetching: set[str] = set()
         self._pool: ThreadPoolExecutor | None = None
@@ -39,6 +56,13 @@ class ClipBytes:
             return self._read(sha256, size)
         self._fetch(sha256, size)
         return None
+
+    def hash_at_once(self, sha256: str, size: int) -> bytes | None:
+        """The `clip_hash` of a clip where it can be had without waiting."""
+        known = self._hashes.get(sha256)
+        if known is None and self.at_once(sha256, size) is not None:
+            known = self._hashes.get(sha256)
+        return known
 
     def _in_memory(self, sha256: str) -> bytes | None:
         with self._lock:
@@ -58,7 +82,10 @@ class ClipBytes:
         return clip
 
     def _keep(self, sha256: str, clip: bytes) -> None:
+        hashed = clip_hash(clip)
         with self._lock:
+            if len(self._hashes) < MAX_HASHES:
+                self._hashes[sha256] = hashed
             if sha256 not in self._kept:
                 self._kept[sha256] = clip
                 self._bytes += len(clip)

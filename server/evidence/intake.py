@@ -9,8 +9,14 @@ from sqlalchemy import Connection
 
 from server.errors import ApiError
 from server.evidence import repository
-from server.evidence.clip_bytes import ClipBytes, clip_digest
-from server.evidence.refusals import ClipsOutlastTickets, DigestDiffers, DigestMissing, TicketMissing
+from server.evidence.clip_bytes import ClipBytes, clip_digest, older_digest
+from server.evidence.refusals import (
+    ClipsOutlastTickets,
+    DigestDiffers,
+    DigestMissing,
+    TicketExpired,
+    TicketMissing,
+)
 from server.evidence.schemas import RatingEvidence
 from server.evidence.tickets import Batch, check_ticket, evidence_key
 from server.rate_limit import RateLimit
@@ -77,7 +83,9 @@ class Intake:
             if enforced:
                 # Each run has a share of its own: who sends false answers hinders nobody else.
                 self._false_answers.hit(answer.run_id)
-                repository.note_refusal(connection, answer.run, refusal.code, answer.received_at)
+                # An outbox that was months away is no false answer: it is noted, and says nothing of the run.
+                event = repository.EXPIRED if isinstance(refusal, TicketExpired) else repository.REFUSED
+                repository.note_refusal(connection, answer.run, event, refusal.code, answer.received_at)
                 raise
             return
         repository.add(connection, _row(answer, batch, given, late=late, digest_right=right))
@@ -94,13 +102,18 @@ class Intake:
             return None
         if given.digest is None:
             raise DigestMissing("Expected a digest of the clip with its rating, got none; nothing is stored.")
-        clips = [self.clips.at_once(sha256, size) for sha256, size in answer.clips]
-        at_hand = [clip for clip in clips if clip is not None]
-        if len(at_hand) < len(clips):
+        hashes = [self.clips.hash_at_once(sha256, size) for sha256, size in answer.clips]
+        at_hand = [one for one in hashes if one is not None]
+        if len(at_hand) < len(hashes):
             return None
-        if clip_digest(given.ticket, b"".join(at_hand)) != given.digest:
+        if clip_digest(given.ticket, *at_hand) != given.digest and not self._is_older(answer, given):
             raise DigestDiffers("Expected the digest of this trial's clip, got another; nothing is stored.")
         return True
+
+    def _is_older(self, answer: Answer, given: RatingEvidence) -> bool:
+        """Whether the digest is right as a page makes it that was open before the last upgrade."""
+        clips = [self.clips.at_once(sha256, size) or b"" for sha256, size in answer.clips]
+        return older_digest(given.ticket, b"".join(clips)) == given.digest
 
 
 def _in_time(connection: Connection, answer: Answer, batch: Batch) -> bool:

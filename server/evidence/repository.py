@@ -11,6 +11,8 @@ from server.models import AnswerEvidence, AssignedTrial, Rating, RunEvent, Study
 
 REFUSED = "answer_refused"
 """The event of a run that had an answer refused."""
+EXPIRED = "answer_expired"
+"""The event of a run that had an answer refused for the age of its ticket alone."""
 
 _evidence = cast(Table, AnswerEvidence.__table__)
 _INSERT = insert(_evidence).inline()
@@ -44,10 +46,10 @@ def add(connection: Connection, values: dict[str, Any]) -> None:
     connection.execute(_INSERT, values)
 
 
-def note_refusal(connection: Connection, run: int, code: str, moment: datetime) -> None:
+def note_refusal(connection: Connection, run: int, event: str, code: str, moment: datetime) -> None:
     """Note that an answer was refused for this reason: once a run and reason, however many come."""
-    event_id = f"{REFUSED} {code}"[:40]
-    values = {"event_id": event_id, "study_run_id": run, "type": REFUSED, "received_at": moment}
+    event_id = f"{event} {code}"[:40]
+    values = {"event_id": event_id, "study_run_id": run, "type": event, "received_at": moment}
     insert_once(Session(connection), RunEvent, [values | {"data": {"code": code}}])
 
 

@@ -36,6 +36,6 @@ class RatingEvidence(BaseModel):
     ticket: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
     digest: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = Field(
         default=None,
-        description="HMAC-SHA-256 of the bytes of the trial's clips, joined, with the ticket as key.",
+        description="HMAC-SHA-256, with the ticket as key, of the SHA-512 of each clip of the trial, joined.",
     )
     interaction: Interaction | None = None

@@ -8,7 +8,7 @@ from typing import Any
 from experiments.trials.clip_rating.page import ShownClipRating
 from server.clock import now
 from server.context import SIMULATED_TIME
-from server.evidence.clip_bytes import clip_digest
+from server.evidence.clip_bytes import clip_digest, clip_hash
 from server.simulation.http import JsonClient, Refused
 from server.simulation.manners import Manner, person
 from server.simulation.person import Person, Rater
@@ -120,7 +120,7 @@ class Actor(Person):
         ticket = self.tickets["by_trial"][trial["trial_index"]][trial["plays_done"]]
         digest = None
         if trial["clip_sha256"] and self.manner.fetches:
-            digest = clip_digest(ticket, self._clip(trial))
+            digest = clip_digest(ticket, clip_hash(self._clip(trial)))
         interaction = self.manner.interaction(self.rng, self.who)
         return {
             "batch": self.tickets["batch"],

@@ -8,7 +8,7 @@ import pytest
 
 from server.clock import now
 from server.context import SIMULATED_TIME, Services, open_services
-from server.evidence.clip_bytes import clip_digest
+from server.evidence.clip_bytes import clip_digest, clip_hash
 from server.settings import Settings
 from tests.helpers.studies import Participant
 
@@ -55,7 +55,9 @@ class Watcher(Participant):
         """What the page sends with this rating; `changes` replace parts."""
         ticket = self.tickets["by_trial"][trial["trial_index"]][play - 1]
         digest = (
-            clip_digest(ticket, self.client.get(trial["clip_url"]).content) if trial["clip_url"] else None
+            clip_digest(ticket, clip_hash(self.client.get(trial["clip_url"]).content))
+            if trial["clip_url"]
+            else None
         )
         interaction = {"presses": 2, "trusted": 2, "press_ms": 90.0, "moves": 5}
         return {

@@ -4668,7 +4668,7 @@ export interface components {
             ticket: string;
             /**
              * Digest
-             * @description HMAC-SHA-256 of the bytes of the trial's clips, joined, with the ticket as key.
+             * @description HMAC-SHA-256, with the ticket as key, of the SHA-512 of each clip of the trial, joined.
              */
             digest?: string | null;
             interaction?: components["schemas"]["Interaction"] | null;

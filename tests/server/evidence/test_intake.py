@@ -10,7 +10,9 @@ from sqlalchemy import select, text
 
 from server.clock import now
 from server.context import Services
+from server.evidence.clip_bytes import older_digest
 from server.evidence.intake import FALSE_ANSWERS_PER_MINUTE
+from server.evidence.repository import has_refusals
 from server.evidence.service import judge_run
 from server.models import AnswerEvidence, RunEvent, StudyRun
 from tests.helpers.evidence import Watcher
@@ -149,6 +151,14 @@ def test_a_digest_of_another_clip_or_none_is_refused(watcher: Watcher) -> None:
     assert watcher.answer(first).status_code == 201
 
 
+def test_a_page_from_before_an_upgrade_is_taken_with_the_digest_of_the_bytes(watcher: Watcher) -> None:
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(SHOWN_S)
+    given = watcher.evidence(trial)
+    given["digest"] = older_digest(given["ticket"], watcher.client.get(trial["clip_url"]).content)
+    assert watcher.answer(trial, given).status_code == 201
+
+
 def test_tickets_of_another_run_and_tampered_ones_are_refused(
     watcher: Watcher, client: TestClient, study: StudyInDatabase
 ) -> None:
@@ -214,3 +224,31 @@ def test_views_told_of_at_once_are_no_time_to_watch_them(watcher: Watcher) -> No
     watcher.state()
     watcher.wait(0.1)
     assert [watcher.answer(trial).status_code for trial in trials].count(201) == 1
+
+
+def test_an_expired_ticket_is_refused_and_costs_the_run_nothing(watcher: Watcher, services: Services) -> None:
+    """An outbox that was away for months: its answers are not taken, and nobody is doubted for them."""
+    first, *others = watcher.state()["trials"]
+    old = watcher.evidence(first)
+    watcher.wait(61 * 86_400)
+    assert [code(watcher.answer(first, old)) for _ in range(3)] == ["409 ticket_expired"] * 3
+    watcher.state()
+    for trial in others:
+        watcher.wait(SHOWN_S)
+        assert watcher.answer(trial).status_code == 201
+    with services.database.read() as session:
+        kinds = select(RunEvent.type).where(RunEvent.type.startswith("answer_"))
+        assert session.scalars(kinds).all() == ["answer_expired"]
+        [run] = session.scalars(select(StudyRun))
+        assert not has_refusals(session, run)
+
+
+def test_a_replayed_ticket_brings_no_second_answer(watcher: Watcher, services: Services) -> None:
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(10 * SHOWN_S)
+    given = watcher.evidence(trial)
+    assert watcher.answer(trial, given).status_code == 201
+    assert code(watcher.answer(trial, given, response=2)) == "409 rating_differs"
+    again = watcher.answer(trial, given | {"digest": None}, play=2)
+    assert code(again) == "422 ticket_of_another_trial"
+    assert len(rows(services)) == 1

@@ -13,13 +13,13 @@ export async function evidenceFor(session: Session, trial: TrialInfo, play: numb
   return { batch: tickets.batch, ticket, digest: clips ? await clipDigest(ticket, clips) : null, interaction };
 }
 
-/** The bytes of every clip of a trial, one after the other in the order of their places; null where one is not here. */
-function bytesOf(session: Session, trial: TrialInfo): Blob | null {
+/** The bytes of every clip of a trial, in the order of their places; null where one is not here. */
+function bytesOf(session: Session, trial: TrialInfo): ArrayBuffer[] | null {
   const parts: ArrayBuffer[] = [];
   for (const { clip_sha256 } of trial.clips) {
     const bytes = session.clips.get(clip_sha256);
     if (!bytes) return null;
     parts.push(bytes);
   }
-  return parts.length ? new Blob(parts) : null;
+  return parts.length ? parts : null;
 }

@@ -1,0 +1,102 @@
+"""CPU of the server for a rating with evidence, over one without, in the same run of the same server.
+
+    python tests/bench/bench_evidence.py [rounds, default 6]
+
+A real server on SQLite with clips as large as those of Experiment 3; in each round one simulated person
+rates with ticket, digest and presses, and one without any. Prints CPU a rating of both and the ratio of the
+medians.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+import uuid
+from pathlib import Path
+
+import psutil
+
+from server.cli_common import migrated_services
+from server.evidence.clip_bytes import clip_digest, clip_hash
+from server.simulation.http import JsonClient
+from server.simulation.person import Person, Rater
+from tests.browser.server_process import ServerProcess
+from tests.helpers.studies import SHORT, add_study
+
+STUDY = SHORT.replace("per_cell = 2", "per_cell = 20")
+CLIP_BYTES = 250_000
+INTERACTION = {"presses": 2, "trusted": 2, "press_ms": 90.0, "moves": 12}
+
+
+def main(rounds: int) -> None:
+    """Print one table."""
+    with tempfile.TemporaryDirectory() as folder:
+        process = ServerProcess(Path(folder) / "data", evidence="record", run_starts_per_minute="100000")
+        with migrated_services(process.settings) as services:
+            study = add_study(services, Path(folder) / "clips", STUDY, frames=1, clip_bytes=CLIP_BYTES)
+            token = study.link(synthetic=True)
+        process.start()
+        try:
+            used: dict[bool, list[float]] = {True: [], False: []}
+            clips: dict[str, bytes] = {}
+            for number in range(rounds + 1):
+                for evidence in (True, False) if number % 2 else (False, True):
+                    spent = rated(process, token, number, clips, evidence=evidence)
+                    if number:  # the first round fills caches
+                        used[evidence].append(spent)
+        finally:
+            process.stop()
+    middle = {evidence: statistics.median(spent) for evidence, spent in used.items()}
+    for evidence, name in ((False, "without evidence"), (True, "with evidence")):
+        sys.stdout.write(f"{'CPU of the server a rating, ' + name:<58} {middle[evidence] * 1000:>13.3f} ms\n")
+    ratio = middle[True] / middle[False]
+    sys.stdout.write(f"{'with evidence over without':<58} {ratio:>16.3f} {'< 1.15':>12}\n")
+
+
+def rated(
+    process: ServerProcess, token: str, number: int, clips: dict[str, bytes], *, evidence: bool
+) -> float:
+    """CPU seconds of the server a rating, of one person who rates everything."""
+    client = JsonClient(process.address)
+    person = Person(client, Rater(2 * number + evidence, 1, {}))
+    person.brings_evidence = evidence
+    person.begin(token)
+    client.put("/api/run/consent", {"agreed": True})
+    state = client.get("/api/run")
+    assert (state["tickets"] is not None) == evidence
+    bodies = [person.rating(trial, state["trial"]) for trial in state["trials"]]
+    if evidence:
+        for trial, body in zip(state["trials"], bodies, strict=True):
+            body["evidence"] = brought(client, trial, state["tickets"], clips)
+    # Else answers would be refused, and what is measured would not be what happens to people.
+    time.sleep(sum(trial["frames"] / trial["fps"] for trial in state["trials"] if trial["frames"]))
+    before = cpu(process)
+    for body in bodies:
+        client.put(f"/api/run/ratings/{uuid.uuid4()}", body)
+    spent = cpu(process) - before
+    client.close()
+    return spent / len(bodies)
+
+
+def brought(
+    client: JsonClient, trial: dict[str, object], tickets: dict[str, object], clips: dict[str, bytes]
+) -> dict[str, object]:
+    """What the page sends with a rating."""
+    ticket = tickets["by_trial"][trial["trial_index"]][0]  # type: ignore[index]
+    sha256 = str(trial["clip_sha256"]) if trial["clip_sha256"] else ""
+    if sha256 and sha256 not in clips:
+        clips[sha256] = client.fetch(str(trial["clip_url"]))
+    digest = clip_digest(ticket, clip_hash(clips[sha256])) if sha256 else None
+    return {"batch": tickets["batch"], "ticket": ticket, "digest": digest, "interaction": INTERACTION}
+
+
+def cpu(process: ServerProcess) -> float:
+    """CPU seconds of the server so far, with those of its own processes."""
+    assert process.process is not None
+    parent = psutil.Process(process.process.pid)
+    every = [parent, *parent.children(recursive=True)]
+    return sum(sum(one.cpu_times()[:2]) for one in every)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 6)
