@@ -28,6 +28,7 @@ def _gather() -> None:
     from server.export import cli as export
     from server.methods import cli as methods
     from server.operations import cli as operations
+    from server.seals import cli as seals
     from server.simulation import cli as simulation
     from server.studies import cli as studies
 
@@ -37,6 +38,7 @@ def _gather() -> None:
         studies,
         export,
         capsules,
+        seals,
         methods,
         simulation,
         accounts,

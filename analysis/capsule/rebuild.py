@@ -7,11 +7,12 @@ from analysis.plans.prepare import study_contents
 from analysis.read.pool import Origin, Pool
 from analysis.read.runs_file import read_runs
 from analysis.read.study_answers import load_csv
-from analysis.report.contents import Progress
+from analysis.report.contents import Progress, held_against
 from analysis.report.write import write_report
 from experiments.capsule.declaration import ReportSource
 from experiments.capsule.packing import report_input
 from experiments.load import load_experiment
+from experiments.seal import read_seal
 
 ANSWERS = "answers.csv"
 """Name of the table while it is analysed, which stands in the report."""
@@ -31,5 +32,7 @@ def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress =
     runs = read_runs(folder / source.runs)
     answers = load_csv(table, experiment, plan_of(experiment.trial.kind).reading)
     contents = study_contents(experiment, answers, Pool(Origin(source.origin), source.series), runs)
+    if source.seal is not None:
+        contents = held_against(contents, read_seal(folder / source.seal), experiment)
     write_report(contents, report, more=source.sensitivity, progress=progress)
     return report

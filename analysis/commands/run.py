@@ -78,6 +78,10 @@ def run(
         bool, typer.Option(help="Add what takes long to the report: mixed and ordinal models, Bayes factors.")
     ] = True,
     verify_with_r: VerifyOption = False,
+    seal: Annotated[
+        Path | None,
+        typer.Option(help="Sealed plan (`server seal`): the report lists each deviation from it."),
+    ] = None,
 ) -> None:
     """Analyse a study as its experiment declares: exclusions, the paper's table, every test, one report.
 
@@ -93,7 +97,7 @@ def run(
 
       analysis run sliders-demo --scale eeriness
 
-      analysis run exp3 --csv ratings.csv --runs runs.csv
+      analysis run exp3 --csv ratings.csv --runs runs.csv --seal exp3-seal.json
     """
     from analysis.errors import NoRatingsError
     from analysis.plans.plan import plan_of
@@ -103,7 +107,9 @@ def run(
     from analysis.read.pool import Pool
     from analysis.read.runs_file import read_runs
     from analysis.read.study_answers import load_csv, load_database
+    from analysis.report.contents import held_against
     from experiments.load import load_experiment
+    from experiments.seal import read_seal
 
     if database is not None and csv is not None:
         raise InputError("--database and --csv exclude each other; give one")
@@ -128,6 +134,8 @@ def run(
     except NoRatingsError as error:
         typer.echo(f"nothing to analyse: {error}", err=True)
         raise typer.Exit(1) from None
+    if seal is not None:
+        contents = held_against(contents, read_seal(seal), declared)
     show(contents)
     save_json(json, contents.numbers)
     if report:

@@ -3,9 +3,13 @@
 from base64 import b64encode
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analysis.report.formats import Table
+from experiments.seal import Seal, deviations_said
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
 
 Progress = Callable[[str], None]
 
@@ -103,3 +107,10 @@ class Contents:
     numbers: dict[str, Any] = field(repr=False)
     given: str = "answers"
     evidence: Section | None = None
+
+
+def held_against(contents: Contents, seal: Seal, experiment: "Experiment") -> Contents:
+    """The contents with a line for each deviation from the sealed plan, or one that there is none."""
+    said = deviations_said(seal, experiment, contents.n_participants)
+    numbers = {**contents.numbers, "sealed_plan": {"sha256": seal.sha256, "said": list(said)}}
+    return replace(contents, decisions=(*said, *contents.decisions), numbers=numbers)

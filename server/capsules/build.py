@@ -23,12 +23,15 @@ from server.export.psych_ds import Folder, dataset_folder
 from server.methods.service import methods_of, read_results, write_beside
 from server.models import Study, StudyVersion
 from server.reports.process import run_analysis
+from server.seals.page import page as seal_page
+from server.seals.service import seal_of
 from server.storage.clips import ClipStore
 from server.studies.lookup import active_version, definition_of, find_study
 
 CapsuleOrigin = Literal["participant", "pilot", "simulated"]
 Progress = Callable[[float, str], None]
 ANSWERS = "answers.csv"
+SEAL = "materials/sealed-plan.json"
 
 
 @dataclass(frozen=True)
@@ -88,12 +91,14 @@ def _write_study(
         with (folder / path).open("wb") as stream:
             for piece in pieces:
                 stream.write(piece)
-    experiment = definition_of(version)
+    experiment, seal = definition_of(version), seal_of(session, study)
     texts = {
         "materials/manifest.json": json_text(version.manifest),
         "analysis/plan.json": json_text(_plan(experiment)),
         "documentation/software.json": json_text(present_software().model_dump(mode="json")),
     }
+    if seal is not None:
+        texts |= {SEAL: seal.text(), SEAL.replace(".json", ".html"): seal_page(seal)}
     for path, text in texts.items():
         (folder / path).write_text(text, encoding="utf-8")
     return ReportSource(
@@ -104,6 +109,7 @@ def _write_study(
         series=version.series,
         sensitivity=wanted.sensitivity,
         renamed=exported.renamed,
+        seal=SEAL if seal else None,
         rebuilt=(),
     )
 

@@ -21,11 +21,13 @@ from server.methods.service import methods_of, read_results, write
 from server.models import Job, Study
 from server.reports.process import LONGEST_S, run_analysis
 from server.reports.schemas import NewReport, ReportOut
+from server.seals.service import seal_of
 from server.studies.lookup import find_study
 from server.studies.series import version_of_series
 from server.tokens import new_public_id
 
 KIND = "report"
+SEAL = "sealed-plan.json"
 _one_at_a_time = threading.Lock()
 
 
@@ -137,6 +139,8 @@ def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> i
             stream.writelines(csv_pieces(rating_table(session, study, wanted.origin)))
         with (inputs / "runs.csv").open("wb") as stream:
             stream.writelines(runs_csv(session, study, wanted.origin))
+        if (seal := seal_of(session, study)) and version.number == study.active_version:
+            (inputs / SEAL).write_text(seal.text(), encoding="utf-8")
         return version.series
 
 
@@ -150,6 +154,7 @@ def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
         series=series,
         sensitivity=wanted.sensitivity,
         runs=inputs / "runs.csv",
+        seal=seal if (seal := inputs / SEAL).is_file() else None,
     )
 
 

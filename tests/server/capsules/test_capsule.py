@@ -21,7 +21,9 @@ from experiments.load import FOLDER
 from server.app import create_app
 from server.capsules.build import Wanted, build_capsule
 from server.context import Services, open_services
+from server.seals.service import seal_plan
 from server.settings import Settings
+from server.studies.lookup import find_study
 from tests.helpers.studies import Participant, add_study
 from tests.server.export.test_psych_ds import VALIDATOR
 
@@ -46,6 +48,8 @@ def opened(tmp_path_factory: pytest.TempPathFactory, sqlite_template: Path) -> I
     services = open_services(Settings(data_folder=folder, database_url=address, secret_key="test key"))
     text = (FOLDER / "exp3.toml").read_text(encoding="utf-8") + CREDIT
     study = add_study(services, folder / "clips", text)
+    with services.database.write() as session:
+        seal_plan(session, find_study(session, "exp3"), None, None)
     app = create_app(services.settings)
     app.state.services = services
     with TestClient(app) as client:
@@ -103,7 +107,8 @@ def test_it_holds_what_the_study_is_made_of(unpacked: Path) -> None:
     present = {str(path.relative_to(unpacked)) for path in unpacked.rglob("*") if path.is_file()}
     assert {
         "README.md", "dataset_description.json", "ro-crate-metadata.json", CAPSULE_FILE,
-        "materials/exp3.toml", "materials/manifest.json", "documentation/codebook.md",
+        "materials/exp3.toml", "materials/manifest.json", "materials/sealed-plan.json",
+        "materials/sealed-plan.html", "documentation/codebook.md",
         "documentation/software.json", "analysis/plan.json", "analysis/analysis.R", "analysis/analysis.py",
         "results/report.html", "results/tables.tex", "results/results.json", "results/methods.txt",
     } <= present  # fmt: skip
@@ -111,6 +116,7 @@ def test_it_holds_what_the_study_is_made_of(unpacked: Path) -> None:
     assert {f"materials/clips/{clip['file']}" for clip in manifest["clips"]} <= present
     numbers = json.loads((unpacked / "results/results.json").read_text(encoding="utf-8"))
     assert numbers["n_participants"] == RUNS
+    assert any("deviation from the plan sealed" in line for line in numbers["sealed_plan"]["said"])
     versions = json.loads((unpacked / "documentation/software.json").read_text(encoding="utf-8"))
     assert {"numpy", "matplotlib", "palpebra", "scipy"} <= set(versions["packages"])
 

@@ -1,0 +1,98 @@
+"""A sealed plan: design, exclusions, analysis and power as they were fixed before the first participant.
+
+Whoever holds the file can show by its hash that nothing in it was changed, and a report held against it lists
+what was done otherwise.
+"""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from experiments.base import Declaration
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.manifest import Sha256
+from experiments.schema.difference import difference
+from experiments.schema.stored import load_stored
+
+OF_PAGES = ("texts", "title", "participant_title", "languages", "source", "dataset", "version")
+"""Keys whose change is no deviation from a plan: what pages say, and what the data say of themselves."""
+
+
+class Seal(Declaration):
+    """The sealed file."""
+
+    format: Literal[1] = 1
+    """Of this file."""
+    study: str
+    """Name of the study."""
+    version: int
+    """Version of the study that was sealed."""
+    sealed_at: str
+    """When (UTC, ISO 8601), by the server's clock."""
+    definition: dict[str, Any]
+    """The whole declaration: design, scales, exclusions, analysis plan, number of participants."""
+    definition_format: int
+    """Format of that declaration."""
+    definition_sha256: Sha256
+    """Hash of that declaration, as stands with every answer."""
+    clips_sha256: Sha256
+    """Hash over the clips' own hashes, in order of cells and exemplars."""
+    power: dict[str, Any] | None = None
+    """What `analysis power --json` found before; none where no power was reckoned."""
+
+    @property
+    def sha256(self) -> str:
+        """Hash over everything in the file."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, ensure_ascii=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def experiment(self) -> Experiment:
+        """What was declared."""
+        return load_stored(self.definition, self.definition_format)
+
+    def text(self) -> str:
+        """The file, its own hash in it."""
+        return (
+            json.dumps(self.model_dump(mode="json") | {"sha256": self.sha256}, indent=1, ensure_ascii=False)
+            + "\n"
+        )
+
+
+def read_seal(path: Path) -> Seal:
+    """Read a sealed plan; InputError where there is none, or something in it was changed."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        own = data.pop("sha256", None)
+        seal = Seal.model_validate(data)
+    except OSError as error:
+        raise InputError(f"{path}: expected a sealed plan (JSON), found none ({error.strerror})") from error
+    except (ValidationError, ValueError, AttributeError, RecursionError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(
+            f"{path.name}: expected a sealed plan as `server seal` writes it ({reason})"
+        ) from error
+    if own != seal.sha256:
+        raise InputError(f"{path.name}: the seal is broken: its content has another hash than it says")
+    return seal
+
+
+def deviations(seal: Seal, experiment: Experiment, participants: int) -> list[str]:
+    """What was declared or done otherwise than sealed, a line each; `participants` are those analysed."""
+    changes = difference(seal.experiment, experiment)
+    lines = [str(change) for change in changes if change.path.split(".")[0] not in OF_PAGES]
+    planned = seal.experiment.participants
+    if participants != planned:
+        lines.append(f"{planned} participants were planned, {participants} are analysed")
+    return lines
+
+
+def deviations_said(seal: Seal, experiment: Experiment, participants: int) -> tuple[str, ...]:
+    """The lines of a report on the plan it is held against."""
+    plan = f"the plan sealed {seal.sealed_at} (sha256 {seal.sha256[:12]}...)"
+    found = deviations(seal, experiment, participants)
+    return tuple(f"deviation from {plan}: {line}" for line in found) or (f"no deviation from {plan}",)

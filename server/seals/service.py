@@ -1,0 +1,54 @@
+"""Seal the plan of a study, once, before the first participant; the audit log keeps it."""
+
+import hashlib
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.manifest import Manifest
+from experiments.schema.canonical import definition_sha256
+from experiments.seal import Seal
+from server.accounts.audit import record
+from server.accounts.identity import Identity
+from server.clock import iso, now
+from server.errors import Conflict
+from server.models import Study
+from server.seals.repository import people_of_series, sealed_document
+from server.studies.lookup import active_version, definition_of
+
+ACTION = "plan sealed"
+
+
+def seal_of(session: Session, study: Study) -> Seal | None:
+    """The sealed plan of the active version's data series; None where it was not sealed."""
+    document = sealed_document(session, study.name, active_version(session, study).series, ACTION)
+    return Seal.model_validate(document) if document else None
+
+
+def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[str, Any] | None) -> Seal:
+    """Seal the active version; Conflict where its series is sealed, or people have taken part already."""
+    version = active_version(session, study)
+    if sealed := seal_of(session, study):
+        raise Conflict(f"The plan was sealed {sealed.sealed_at} already; a seal is never replaced.")
+    if people := people_of_series(session, study, version.series):
+        raise Conflict(
+            f"{people} participants have begun already: a plan is sealed before the first. "
+            "A report without a seal says nothing of deviations."
+        )
+    experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
+    clips = sorted((clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips)
+    seal = Seal(
+        study=study.name,
+        version=version.number,
+        sealed_at=iso(now()),
+        definition=version.definition,
+        definition_format=version.format,
+        definition_sha256=definition_sha256(experiment),
+        clips_sha256=hashlib.sha256("\n".join(map(str, clips)).encode()).hexdigest(),
+        power=power,
+    )
+    record(
+        session, who, ACTION, "study", study.name,
+        sha256=seal.sha256, series=version.series, seal=seal.model_dump(mode="json"),
+    )  # fmt: skip
+    return seal

@@ -1,0 +1,95 @@
+import json
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from analysis.cli import app as analysis
+from experiments.errors import InputError
+from experiments.load import load_experiment, parse_experiment
+from experiments.seal import deviations, read_seal
+from server.context import Services
+from server.errors import Conflict
+from server.seals.page import page
+from server.seals.service import seal_of, seal_plan
+from server.studies.lookup import find_study
+from tests.analysis.ratings_file import rows_of, simulate, write_export
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+
+POWER = {"effects": {"speed": 0.91}}
+
+
+def test_a_plan_is_sealed_once_before_the_first_participant(
+    services: Services, study: StudyInDatabase, client: TestClient
+) -> None:
+    with services.database.write() as session:
+        sealed = seal_plan(session, find_study(session, "short"), None, POWER)
+    assert sealed.power == POWER
+    assert sealed.experiment == study.experiment
+    with services.database.write() as session:
+        assert seal_of(session, find_study(session, "short")) == sealed
+        with pytest.raises(Conflict, match="a seal is never replaced"):
+            seal_plan(session, find_study(session, "short"), None, None)
+
+
+def test_after_the_first_participant_nothing_is_sealed(services: Services, participant: Participant) -> None:
+    participant.agree()
+    with services.database.write() as session, pytest.raises(Conflict, match="1 participants have begun"):
+        seal_plan(session, find_study(session, "short"), None, None)
+
+
+def test_what_differs_from_the_plan_is_named(services: Services, tmp_path: Path) -> None:
+    add_study(services, tmp_path / "clips")
+    with services.database.write() as session:
+        sealed = seal_plan(session, find_study(session, "short"), None, None)
+    later = SHORT.replace('rule = "attention_checks_failed"', 'rule = "incomplete"').replace(
+        'consent = "Do you agree?"', 'consent = "Do you still agree?"'
+    )
+    found = deviations(sealed, parse_experiment(later), participants=20)
+    assert len(found) == 1
+    assert "exclusions" in found[0]
+    assert deviations(sealed, parse_experiment(SHORT), 20) == []
+    assert deviations(sealed, parse_experiment(SHORT), 12) == [
+        "20 participants were planned, 12 are analysed"
+    ]
+    shown = page(sealed)
+    assert sealed.sha256 in shown
+    assert "attention_checks_failed" in shown
+    assert "<script" not in shown
+
+
+@pytest.fixture
+def sealed_exp3(services: Services, tmp_path: Path) -> Path:
+    add_study(services, tmp_path / "clips", load_text("exp3"))
+    with services.database.write() as session:
+        sealed = seal_plan(session, find_study(session, "exp3"), None, None)
+    (tmp_path / "seal.json").write_text(sealed.text(), encoding="utf-8")
+    return tmp_path / "seal.json"
+
+
+def load_text(name: str) -> str:
+    from experiments.load import locate
+
+    return locate(name).read_text(encoding="utf-8")
+
+
+def test_a_report_lists_each_deviation_from_the_seal(sealed_exp3: Path, tmp_path: Path) -> None:
+    experiment = load_experiment("exp3")
+    table = write_export(tmp_path / "r.csv", experiment, rows_of(experiment, simulate(experiment, 8)))
+    arguments = ["run", "exp3", "--csv", str(table), "--seal", str(sealed_exp3), "--no-sensitivity"]
+    result = CliRunner().invoke(analysis, [*arguments, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "deviation from the plan sealed" in report
+    assert f"{experiment.participants} participants were planned, 8 are analysed" in report
+
+
+def test_a_broken_seal_is_refused(sealed_exp3: Path) -> None:
+    text = sealed_exp3.read_text(encoding="utf-8")
+    sealed_exp3.write_text(text.replace('"version": 1', '"version": 2', 1), encoding="utf-8")
+    with pytest.raises(InputError, match=r"seal.json: the seal is broken"):
+        read_seal(sealed_exp3)
+    sealed_exp3.write_text(json.dumps({"study": "x"}))
+    with pytest.raises(InputError, match="expected a sealed plan"):
+        read_seal(sealed_exp3)
