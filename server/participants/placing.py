@@ -12,7 +12,7 @@ from experiments.definition import Experiment
 from experiments.trials import KINDS
 from server.models import StudyRun
 from server.participants import repository
-from server.participants.comparisons import compared
+from server.participants.comparisons_repository import compared
 from server.trials.series import service as series
 from server.versions import LoadedVersion
 

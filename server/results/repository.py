@@ -1,11 +1,12 @@
 """What the results page reads: the runs of a pool, and what their results depend on."""
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Select, and_, case, func, select
 from sqlalchemy.orm import Session
 
-from server.models import Rating, SeriesAnswer, SeriesTrial, Study, StudyRun, StudyVersion
+from server.models import Rating, SeriesAnswer, SeriesTrial, Study, StudyRun, StudyVersion, VersionClip
 from server.results.cache import Revision
 
 
@@ -30,6 +31,18 @@ class Pool(NamedTuple):
         return select(StudyVersion.id).where(
             StudyVersion.study_id == self.study_id, StudyVersion.series == self.series
         )
+
+
+def cells_of(session: Session, of: Pool) -> dict[int, str]:
+    """The cell of every clip of the pool's versions."""
+    query = select(VersionClip.id, VersionClip.cell).where(VersionClip.version_id.in_(of.versions()))
+    return dict(session.execute(query).all())
+
+
+def clips_of(session: Session, version: StudyVersion, answered: Iterable[int]) -> list[VersionClip]:
+    """The clips of a version, and those of older versions with these ids."""
+    mine = VersionClip.version_id == version.id
+    return list(session.scalars(select(VersionClip).where(mine | VersionClip.id.in_(set(answered)))))
 
 
 class StimulusCount(NamedTuple):

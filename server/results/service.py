@@ -5,14 +5,13 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from itertools import combinations
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from experiments.trials.scales import RatedScale, scale_called, scales_of
 from server.clock import now
-from server.models import Study, StudyVersion, VersionClip
+from server.models import Study, StudyVersion
 from server.results import summary
-from server.results.repository import Pool
+from server.results.repository import Pool, clips_of
 from server.results.schemas import (
     CellResult,
     ClipResult,
@@ -111,11 +110,7 @@ def _clips(
         if bins[0] <= response <= highest:
             counts[clip][bisect_right(bins, response + ROUNDING) - 1] += number
             sums[clip] += response * number
-    query = select(VersionClip).where(VersionClip.version_id == version.id)
-    shown = {row.id: row for row in session.scalars(query)}
-    older = set(counts) - set(shown)
-    for row in session.scalars(select(VersionClip).where(VersionClip.id.in_(older))):
-        shown[row.id] = row
+    shown = {row.id: row for row in clips_of(session, version, counts)}
     return [
         ClipResult(
             clip_sha256=row.clip_sha256,

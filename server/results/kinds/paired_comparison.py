@@ -5,15 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from experiments import design
 from experiments.definition import Experiment
 from experiments.trials.paired_comparison.answer import CODES
 from server.clock import now
-from server.models import Study, StudyVersion, VersionClip
-from server.results.repository import Pool
+from server.models import Study, StudyVersion
+from server.results.repository import Pool, cells_of
 from server.results.schemas import LevelChoices, PairChoices, PairResults
 from server.results.service import playback_of, time_bins
 from server.studies.lookup import definition_of
@@ -41,7 +40,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     """Choices of one pool, which is of the data series of `version`."""
     definition = definition_of(version)
     tally = pooled(session, of.runs(), "", ())
-    outcomes = outcomes_of(tally, _cells(session, of))
+    outcomes = outcomes_of(tally, cells_of(session, of))
     sides = Counter[int]()
     for (_, _, code), times in outcomes.items():
         sides[code] += times
@@ -60,13 +59,6 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
         response_times=time_bins(tally),
         playback=playback_of(tally),
     )
-
-
-def _cells(session: Session, of: Pool) -> dict[int, str]:
-    """The cell of every clip of the pool's versions."""
-    versions = of.versions()
-    query = select(VersionClip.id, VersionClip.cell).where(VersionClip.version_id.in_(versions))
-    return dict(session.execute(query).all())
 
 
 def outcomes_of(tally: PooledTally, cells: Mapping[int, str]) -> Outcomes:
