@@ -39,6 +39,14 @@ class SlopesChoice(StrEnum):
     NONE = "none"
 
 
+class OrdinalSlopesChoice(StrEnum):
+    """By-participant slopes of the ordinal model, which do not correlate."""
+
+    ALL = "all"
+    MAIN = "main"
+    NONE = "none"
+
+
 def register(app: typer.Typer) -> None:
     """Add the commands to `app`, those on synthetic participants too."""
     from analysis.commands.synthetic import register as register_synthetic
@@ -89,25 +97,39 @@ def ordinal(
     rating: RatingOption = "response",
     within: WithinOption = "",
     item: ItemOption = "",
+    slopes: Annotated[
+        OrdinalSlopesChoice,
+        typer.Option(
+            help="all: an own variance for every effect; main: for main effects; none: intercepts only "
+            "(anti-conservative where people differ in an effect)."
+        ),
+    ] = OrdinalSlopesChoice.NONE,
     json: JsonOption = None,
 ) -> None:
-    """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed intercepts, Laplace.
+    """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed effects, slopes, Laplace.
 
     Examples:
 
       analysis ordinal ratings.csv
 
-      analysis ordinal table.csv --participant id --rating score --within face,blur --item clip
+      analysis ordinal table.csv --participant id --rating score --within face,blur --item clip --slopes main
     """
     from analysis.models.ordinal import fit_ordinal
-    from analysis.report.model_tables import ordinal_coefficients_table, ordinal_effects_table, ordinal_text
+    from analysis.report.model_tables import (
+        ordinal_coefficients_table,
+        ordinal_components_table,
+        ordinal_effects_table,
+        ordinal_text,
+    )
 
     data = _read(file, participant, rating, within, item)
     with saying("fitting"):
-        result = fit_ordinal(data.rows, participant, rating, data.within, data.item)
+        result = fit_ordinal(data.rows, participant, rating, data.within, data.item, slopes.value)
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
-    show_tables(ordinal_effects_table(*named), ordinal_coefficients_table(*named))
+    show_tables(
+        ordinal_effects_table(*named), ordinal_coefficients_table(*named), ordinal_components_table(*named)
+    )
     save_json(json, asdict(result), data.synthetic)
 
 

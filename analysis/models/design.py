@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from experiments.errors import InputError, did_you_mean
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Slopes = Literal["none", "main", "all", "correlated"]
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,21 @@ def model_data(
     return ModelData(
         tuple(within), levels, people, items, cell, who, what, values, fixed, spread, effect_of, names
     )
+
+
+def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
+    """Effects with a by-participant slope (`intercept` first), and what had to be left out."""
+    if slopes == "none":
+        return ["intercept"], []
+    if slopes != "all":
+        return ["intercept", *data.factors], []
+    cells = len(data.fixed)
+    counts = np.bincount(data.participant * cells + data.cell, minlength=len(data.participants) * cells)
+    if counts.max() > 1:
+        return ["intercept", *data.effects], []
+    left_out = data.effects[-1]
+    kept = [effect for effect in data.effects if effect != left_out]
+    return ["intercept", *kept], [f"no slope of {left_out}: with one rating a cell it is the residual"]
 
 
 def _coded(column: "pd.Series[str]", what: str) -> tuple[Integers, tuple[str, ...]]:

@@ -1,8 +1,9 @@
-"""Laplace approximation of the cumulative-logit model with crossed intercepts, with its exact gradient.
+"""Laplace approximation of the cumulative-logit model with crossed random effects, with its exact gradient.
 
-P(y <= k) = F(alpha_k - eta), eta = X beta + s_p u_participant + s_c v_item, u, v standard normal, F logistic,
-as in R's ordinal::clmm (Christensen 2019). F(a) - F(b) = F(a) F(-b) (1 - exp(b - a)), so that the
-log-likelihood of a rating has simple derivatives by eta: F(a) + F(b) - 1, then -(f(a) + f(b)).
+P(y <= k) = F(alpha_k - eta), eta = X beta + sum_c s_c z_c u_participant,c + s_i v_item, u, v standard
+normal, F logistic, as in R's ordinal::clmm (Christensen 2019); the first column z is ones, the intercept, the
+others are contrasts, whose slopes differ between participants. F(a) - F(b) = F(a) F(-b) (1 - exp(b - a)), so
+that the log-likelihood of a rating has simple derivatives by eta: F(a) + F(b) - 1, then -(f(a) + f(b)).
 """
 
 from dataclasses import dataclass, field
@@ -22,9 +23,15 @@ SCORE_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class OrdinalData:
-    """Trials: x (n, f), category codes from 0 (n,), participant and item codes (n,)."""
+    """Trials: x (n, f), category codes from 0 (n,), participant and item codes (n,).
+
+    `z` (n, c) are the columns whose coefficients differ between participants, `term` (c,) the random term,
+    from 0, that each belongs to: the columns of a term share one SD.
+    """
 
     x: Floats = field(repr=False)
+    z: Floats = field(repr=False)
+    term: Integers = field(repr=False)
     category: Integers = field(repr=False)
     participant: Integers = field(repr=False)
     item: Integers = field(repr=False)
@@ -32,10 +39,15 @@ class OrdinalData:
     n_participants: int
     n_items: int
 
+    @property
+    def n_sds(self) -> int:
+        """SDs of the participants' terms, and that of the items."""
+        return int(self.term.max()) + 2
+
 
 @dataclass(frozen=True)
 class Parameters:
-    """Thresholds (categories - 1,), coefficients (f,), log SDs of participants and items."""
+    """Thresholds (categories - 1,), coefficients (f,), log SDs of participants' terms and, last, of items."""
 
     thresholds: Floats
     beta: Floats
@@ -43,11 +55,12 @@ class Parameters:
 
 
 class _Trials:
-    """Each trial's likelihood and derivatives at given parameters and random effects."""
+    """Each trial's likelihood and derivatives; u (people, c) and v (items,) are the random effects."""
 
     def __init__(self, data: OrdinalData, p: Parameters, u: Floats, v: Floats) -> None:
         sd = np.exp(p.log_sd)
-        eta = data.x @ p.beta + sd[0] * u[data.participant] + sd[1] * v[data.item]
+        of_people = np.einsum("tc,tc->t", data.z * sd[data.term], u[data.participant])
+        eta = data.x @ p.beta + of_people + sd[-1] * v[data.item]
         edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
         a, b = edges[data.category + 1] - eta, edges[data.category] - eta
         self.upper, self.lower = special.expit(a), special.expit(b)
@@ -69,32 +82,70 @@ class _Trials:
 
 
 class _Hessian:
-    """H = I + L'U'WUL of the crossed effects: both diagonal blocks are diagonal, the larger is eliminated."""
+    """H = I + L'WL of the crossed effects.
 
-    def __init__(self, data: OrdinalData, sd: Floats, weight: Floats) -> None:
-        n, j = data.n_participants, data.n_items
-        pair = np.bincount(data.participant * j + data.item, weights=weight, minlength=n * j).reshape(n, j)
-        self.swap = n > j
-        b = sd[0] * sd[1] * (pair.T if self.swap else pair)
-        d_p, d_i = 1 + sd[0] ** 2 * pair.sum(axis=1), 1 + sd[1] ** 2 * pair.sum(axis=0)
-        self.d_small, self.d_large = (d_i, d_p) if self.swap else (d_p, d_i)
-        self.scaled = b / self.d_large
-        schur = np.diag(self.d_small) - self.scaled @ b.T
+    Its blocks are A of participants (block diagonal), D of items (diagonal) and B between them. The larger
+    of the two is eliminated, so that the one matrix inverted whole is the smaller one's Schur complement.
+    """
+
+    def __init__(self, data: OrdinalData, scaled: Floats, sd_item: float, weight: Floats) -> None:
+        n, c, j = data.n_participants, data.z.shape[1], data.n_items
+        self.shape = (n, c, j)
+        a = np.empty((n, c, c))
+        for row in range(c):
+            for column in range(row + 1):
+                w = weight * scaled[:, row] * scaled[:, column]
+                a[:, row, column] = a[:, column, row] = np.bincount(data.participant, weights=w, minlength=n)
+        a += np.eye(c)
+        pair = data.participant * j + data.item
+        b = np.stack([np.bincount(pair, weights=weight * z, minlength=n * j) for z in scaled.T], axis=1)
+        self.b = sd_item * b.reshape(n, j, c).transpose(0, 2, 1).reshape(n * c, j)
+        d = np.asarray(1 + sd_item**2 * np.bincount(data.item, weights=weight, minlength=j), np.float64)
+        self.keeps_people = n * c <= j
+        if self.keeps_people:
+            self._eliminate_items(a, d)
+        else:
+            self._eliminate_people(a, d)
+
+    def _eliminate_items(self, a: Floats, d: Floats) -> None:
+        n, c, _ = self.shape
+        self.d = d
+        self.scaled_b: Floats = self.b / d
+        schur: Floats = -self.scaled_b @ self.b.T
+        for i in range(n):
+            schur[i * c : (i + 1) * c, i * c : (i + 1) * c] += a[i]
         self.inverse = np.linalg.inv(schur)
-        self.log_det = float(np.linalg.slogdet(schur)[1] + np.log(self.d_large).sum())
+        self.log_det = float(np.linalg.slogdet(schur)[1] + np.log(d).sum())
+
+    def _eliminate_people(self, a: Floats, d: Floats) -> None:
+        n, c, j = self.shape
+        self.a_inverse = np.linalg.inv(a)
+        self.scaled_b = (self.a_inverse @ self.b.reshape(n, c, j)).reshape(n * c, j)
+        schur = np.diag(d) - self.b.T @ self.scaled_b
+        self.inverse = np.linalg.inv(schur)
+        self.log_det = float(np.linalg.slogdet(schur)[1] + np.linalg.slogdet(a)[1].sum())
 
     def solve(self, r_p: Floats, r_i: Floats) -> tuple[Floats, Floats]:
-        small, large = (r_i, r_p) if self.swap else (r_p, r_i)
-        x = self.inverse @ (small - self.scaled @ large)
-        y = large / self.d_large - self.scaled.T @ x
-        return (y, x) if self.swap else (x, y)
+        """H^-1 of a vector of participants (people, c) and items (items,)."""
+        n, c, _ = self.shape
+        if self.keeps_people:
+            people = self.inverse @ (r_p.ravel() - self.scaled_b @ r_i)
+            return people.reshape(n, c), r_i / self.d - self.scaled_b.T @ people
+        items = self.inverse @ (r_i - self.scaled_b.T @ r_p.ravel())
+        alone = np.einsum("ncd,nd->nc", self.a_inverse, r_p)
+        return alone - (self.scaled_b @ items).reshape(n, c), items
 
     def blocks(self) -> tuple[Floats, Floats, Floats]:
-        """Inverse's diagonal of participants and of items, and the cross block (participants, items)."""
-        cross = -self.inverse @ self.scaled
-        small = np.diag(self.inverse)
-        large = 1 / self.d_large - np.einsum("sl,sl->l", self.scaled, cross)
-        return (large, small, cross.T) if self.swap else (small, large, cross)
+        """Of H^-1: blocks of participants (people, c, c), diagonal of items, cross (people, c, items)."""
+        n, c, j = self.shape
+        if self.keeps_people:
+            people = np.stack([self.inverse[i * c : (i + 1) * c, i * c : (i + 1) * c] for i in range(n)])
+            cross = -self.inverse @ self.scaled_b
+            items = 1 / self.d - np.einsum("qj,qj->j", self.scaled_b, cross)
+            return people, items, cross.reshape(n, c, j)
+        cross = (-self.scaled_b @ self.inverse).reshape(n, c, j)
+        people = self.a_inverse - np.einsum("ncj,ndj->ncd", cross, self.scaled_b.reshape(n, c, j))
+        return people, np.diag(self.inverse), cross
 
 
 @dataclass
@@ -106,62 +157,70 @@ class LaplaceLikelihood:
     v: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.u, self.v = np.zeros(self.data.n_participants), np.zeros(self.data.n_items)
+        self.u = np.zeros((self.data.n_participants, self.data.z.shape[1]))
+        self.v = np.zeros(self.data.n_items)
 
-    def _score(self, t: _Trials, sd: Floats, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def _carried(self, scaled: Floats, sd_item: float, values: Floats) -> tuple[Floats, Floats]:
+        """L' of values of trials (n,): to participants (people, c) and items (items,)."""
         d = self.data
-        r_p = sd[0] * np.bincount(d.participant, weights=t.slope, minlength=d.n_participants) - u
-        return r_p, sd[1] * np.bincount(d.item, weights=t.slope, minlength=d.n_items) - v
+        columns = [np.bincount(d.participant, values * z, d.n_participants) for z in scaled.T]
+        of_items = np.asarray(sd_item * np.bincount(d.item, values, d.n_items), np.float64)
+        return np.stack(columns, axis=1), of_items
 
-    def _modes(self, p: Parameters) -> tuple[_Trials, _Hessian]:
+    def _modes(self, p: Parameters, scaled: Floats, sd_item: float) -> tuple[_Trials, _Hessian]:
         """Newton with halved steps: the joint density is log-concave, so it always arrives."""
-        sd, u, v = np.exp(p.log_sd), self.u, self.v
+        u, v = self.u, self.v
         t = _Trials(self.data, p, u, v)
-        value = t.log_likelihood - (u @ u + v @ v) / 2
+        value = t.log_likelihood - ((u**2).sum() + v @ v) / 2
         for _ in range(NEWTON_STEPS):
-            hessian = _Hessian(self.data, sd, t.weight)
-            score = self._score(t, sd, u, v)
+            hessian = _Hessian(self.data, scaled, sd_item, t.weight)
+            of_people, of_items = self._carried(scaled, sd_item, t.slope)
+            score = of_people - u, of_items - v
             if (
                 max(np.abs(score[0]).max(), np.abs(score[1]).max())
                 < SCORE_TOLERANCE * (1 + abs(value)) ** 0.5
             ):
                 self.u, self.v = u, v
                 return t, hessian
-            step_p, step_i = hessian.solve(*score)
-            length = 1.0
-            while True:
-                new_u, new_v = u + length * step_p, v + length * step_i
-                trial = _Trials(self.data, p, new_u, new_v)
-                reached = trial.log_likelihood - (new_u @ new_u + new_v @ new_v) / 2
-                if reached >= value - 1e-9 * abs(value) or length < 1e-6:
-                    break
-                length /= 2
-            u, v, t, value = new_u, new_v, trial, reached
+            u, v, t, value = self._step(p, (u, v), hessian.solve(*score), value)
         raise InputError("the random effects of the ordinal model do not settle; the ratings may be too few")
+
+    def _step(
+        self, p: Parameters, at: tuple[Floats, Floats], step: tuple[Floats, Floats], value: float
+    ) -> tuple[Floats, Floats, _Trials, float]:
+        """A Newton step, halved until the joint density does not fall."""
+        length = 1.0
+        while True:
+            u, v = at[0] + length * step[0], at[1] + length * step[1]
+            trial = _Trials(self.data, p, u, v)
+            reached = trial.log_likelihood - ((u**2).sum() + v @ v) / 2
+            if reached >= value - 1e-9 * abs(value) or length < 1e-6:
+                return u, v, trial, reached
+            length /= 2
 
     def evaluate(self, p: Parameters) -> tuple[float, Parameters]:
         """Laplace log-likelihood, and its gradient in the form of Parameters."""
         d, sd = self.data, np.exp(p.log_sd)
-        t, hessian = self._modes(p)
+        scaled, sd_item = d.z * sd[d.term], float(sd[-1])
+        t, hessian = self._modes(p, scaled, sd_item)
         u, v = self.u, self.v
-        value = t.log_likelihood - (u @ u + v @ v) / 2 - hessian.log_det / 2
-        inverse_p, inverse_i, cross = hessian.blocks()
+        value = t.log_likelihood - ((u**2).sum() + v @ v) / 2 - hessian.log_det / 2
+        of_people, of_items, cross = hessian.blocks()
         # spread: each trial's z' H^-1 z; pull: what a moved mode does to log|H|, carried back to eta
         spread = (
-            sd[0] ** 2 * inverse_p[d.participant]
-            + sd[1] ** 2 * inverse_i[d.item]
-            + 2 * sd[0] * sd[1] * cross[d.participant, d.item]
+            np.einsum("tc,tcd,td->t", scaled, of_people[d.participant], scaled)
+            + sd_item**2 * of_items[d.item]
+            + 2 * sd_item * np.einsum("tc,tc->t", scaled, cross[d.participant, :, d.item])
         )
         change = -spread * (t.curve_upper + t.curve_lower)
-        v_p, v_i = hessian.solve(
-            sd[0] * np.bincount(d.participant, weights=change, minlength=d.n_participants),
-            sd[1] * np.bincount(d.item, weights=change, minlength=d.n_items),
-        )
-        pull = sd[0] * v_p[d.participant] + sd[1] * v_i[d.item]
+        v_p, v_i = hessian.solve(*self._carried(scaled, sd_item, change))
+        pull = np.einsum("tc,tc->t", scaled, v_p[d.participant]) + sd_item * v_i[d.item]
         beta = d.x.T @ (t.slope - (change - pull * t.weight) / 2)
         upper = t.above + t.between - (spread * t.curve_upper + pull * t.f_upper) / 2
         lower = -t.lower - t.between - (spread * t.curve_lower + pull * t.f_lower) / 2
         edges = np.bincount(d.category + 1, weights=upper, minlength=d.n_categories + 1)
         edges += np.bincount(d.category, weights=lower, minlength=d.n_categories + 1)
-        log_sd = np.array([u @ u - (1 - inverse_p).sum() - v_p @ u, v @ v - (1 - inverse_i).sum() - v_i @ v])
+        of_columns = (u**2 - (1 - np.einsum("ncc->nc", of_people)) - v_p * u).sum(axis=0)
+        of_terms = np.bincount(d.term, weights=of_columns, minlength=d.n_sds - 1)
+        log_sd = np.append(of_terms, v @ v - (1 - of_items).sum() - v_i @ v)
         return float(value), Parameters(edges[1:-1].astype(np.float64), beta, log_sd)

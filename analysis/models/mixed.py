@@ -2,20 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from analysis.models.design import ModelData, model_data
+from analysis.models.design import ModelData, Slopes, model_data, slope_groups
 from analysis.models.reml import CrossProducts, criterion, cross_products
 from analysis.models.satterthwaite import Uncertainty, f_test, uncertainty
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
-Slopes = Literal["none", "main", "all", "correlated"]
 
 ZERO_THETA = 1e-4
 """A relative SD below this is tried at zero, its bound."""
@@ -115,7 +113,7 @@ def fit_mixed(
         Unknown columns, text for numbers, constant ratings, empty cells, or too few ratings for the model.
     """
     data = model_data(rows, participant, item, rating, within)
-    groups, notes = _slope_groups(data, slopes)
+    groups, notes = slope_groups(data, slopes)
     patterns, labels = _patterns(data, groups, slopes)
     columns = np.concatenate([data.columns(g) for g in groups])
     x, z = data.fixed[data.cell], data.spread[:, columns][data.cell]
@@ -126,21 +124,6 @@ def fit_mixed(
     c = cross_products(x, z, data.rating, data.participant, data.item, patterns)
     theta = _fit_theta(c, _bounded(patterns, bool(data.items)))
     return _result(data, c, theta, labels, slopes, tuple(notes), participant, item, rating)
-
-
-def _slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
-    """Effects with a by-participant slope (`intercept` first), and what had to be left out."""
-    if slopes == "none":
-        return ["intercept"], []
-    if slopes != "all":
-        return ["intercept", *data.factors], []
-    cells = len(data.fixed)
-    counts = np.bincount(data.participant * cells + data.cell, minlength=len(data.participants) * cells)
-    if counts.max() > 1:
-        return ["intercept", *data.effects], []
-    left_out = data.effects[-1]
-    kept = [effect for effect in data.effects if effect != left_out]
-    return ["intercept", *kept], [f"no slope of {left_out}: with one rating a cell it is the residual"]
 
 
 def _patterns(data: ModelData, groups: list[str], slopes: Slopes) -> tuple[Floats, list[str]]:

@@ -1,4 +1,4 @@
-"""Cumulative-link mixed model of ratings: logit link, flexible thresholds, crossed random intercepts."""
+"""Cumulative-link mixed model of ratings: logit link, flexible thresholds, crossed random effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,14 +8,16 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from analysis.models.design import ModelData, model_data
+from analysis.models.design import ModelData, Slopes, model_data, slope_groups
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 MAXIMUM_CATEGORIES = 20
 LOG_SD_BOUNDS = (-9.0, 4.0)
+ZERO_LOG_SD = LOG_SD_BOUNDS[0] / 2
 START_LOG_SD = np.log(0.6)
 HESSIAN_STEP = 1e-4
 
@@ -42,8 +44,20 @@ class OrdinalCoefficient:
 
 
 @dataclass(frozen=True)
+class OrdinalComponent:
+    """Standard deviation, on the logit scale, of a random term; a slope's is over unit-variance contrasts."""
+
+    group: str
+    term: str
+    sd: float
+
+
+@dataclass(frozen=True)
 class OrdinalResult:
-    """A fitted cumulative-link mixed model; `thresholds[k]` lies between categories k and k + 1."""
+    """A fitted cumulative-link mixed model; `thresholds[k]` lies between categories k and k + 1.
+
+    `singular`: the SD of a random term is estimated as zero.
+    """
 
     formula: str
     log_likelihood: float
@@ -54,6 +68,9 @@ class OrdinalResult:
     effects: tuple[OrdinalEffect, ...]
     sd_participant: float
     sd_item: float
+    slopes: Slopes
+    components: tuple[OrdinalComponent, ...]
+    singular: bool
     n_ratings: int
     n_participants: int
     n_items: int
@@ -67,13 +84,21 @@ def fit_ordinal(
     rating: str,
     within: Sequence[str],
     item: str | Sequence[str] | None = None,
+    slopes: Slopes = "none",
 ) -> OrdinalResult:
-    """Fit ordered ratings ~ full factorial of `within` with crossed random intercepts (Laplace).
+    """Fit ordered ratings ~ full factorial of `within` with crossed random effects (Laplace).
 
-    Parameters are those of `analysis.models.mixed.fit_mixed`. Categories are the distinct ratings met, in
-    order; a rating of the scale that nobody gave has no threshold of its own. Raises InputError as there,
-    and for more than 20 distinct ratings.
+    Parameters are those of `analysis.models.mixed.fit_mixed`; slopes of one effect share one variance over
+    its orthonormal contrasts and do not correlate. Categories are the distinct ratings met, in order; a
+    rating of the scale that nobody gave has no threshold of its own.
+
+    Raises
+    ------
+    InputError
+        As there, for more than 20 distinct ratings, and for correlated slopes.
     """
+    if slopes == "correlated":
+        raise InputError("slopes of the ordinal model do not correlate; expected all, main or none")
     data = model_data(rows, participant, item, rating, within)
     categories, codes = np.unique(data.rating, return_inverse=True)
     if len(categories) > MAXIMUM_CATEGORIES:
@@ -81,27 +106,54 @@ def fit_ordinal(
             f"expected at most {MAXIMUM_CATEGORIES} distinct ratings, got {len(categories)}; "
             "use the linear mixed model for continuous ratings"
         )
-    x = data.fixed[data.cell][:, 1:]
-    ordinal = OrdinalData(
-        x,
-        codes.astype(np.int64),
-        data.participant,
-        data.item,
-        len(categories),
-        len(data.participants),
-        max(1, len(data.items)),
-    )
+    groups, left_out = slope_groups(data, slopes)
+    ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups)
     likelihood = LaplaceLikelihood(ordinal)
     packed, notes = _maximise(likelihood, _start(ordinal), bool(data.items))
     value, _ = likelihood.evaluate(_unpack(packed, ordinal))
+    terms = _Terms(participant, item, rating, slopes, tuple(groups))
+    said = (*left_out, *notes, *_zero_notes(packed, groups, bool(data.items)))
     covariance = _covariance(likelihood, packed)
-    return _result(data, ordinal, packed, value, covariance, categories, notes, (participant, item, rating))
+    return _result(data, ordinal, packed, value, covariance, categories, said, terms)
+
+
+@dataclass(frozen=True)
+class _Terms:
+    """What the model is about: columns, and the effects that differ between participants."""
+
+    participant: str
+    item: str | Sequence[str] | None
+    rating: str
+    slopes: Slopes
+    groups: tuple[str, ...]
+
+    @property
+    def item_name(self) -> str:
+        return self.item if isinstance(self.item, str) else "/".join(self.item or ())
+
+
+def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: Sequence[str]) -> OrdinalData:
+    columns = np.concatenate([data.columns(group) for group in groups])
+    term = np.concatenate([np.full(len(data.columns(group)), k) for k, group in enumerate(groups)])
+    return OrdinalData(
+        data.fixed[data.cell][:, 1:],
+        data.spread[:, columns][data.cell],
+        term.astype(np.int64),
+        codes,
+        data.participant,
+        data.item,
+        n_categories,
+        len(data.participants),
+        max(1, len(data.items)),
+    )
 
 
 def _start(d: OrdinalData) -> Floats:
     """Thresholds from the pooled cumulative shares, no effects, moderate SDs."""
     shares = np.cumsum(np.bincount(d.category, minlength=d.n_categories))[:-1] / len(d.category)
-    return _pack(Parameters(np.log(shares / (1 - shares)), np.zeros(d.x.shape[1]), np.full(2, START_LOG_SD)))
+    return _pack(
+        Parameters(np.log(shares / (1 - shares)), np.zeros(d.x.shape[1]), np.full(d.n_sds, START_LOG_SD))
+    )
 
 
 def _pack(p: Parameters) -> Floats:
@@ -112,7 +164,7 @@ def _pack(p: Parameters) -> Floats:
 def _unpack(packed: Floats, d: OrdinalData) -> Parameters:
     k = d.n_categories - 1
     thresholds = packed[0] + np.concatenate([[0.0], np.cumsum(np.exp(packed[1:k]))])
-    return Parameters(thresholds, packed[k:-2], packed[-2:])
+    return Parameters(thresholds, packed[k : -d.n_sds], packed[-d.n_sds :])
 
 
 def _packed_gradient(gradient: Parameters, packed: Floats, d: OrdinalData) -> Floats:
@@ -133,7 +185,7 @@ def _maximise(
         return -value, -_packed_gradient(gradient, packed, d)
 
     bounds: list[tuple[float | None, float | None]] = [(None, None)] + [(-12.0, 5.0)] * (d.n_categories - 2)
-    bounds += [(None, None)] * d.x.shape[1] + [LOG_SD_BOUNDS]
+    bounds += [(None, None)] * d.x.shape[1] + [LOG_SD_BOUNDS] * (d.n_sds - 1)
     bounds.append(LOG_SD_BOUNDS if with_items else (LOG_SD_BOUNDS[0], LOG_SD_BOUNDS[0]))
     found = optimize.minimize(
         objective,
@@ -143,11 +195,19 @@ def _maximise(
         bounds=bounds,
         options={"maxiter": 2000, "maxfun": 4000, "ftol": 1e-13, "gtol": 1e-5, "maxcor": 30},
     )
-    notes = [] if found.success else [f"the optimiser stopped early: {found.message}"]
-    for name, value in zip(("participants", "items")[: 1 + with_items], found.x[-2:], strict=False):
-        if value < LOG_SD_BOUNDS[0] / 2:
-            notes.append(f"the SD of {name} is estimated as zero")
-    return np.asarray(found.x, dtype=np.float64), tuple(notes)
+    notes = () if found.success else (f"the optimiser stopped early: {found.message}",)
+    return np.asarray(found.x, dtype=np.float64), notes
+
+
+def _zero_notes(packed: Floats, groups: Sequence[str], with_items: bool) -> list[str]:
+    names = ["participants", *(f"participants' slopes of {group}" for group in groups[1:])]
+    names += ["items"] * with_items
+    log_sds = packed[-len(groups) - 1 :]
+    return [
+        f"the SD of {name} is estimated as zero"
+        for name, log_sd in zip(names, log_sds, strict=False)
+        if log_sd < ZERO_LOG_SD
+    ]
 
 
 def _covariance(likelihood: LaplaceLikelihood, packed: Floats) -> Floats:
@@ -156,7 +216,8 @@ def _covariance(likelihood: LaplaceLikelihood, packed: Floats) -> Floats:
     SDs estimated as zero are held fixed.
     """
     d = likelihood.data
-    free = np.flatnonzero(~((np.arange(len(packed)) >= len(packed) - 2) & (packed < LOG_SD_BOUNDS[0] / 2)))
+    is_sd = np.arange(len(packed)) >= len(packed) - d.n_sds
+    free = np.flatnonzero(~(is_sd & (packed < ZERO_LOG_SD)))
     information = np.empty((len(free), len(free)))
     for row, k in enumerate(free):
         sides = []
@@ -179,10 +240,10 @@ def _result(
     covariance: Floats,
     categories: Floats,
     notes: tuple[str, ...],
-    names: tuple[str, str | Sequence[str] | None, str],
+    terms: _Terms,
 ) -> OrdinalResult:
     p, first = _unpack(packed, d), d.n_categories - 1
-    block = covariance[first:-2, first:-2]
+    block = covariance[first : -d.n_sds, first : -d.n_sds]
     se = np.sqrt(np.maximum(np.diag(block), 0.0))
     coefficients = tuple(
         OrdinalCoefficient(name, float(b), float(s), float(b / s), float(2 * stats.norm.sf(abs(b / s))))
@@ -193,21 +254,39 @@ def _result(
         columns = data.columns(effect) - 1
         chi2 = float(p.beta[columns] @ np.linalg.solve(block[np.ix_(columns, columns)], p.beta[columns]))
         effects.append(OrdinalEffect(effect, chi2, len(columns), float(stats.chi2.sf(chi2, len(columns)))))
-    participant, item, rating = names
-    items = f" + (1 | {item if isinstance(item, str) else '/'.join(item or ())})" if data.items else ""
+    components = _components(p, terms, bool(data.items))
     return OrdinalResult(
-        formula=f"{rating} ~ {' * '.join(data.factors)} + (1 | {participant}){items}, logit",
+        formula=_formula(data, terms),
         log_likelihood=value,
         aic=2 * (len(packed) - (not data.items)) - 2 * value,
         categories=tuple(float(c) for c in categories),
         thresholds=tuple(float(t) for t in p.thresholds),
         coefficients=coefficients,
         effects=tuple(effects),
-        sd_participant=float(np.exp(p.log_sd[0])),
-        sd_item=float(np.exp(p.log_sd[1])) if data.items else 0.0,
+        sd_participant=components[0].sd,
+        sd_item=components[-1].sd if data.items else 0.0,
+        slopes=terms.slopes,
+        components=components,
+        singular=any(component.sd < np.exp(ZERO_LOG_SD) for component in components),
         n_ratings=len(data.rating),
         n_participants=len(data.participants),
         n_items=len(data.items),
         notes=notes,
         factors=data.factors,
     )
+
+
+def _components(p: Parameters, terms: _Terms, with_items: bool) -> tuple[OrdinalComponent, ...]:
+    sds = np.exp(p.log_sd)
+    of_people = [
+        OrdinalComponent(terms.participant, group, float(sd))
+        for group, sd in zip(terms.groups, sds[:-1], strict=True)
+    ]
+    of_items = [OrdinalComponent(terms.item_name, "intercept", float(sds[-1]))] * with_items
+    return (*of_people, *of_items)
+
+
+def _formula(data: ModelData, terms: _Terms) -> str:
+    slopes = "".join(f" + (0 + {group} | {terms.participant})" for group in terms.groups[1:])
+    items = f" + (1 | {terms.item_name})" if data.items else ""
+    return f"{terms.rating} ~ {' * '.join(data.factors)} + (1 | {terms.participant}){slopes}{items}, logit"

@@ -112,7 +112,7 @@ def ordinal_model(analysis: Analysis) -> Section:
     """The cumulative-link mixed model's tests beside those of the ANOVA."""
     from analysis.models.ordinal import fit_ordinal
 
-    result = fit_ordinal(**_model_arguments(analysis))
+    result = fit_ordinal(**_model_arguments(analysis), slopes="main")
     rows = []
     for effect in result.effects:
         ours = analysis.anova.effect(effect.effect)
@@ -125,8 +125,7 @@ def ordinal_model(analysis: Analysis) -> Section:
         rows.append((ours.effect, *cells))
     header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
-    spreads = f"SD of participants {fixed(result.sd_participant, 3)}, of blinks {fixed(result.sd_item, 3)}."
-    notes = (result.formula, f"Thresholds: {thresholds}. {spreads}", *result.notes)
+    notes = (result.formula, f"Thresholds: {thresholds}.", *_parts(result.components), *result.notes)
     table = Table(
         "ordinal",
         caption("Ordinal mixed model", analysis.name, analysis.synthetic),
@@ -136,9 +135,9 @@ def ordinal_model(analysis: Analysis) -> Section:
         notes,
     )
     text = (
-        "Ratings as ordered categories: cumulative logit with free thresholds, crossed random intercepts of "
-        "participants and blinks, Laplace approximation, joint Wald tests. Without by-participant slopes its "
-        "p are too small where people differ in an effect; read it for direction and shape."
+        "Ratings as ordered categories: cumulative logit with free thresholds, participants crossed with "
+        "blinks, by-participant slopes for the main effects, Laplace approximation, joint Wald tests. Without "
+        "slopes of interactions their p are too small where people differ in them."
         f"{_without_groups(analysis)}"
     )
     return Section("Ordinal mixed model", text, (table,))

@@ -42,6 +42,13 @@ def ordinal_coefficients_table(result: OrdinalResult, name: str, synthetic: bool
     return Table("ordinal-coefficients", caption("Ordinal coefficients", name, synthetic), header, rows, 1)
 
 
+def ordinal_components_table(result: OrdinalResult, name: str, synthetic: bool) -> Table:
+    """Standard deviations of the random terms on the logit scale."""
+    rows = tuple((c.group, c.term, fixed(c.sd, 3)) for c in result.components)
+    header = ("Group", "Term", "SD")
+    return Table("ordinal-random", caption("Random effects (logit)", name, synthetic), header, rows, 2)
+
+
 def mixed_text(result: MixedResult) -> str:
     """What was fitted, in words."""
     of_items = f"of {result.n_items} items " if result.n_items else ""
@@ -57,8 +64,11 @@ def ordinal_text(result: OrdinalResult) -> str:
     """What was fitted, in words."""
     said = [
         f"{result.formula} link, flexible thresholds, Laplace approximation (log-likelihood "
-        f"{result.log_likelihood:.2f}, AIC {result.aic:.2f}); SD of participants "
-        f"{result.sd_participant:.2f}, of items {result.sd_item:.2f}. Wald tests. Random intercepts only: "
-        "where people differ in the size of an effect its p is too small."
+        f"{result.log_likelihood:.2f}, AIC {result.aic:.2f}). Wald tests."
     ]
+    if result.slopes == "none":
+        said.append(
+            "Random intercepts only: where people differ in the size of an effect its p is too small; "
+            "--slopes all lets them differ."
+        )
     return " ".join([*said, *(f"{note}." for note in result.notes)])

@@ -1,6 +1,7 @@
 """The cumulative-link mixed model against ordinal::clmm (golden), quadrature, and on bad input."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize
+from scipy.special import expit
 
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from analysis.models.ordinal import fit_ordinal
@@ -49,20 +52,23 @@ def _key(name: str, expected: dict | None = None) -> frozenset[str]:
     return frozenset(parts)
 
 
-def problem(seed: int) -> tuple[OrdinalData, Parameters]:
+def problem(seed: int, columns: int = 1, items: int = 4) -> tuple[OrdinalData, Parameters]:
+    """Five people, some items; the columns after the first share one SD."""
     rng = np.random.default_rng(seed)
-    people, items = 5, 4
+    people = 5
     who, what = (a.ravel() for a in np.meshgrid(np.arange(people), np.arange(items), indexing="ij"))
     x = rng.normal(size=(len(who), 2))
-    data = OrdinalData(x, rng.integers(0, 4, len(who)), who, what, 4, people, items)
+    z = np.hstack([np.ones((len(who), 1)), rng.normal(size=(len(who), columns - 1))])
+    term = np.minimum(np.arange(columns), 1)
+    data = OrdinalData(x, z, term, rng.integers(0, 4, len(who)), who, what, 4, people, items)
     gaps = np.cumsum(rng.uniform(0.3, 1.5, 3)) - 1.5
-    return data, Parameters(gaps, rng.normal(size=2), rng.uniform(-1.5, 0.7, 2))
+    return data, Parameters(gaps, rng.normal(size=2), rng.uniform(-1.5, 0.7, data.n_sds))
 
 
-@given(st.integers(0, 10_000))
+@given(st.integers(0, 10_000), st.sampled_from([(1, 4), (1, 7), (3, 4), (3, 20)]))
 @settings(max_examples=25, deadline=None)
-def test_gradient_is_that_of_the_likelihood(seed):
-    data, p = problem(seed)
+def test_gradient_is_that_of_the_likelihood(seed, shape):
+    data, p = problem(seed, *shape)
     likelihood = LaplaceLikelihood(data)
     _, gradient = likelihood.evaluate(p)
     for name in ("thresholds", "beta", "log_sd"):
@@ -74,7 +80,61 @@ def test_gradient_is_that_of_the_likelihood(seed):
                 moved[k] += step
                 sides.append(likelihood.evaluate(Parameters(**{**vars(p), name: moved}))[0])
             numeric = (sides[0] - sides[1]) / 2e-5
-            assert getattr(gradient, name)[k] == pytest.approx(numeric, rel=1e-4, abs=2e-5)
+            assert getattr(gradient, name)[k] == pytest.approx(numeric, rel=1e-4, abs=5e-5)
+
+
+@pytest.mark.parametrize("shape", [(3, 4), (3, 20)])
+def test_the_value_is_that_of_the_dense_approximation(shape):
+    """By the definition: the joint density at its mode, by a general optimiser, log|H| from differences."""
+    data, p = problem(11, *shape)
+    value, _ = LaplaceLikelihood(data).evaluate(p)
+    size = data.n_participants * data.z.shape[1]
+
+    def joint(effects):
+        u, v = effects[:size].reshape(data.n_participants, -1), effects[size:]
+        sd = np.exp(p.log_sd)
+        eta = data.x @ p.beta + (data.z * sd[data.term] * u[data.participant]).sum(axis=1)
+        eta = eta + sd[-1] * v[data.item]
+        edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
+        shares = expit(edges[data.category + 1] - eta) - expit(edges[data.category] - eta)
+        return effects @ effects / 2 - np.log(shares).sum()
+
+    mode = minimize(joint, np.zeros(size + data.n_items), method="BFGS", options={"gtol": 1e-7}).x
+    step = 1e-4 * np.eye(len(mode))
+    sides = np.array(
+        [[joint(mode + s * a + t * b) * s * t for s in (1, -1) for t in (1, -1)] for a in step for b in step]
+    )
+    hessian = sides.sum(axis=1).reshape(len(mode), -1) / 4e-8
+    dense = -joint(mode) - np.linalg.slogdet(hessian)[1] / 2
+    assert value == pytest.approx(dense, rel=1e-5)
+
+
+def test_slopes_equal_those_of_clmm():
+    expected = json.loads((GOLDEN.parent / "ordinal_slopes.json").read_text())
+    rows = pd.read_csv(GOLDEN.parent / "ordinal_slopes.csv")
+    ours = fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip", slopes="main")
+    assert ours.log_likelihood == pytest.approx(expected["log_likelihood"], abs=1e-5)
+    assert ours.thresholds == pytest.approx(expected["thresholds"], abs=2e-3)
+    sds = {component.term: component.sd for component in ours.components[:-1]}
+    spread = {name.split()[-1]: sd for name, sd in expected["sds"].items() if name.startswith("participant")}
+    theirs = {"intercept": spread["(Intercept)"], "A": spread["xA"], "B": spread["xB"]}
+    assert sds == pytest.approx(theirs, rel=2e-3)
+    assert ours.sd_item == pytest.approx(expected["sds"]["clip (Intercept)"], rel=2e-3)
+    assert [c.estimate for c in ours.coefficients] == pytest.approx(
+        [expected["coefficients"][name] for name in ("A1", "B1", "A1:B1")], abs=1e-3
+    )
+    assert [c.se for c in ours.coefficients] == pytest.approx(
+        [expected["se"][name] for name in ("A1", "B1", "A1:B1")], rel=5e-3
+    )
+    # a test of A without its slope takes the spread of people for none
+    without = fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip")
+    assert without.effects[0].p_value < ours.effects[0].p_value / 5
+
+
+def test_correlated_slopes_are_refused():
+    rows = pd.read_csv(GOLDEN.parent / "ordinal_slopes.csv")
+    with pytest.raises(InputError, match="expected all, main or none"):
+        fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip", slopes="correlated")
 
 
 def test_without_spread_it_is_the_plain_ordinal_likelihood():
@@ -90,7 +150,7 @@ def test_without_spread_it_is_the_plain_ordinal_likelihood():
 
 def test_swapping_participants_and_items_changes_nothing():
     data, p = problem(8)
-    turned = OrdinalData(data.x, data.category, data.item, data.participant, 4, 4, 5)
+    turned = replace(data, participant=data.item, item=data.participant, n_participants=4, n_items=5)
     value, _ = LaplaceLikelihood(data).evaluate(p)
     other, _ = LaplaceLikelihood(turned).evaluate(Parameters(p.thresholds, p.beta, p.log_sd[::-1]))
     assert other == pytest.approx(value, rel=1e-12)
