@@ -136,8 +136,8 @@ def ordinal_model(analysis: Analysis) -> Section:
     )
     text = (
         "Ratings as ordered categories: cumulative logit with free thresholds, participants crossed with "
-        "blinks, by-participant slopes for the main effects, Laplace approximation, joint Wald tests. Without "
-        "slopes of interactions their p are too small where people differ in them."
+        "blinks, by-participant slopes for the main effects, Laplace approximation, joint Wald tests. "
+        "Without slopes of interactions their p are too small where people differ in them."
         f"{_without_groups(analysis)}"
     )
     return Section("Ordinal mixed model", text, (table,))
