@@ -63,9 +63,8 @@ screenshots: setup-test ## make the pictures of README and docs anew (needs the 
 	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
 	@$(BIN)/python tools/screenshots_admin.py
 
-PLAYS ?= 200
-scope: setup-test ## what reaches a virtual screen against what is recorded (hours; PLAYS=20 SCOPE="--rates 30 --conditions idle")
-	@$(BIN)/python -m tools.scope --plays $(PLAYS) $(SCOPE)
+scope: setup-test ## what reaches a virtual screen against what is recorded (hours; SCOPE=short, SCOPE="rows --plays 20")
+	@$(BIN)/python -m tools.scope $(SCOPE)
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python tools/load.py $(LOAD)

@@ -1,15 +1,21 @@
 """`make scope`: plays in real browsers, on a virtual display whose frame buffer is read from outside.
 
-python -m tools.scope                                    all rows, 200 plays each (hours)
-python -m tools.scope --plays 20 --conditions idle hogs --rates 30 60 --browsers chromium
-python -m tools.scope --before-others                    on a machine that others use too: in rows that are
-                                                         not busy the browser goes before other programs
+python -m tools.scope                        everything: rows of 200 plays, 100 views, 50 pairs (hours)
+python -m tools.scope short                  rows of 20 plays idle and busy, 10 views, 10 pairs (20 minutes)
+python -m tools.scope rows --plays 20 --conditions idle hogs --rates 30 60 --browsers chromium
+python -m tools.scope views --tries 100      reload, kill -9, another device: views stored against seen
+python -m tools.scope pairs --pairs 50       two clips on one canvas: are they ever a frame apart?
+
+Each result is stored as it ends (--results), and what is there is not measured again: a run that was stopped
+goes on where it was. --before-others: on a machine that others use too the browser goes before other programs
+in rows that are not busy.
 """
 
 import argparse
-import json
 import sys
 import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from tests.browser.server_process import ServerProcess
@@ -17,20 +23,28 @@ from tools.scope.browser import PROGRAMS, program
 from tools.scope.compare import REFRESH_MS
 from tools.scope.conditions import CONDITIONS
 from tools.scope.display import Display, missing_here
-from tools.scope.measure import Row, measure
-from tools.scope.table import HEADER, as_json, cells, markdown
+from tools.scope.measure import measure
+from tools.scope.pairs import measure_pairs
+from tools.scope.results import Results
+from tools.scope.table import HEADER, cells, markdown
+from tools.scope.views import count_views
 
 RATES = (24, 25, 30, 50, 60)
+PAIR_RATES = (30, 60)
+SHORT = {"plays": 20, "tries": 10, "pairs": 10, "rates": [30, 60], "conditions": ["idle", "hogs"]}
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="make scope", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--plays", type=int, default=200, help="plays a row (200)")
+    parser.add_argument("what", nargs="?", choices=("all", "short", "rows", "views", "pairs"), default="all")
+    parser.add_argument("--plays", type=int, help="plays a row (200)")
+    parser.add_argument("--tries", type=int, help="views to which something happens (100)")
+    parser.add_argument("--pairs", type=int, help="pairs shown at each rate (50)")
     parser.add_argument("--browsers", nargs="+", choices=list(PROGRAMS), default=list(PROGRAMS))
-    parser.add_argument("--rates", nargs="+", type=int, choices=RATES, default=list(RATES), metavar="FPS")
-    parser.add_argument("--conditions", nargs="+", choices=list(CONDITIONS), default=list(CONDITIONS))
+    parser.add_argument("--rates", nargs="+", type=int, choices=RATES, metavar="FPS", help="of rows (all)")
+    parser.add_argument("--conditions", nargs="+", choices=list(CONDITIONS), help="of rows (all)")
     parser.add_argument(
         "--before-others",
         action="store_true",
@@ -41,8 +55,37 @@ def arguments() -> argparse.Namespace:
         action="store_true",
         help="let the display wait for the processor like any program",
     )
-    parser.add_argument("--json", type=Path, help="write every play here")
-    return parser.parse_args()
+    parser.add_argument(
+        "--results", type=Path, default=Path("out/scope.jsonl"), help="file of results (out/scope.jsonl)"
+    )
+    parser.add_argument("--again", action="store_true", help="measure what the file has already, too")
+    options = parser.parse_args()
+    full = {"plays": 200, "tries": 100, "pairs": 50, "rates": list(RATES), "conditions": list(CONDITIONS)}
+    for name, value in (SHORT if options.what == "short" else full).items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
+    return options
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What every measurement needs."""
+
+    options: argparse.Namespace
+    display: Display
+    server: ServerProcess
+    folder: Path
+    results: Results
+
+
+@dataclass(frozen=True)
+class Task:
+    """One measurement: its key and how many, what it is in words, and how it is taken."""
+
+    key: tuple[str, ...]
+    count: int
+    sentence: str
+    take: Callable[[Bench], None]
 
 
 def main() -> None:
@@ -50,7 +93,7 @@ def main() -> None:
     missing = missing_here() or ", ".join(f"no {name} here" for name in options.browsers if not program(name))
     if missing:
         sys.exit(f"error: {missing}")
-    rows: list[Row] = []
+    results = Results(options.results, options.again)
     with tempfile.TemporaryDirectory(prefix="palpebra-scope-") as made:
         folder = Path(made)
         (folder / "display").mkdir()
@@ -59,47 +102,94 @@ def main() -> None:
             with Display(folder / "display", not options.ordinary_display) as display:
                 server.start()
                 print(f"display {display.name}, real-time priority: {'yes' if display.scan_out else 'no'}")
-                _measure_all(options, display, server, folder, rows)
+                _take_all(Bench(options, display, server, folder, results))
         finally:
             server.stop()
-    _print(rows)
-    if options.json:
-        options.json.write_text(json.dumps(as_json(rows)), encoding="utf-8")
+    _print(results)
 
 
-def _measure_all(
-    options: argparse.Namespace, display: Display, server: ServerProcess, folder: Path, rows: list[Row]
-) -> None:
-    planned = [
-        (browser, fps, CONDITIONS[name])
-        for browser in options.browsers
-        for name in options.conditions
-        for fps in options.rates
-        if browser in CONDITIONS[name].browsers
-    ]
-    for number, (browser, fps, condition) in enumerate(planned, start=1):
-        print(
-            f"[{number}/{len(planned)}] {browser}, {fps} fps, {condition.name}: {condition.sentence}",
-            flush=True,
-        )
+def _take_all(bench: Bench) -> None:
+    tasks = _tasks(bench.options)
+    for number, task in enumerate(tasks, start=1):
+        if bench.results.has(task.key, task.count):
+            print(f"[{number}/{len(tasks)}] {task.sentence}: in {bench.results.path} already", flush=True)
+            continue
+        print(f"[{number}/{len(tasks)}] {task.sentence}", flush=True)
         try:
-            row = measure(
-                display, server, folder, browser, fps, condition, options.plays, options.before_others
-            )
+            task.take(bench)
         except (RuntimeError, ValueError) as error:
             print(f"    not measured: {error}", flush=True)
-            continue
-        rows.append(row)
+
+
+def _tasks(options: argparse.Namespace) -> list[Task]:
+    every = options.what in ("all", "short")
+    tasks: list[Task] = []
+    for browser in options.browsers:
+        if every or options.what == "views":
+            tasks.append(_view_task(browser, options.tries))
+        if every or options.what == "pairs":
+            tasks += [_pair_task(browser, fps, options.pairs) for fps in PAIR_RATES]
+        if every or options.what == "rows":
+            names = [name for name in options.conditions if browser in CONDITIONS[name].browsers]
+            tasks += [_row_task(browser, fps, name, options.plays) for name in names for fps in options.rates]
+    return tasks
+
+
+def _row_task(browser: str, fps: int, name: str, plays: int) -> Task:
+    condition = CONDITIONS[name]
+    key = ("row", browser, str(fps), name)
+
+    def take(bench: Bench) -> None:
+        row = measure(
+            bench.display,
+            bench.server,
+            bench.folder,
+            browser,
+            fps,
+            condition,
+            plays,
+            bench.options.before_others,
+        )
+        line = cells(row)
+        bench.results.add(key, plays, line, asdict(row))
         print(
-            "    "
-            + ", ".join(f"{head}: {cell}" for head, cell in zip(HEADER[3:], cells(row)[3:], strict=True)),
+            "    " + ", ".join(f"{head}: {cell}" for head, cell in zip(HEADER[3:], line[3:], strict=True)),
             flush=True,
         )
 
+    return Task(key, plays, f"{browser}, {fps} fps, {name}: {condition.sentence}", take)
 
-def _print(rows: list[Row]) -> None:
+
+def _view_task(browser: str, tries: int) -> Task:
+    key = ("views", browser)
+
+    def take(bench: Bench) -> None:
+        count = count_views(bench.display, bench.server, bench.folder, browser, tries)
+        bench.results.add(key, tries, [count.line()], asdict(count))
+        print(f"    {count.line()}", flush=True)
+
+    return Task(key, tries, f"{browser}, views stored against views seen", take)
+
+
+def _pair_task(browser: str, fps: int, pairs: int) -> Task:
+    key = ("pairs", browser, str(fps))
+
+    def take(bench: Bench) -> None:
+        row = measure_pairs(bench.display, bench.server, bench.folder, browser, fps, pairs)
+        bench.results.add(key, pairs, [row.line()], asdict(row))
+        print(f"    {row.line()}", flush=True)
+
+    return Task(key, pairs, f"{browser}, {fps} fps, two clips on one canvas", take)
+
+
+def _print(results: Results) -> None:
     print(f"\nOne refresh is {REFRESH_MS:.1f} ms. Figures hold up to the frame buffer, not to the monitor.\n")
-    print(markdown(rows))
+    rows = results.of("row")
+    if rows:
+        print(markdown([result.cells for result in rows]))
+    for kind in ("views", "pairs"):
+        for result in results.of(kind):
+            print(f"\n{kind} ({result.at}): {result.cells[0]}")
 
 
 if __name__ == "__main__":

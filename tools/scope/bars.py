@@ -29,11 +29,11 @@ def pattern(number: int) -> list[bool]:
     return [True, False, *bits, odd, not odd]
 
 
-def planes(number: int) -> NDArray[np.uint8]:
+def planes(number: int, height_px: int = HEIGHT_PX) -> NDArray[np.uint8]:
     """The frame as 4:2:0 planes, uint8 (height * 3 / 2, width)."""
-    picture = np.full((HEIGHT_PX * 3 // 2, WIDTH_PX), GREY_CHROMA, np.uint8)
+    picture = np.full((height_px * 3 // 2, WIDTH_PX), GREY_CHROMA, np.uint8)
     luma = [WHITE_LUMA if white else BLACK_LUMA for white in pattern(number)]
-    picture[:HEIGHT_PX] = np.repeat(np.array(luma, np.uint8), BAR_PX)
+    picture[:height_px] = np.repeat(np.array(luma, np.uint8), BAR_PX)
     return picture
 
 

@@ -50,9 +50,9 @@ debrief = "Thanks."
 """
 
 
-def frames_at(fps: int) -> int:
+def frames_at(fps: int, seconds: float = CLIP_S) -> int:
     """How many frames a clip of that rate has."""
-    return min(bars.MAX_FRAMES, round(CLIP_S * fps))
+    return min(bars.MAX_FRAMES, round(seconds * fps))
 
 
 def declaration(name: str, fps: int, plays: int) -> str:
@@ -61,11 +61,13 @@ def declaration(name: str, fps: int, plays: int) -> str:
     return DECLARATION.format(name=name, fps=fps, per_cell=per_cell, repeats=-(-plays // per_cell))
 
 
-def make_clip_folder(text: str, folder: Path, fps: int) -> None:
+def make_clip_folder(
+    text: str, folder: Path, fps: int, height_px: int = bars.HEIGHT_PX, seconds: float = CLIP_S
+) -> None:
     """Write the declared clips and their manifest, as `stimuli build` does."""
     experiment = parse_experiment(text)
     folder.mkdir(parents=True, exist_ok=True)
-    clips = [_clip(folder, spec, fps) for spec in design.clips(experiment)]
+    clips = [_clip(folder, spec, fps, height_px, seconds) for spec in design.clips(experiment)]
     manifest = Manifest(
         experiment=experiment.name,
         definition_sha256=definition_sha256(experiment),
@@ -77,10 +79,10 @@ def make_clip_folder(text: str, folder: Path, fps: int) -> None:
     (folder / MANIFEST_NAME).write_text(json.dumps(manifest.model_dump(mode="json")), encoding="utf-8")
 
 
-def _clip(folder: Path, spec: design.ClipSpec, fps: int) -> Clip:
+def _clip(folder: Path, spec: design.ClipSpec, fps: int, height_px: int, seconds: float) -> Clip:
     # A box that players skip makes each file one of its own.
     own = f"{spec.cell}/{spec.exemplar}".encode()
-    data = bar_video(fps) + (len(own) + BOX_HEAD_BYTES).to_bytes(4, "big") + b"free" + own
+    data = bar_video(fps, height_px, seconds) + (len(own) + BOX_HEAD_BYTES).to_bytes(4, "big") + b"free" + own
     sha256 = hashlib.sha256(data).hexdigest()
     (folder / f"{sha256[:16]}.mp4").write_bytes(data)
     return Clip(
@@ -91,16 +93,16 @@ def _clip(folder: Path, spec: design.ClipSpec, fps: int) -> Clip:
         sha256=sha256,
         bytes=len(data),
         fps=fps,
-        frames=frames_at(fps),
+        frames=frames_at(fps, seconds),
         width_px=bars.WIDTH_PX,
-        height_px=bars.HEIGHT_PX,
+        height_px=height_px,
         width_mm=128.0,
         profile="bars",
     )
 
 
 @cache
-def bar_video(fps: int) -> bytes:
+def bar_video(fps: int, height_px: int, seconds: float) -> bytes:
     """The bars as H.264 in MP4."""
-    pictures = (bars.planes(number) for number in range(frames_at(fps)))
-    return encode_clip(pictures, (bars.WIDTH_PX, bars.HEIGHT_PX), fps)
+    pictures = (bars.planes(number, height_px) for number in range(frames_at(fps, seconds)))
+    return encode_clip(pictures, (bars.WIDTH_PX, height_px), fps)

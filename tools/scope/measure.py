@@ -27,7 +27,10 @@ AFTER_CLIP_S = 0.25
 
 @dataclass(frozen=True)
 class Row:
-    """lost: plays whose clip was never seen on the screen. load: the machine's, over the last minute."""
+    """lost: plays whose clip was never seen on the screen. load: the machine's, over the last minute.
+
+    blind_ms, blind_share: the poller's own longest hold-up, and the share of its time that hold-ups took.
+    """
 
     browser: str
     version: str
@@ -38,6 +41,13 @@ class Row:
     polls_per_s: float
     real_time: bool
     load: float
+    blind_ms: float
+    blind_share: float
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What the row is of."""
+        return ("row", self.browser, str(self.fps), self.condition)
 
 
 def measure(
@@ -78,7 +88,14 @@ def measure(
         rate,
         log["real_time"],
         os.getloadavg()[0],
+        *blind(log),
     )
+
+
+def blind(log: dict[str, Any]) -> tuple[float, float]:
+    """The poller's longest hold-up (ms), and the share of its time in which it was held up."""
+    held_up = [end - start for start, end in log["held_up"]]
+    return max(held_up, default=0.0), sum(held_up) / max(1000 * log["seconds"], 1e-9)
 
 
 def _one_play(display: Display, driver: Browser) -> float:

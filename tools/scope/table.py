@@ -1,9 +1,7 @@
-"""The rows as a table for people, as Markdown for docs/participant.md, and as JSON for a closer look."""
+"""The rows as a table for people: Markdown, as in docs/participant.md."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from statistics import median, quantiles
-from typing import Any
 
 from tools.scope.compare import Play
 from tools.scope.measure import Row
@@ -11,7 +9,7 @@ from tools.scope.measure import Row
 HEADER = (
     "browser", "fps", "condition", "plays", "not measured", "good", "good, yet off or a frame not shown",
     "right", "right, called otherwise", "worst off (ms)", "key to first pixel, median (95%) (ms)",
-    "record's bias (ms)", "polls a second", "load",
+    "record's bias (ms)", "polls a second", "poller blind, longest (ms), share", "load",
 )  # fmt: skip
 
 
@@ -36,6 +34,7 @@ def cells(row: Row) -> list[str]:
         _median_and_95([play.key_to_pixel_ms for play in plays]),
         _median_and_95([_bias(play) for play in plays if play.record.key_to_first_frame_ms is not None]),
         f"{row.polls_per_s:.0f}" + ("" if row.real_time else " (ordinary priority)"),
+        f"{row.blind_ms:.0f}, {100 * row.blind_share:.1f}%",
         f"{row.load:.1f}",
     ]
 
@@ -54,11 +53,7 @@ def _median_and_95(values: Sequence[float]) -> str:
     return f"{median(values):.0f} ({quantiles(values, n=20, method='inclusive')[-1]:.0f})"
 
 
-def markdown(rows: Sequence[Row]) -> str:
-    lines = [HEADER, tuple("---" for _ in HEADER), *(cells(row) for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def as_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Everything, play by play."""
-    return [asdict(row) for row in rows]
+def markdown(lines: Sequence[Sequence[str]]) -> str:
+    """Lines of cells under the header."""
+    table = [HEADER, tuple("---" for _ in HEADER), *lines]
+    return "\n".join(f"| {' | '.join(line)} |" for line in table)

@@ -1,6 +1,9 @@
 // A headed browser for tools/scope: node driver.mjs chromium|firefox PROGRAM, then one JSON command a line.
 // The page goes through consent and texts by itself whenever its state is asked for.
 import { createInterface } from "node:readline";
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import puppeteer from "puppeteer-core";
 
 const [name, program] = process.argv.slice(2);
@@ -23,8 +26,38 @@ const options = {
   firefox: { browser: "firefox", executablePath: program, args: [`--width=${SIZE[0]}`, `--height=${SIZE[1]}`] },
 };
 
-const browser = await puppeteer.launch({ ...options[name], headless: false, defaultViewport: null });
-const page = (await browser.pages())[0] ?? (await browser.newPage());
+const profiles = [];
+let browser, page;
+
+async function launch(userDataDir) {
+  browser = await puppeteer.launch({ ...options[name], userDataDir, headless: false, defaultViewport: null });
+  page = (await browser.pages())[0] ?? (await browser.newPage());
+}
+
+/** A browser that has never been here, as another device is. */
+async function launchAnew() {
+  profiles.push(await mkdtemp(join(tmpdir(), "palpebra-scope-")));
+  await launch(profiles.at(-1));
+}
+
+/** End the browser as a crash does, and come back with the same profile. */
+async function kill() {
+  const process = browser.process();
+  const gone = new Promise((resolve) => process.once("exit", resolve));
+  process.kill("SIGKILL");
+  await gone;
+  await launch(profiles.at(-1));
+}
+
+/** Another browser takes over while the first one still shows its page. */
+async function move(address) {
+  const first = browser;
+  await launchAnew();
+  await page.goto(address);
+  await first.close();
+}
+
+await launchAnew();
 
 function step() {
   const see = (selector) => document.querySelector(selector);
@@ -56,6 +89,12 @@ function block(busy_ms, every_ms) {
 
 const commands = {
   open: ({ address }) => page.goto(address).then(() => true),
+  reload: () => page.reload().then(() => true),
+  kill: ({ address }) =>
+    kill()
+      .then(() => page.goto(address))
+      .then(() => true),
+  move: ({ address }) => move(address).then(() => true),
   state: () => page.evaluate(step).catch((error) => `between pages (${error.message.slice(0, 60)})`),
   area: () => page.evaluate(clipArea),
   throttle: ({ rate }) => page.emulateCPUThrottling(rate).then(() => true),
@@ -72,3 +111,4 @@ for await (const line of createInterface({ input: process.stdin })) {
   );
 }
 await browser.close();
+for (const profile of profiles) await rm(profile, { recursive: true, force: true, maxRetries: 5 });

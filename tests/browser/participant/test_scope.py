@@ -1,4 +1,4 @@
-"""The short form of `make scope`: the record against the frame buffer, on a few plays in each browser."""
+"""The short form of `make scope`: records against the frame buffer, on a few plays in each browser."""
 
 import logging
 import os
@@ -12,34 +12,42 @@ from tools.scope.browser import program
 from tools.scope.conditions import CONDITIONS
 from tools.scope.display import Display, missing_here
 from tools.scope.measure import measure
+from tools.scope.pairs import APART_MS, measure_pairs
 from tools.scope.table import cells
+from tools.scope.views import count_views
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 LOG = logging.getLogger(__name__)
 PLAYS, FPS = 4, 30
+TRIES, PAIRS = 5, 3
 
 
-@pytest.fixture
-def display(tmp_path: Path) -> Iterator[Display]:
+@pytest.fixture(scope="module")
+def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Display]:
     """A display of its own."""
     missing = missing_here()
     if missing:
         pytest.skip(missing)
-    folder = tmp_path / "display"
-    folder.mkdir()
-    with Display(folder) as opened:
+    with Display(tmp_path_factory.mktemp("display")) as opened:
         yield opened
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[ServerProcess]:
+    """One server; the bench takes in its studies itself."""
+    server = ServerProcess(tmp_path_factory.mktemp("scope") / "data")
+    yield server.start()
+    server.stop()
 
 
 @pytest.mark.parametrize("browser", ["chromium", pytest.param("firefox", marks=pytest.mark.firefox)])
 def test_what_is_recorded_was_on_the_screen(
-    display: Display, server: ServerProcess, tmp_path: Path, browser: str
+    display: Display, running: ServerProcess, tmp_path: Path, browser: str
 ) -> None:
     if program(browser) is None:
         pytest.skip(f"no {browser} here: run `make setup-test`")
     before_others = os.geteuid() == 0
-    server.start()
-    row = measure(display, server, tmp_path, browser, FPS, CONDITIONS["idle"], PLAYS, before_others)
+    row = measure(display, running, tmp_path, browser, FPS, CONDITIONS["idle"], PLAYS, before_others)
     LOG.info("%s", cells(row))
     assert row.lost == 0
     measured = [play for play in row.plays if play.is_measured]
@@ -51,3 +59,27 @@ def test_what_is_recorded_was_on_the_screen(
     if os.getloadavg()[0] <= (os.cpu_count() or 1):
         assert len(right) == len(measured)
         assert not any(play.is_off for play in measured)
+
+
+def test_as_many_views_are_stored_as_were_on_the_screen(
+    display: Display, running: ServerProcess, tmp_path: Path
+) -> None:
+    if program("chromium") is None:
+        pytest.skip("no chromium here: run `make setup-test`")
+    count = count_views(display, running, tmp_path, "chromium", TRIES)
+    LOG.info("%s", count.line())
+    assert count.is_right, count.line()
+    assert set(count.stored) <= {"shown", "interrupted"}
+
+
+def test_two_clips_on_one_canvas_are_never_a_frame_apart(
+    display: Display, running: ServerProcess, tmp_path: Path
+) -> None:
+    if program("chromium") is None:
+        pytest.skip("no chromium here: run `make setup-test`")
+    row = measure_pairs(display, running, tmp_path, "chromium", FPS, PAIRS)
+    LOG.info("%s", row.line())
+    assert row.seen == PAIRS
+    assert row.differing_records == 0
+    # What lay between two looks at the screen is not known: the looks may be that far apart.
+    assert row.apart == 0 or row.blind_ms > APART_MS
