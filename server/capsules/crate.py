@@ -92,11 +92,11 @@ def _add_action(crate: ROCrate, by_path: dict[str, Any], report: ReportSource, s
         crate,
         f"#{PROGRAM}",
         properties={
-            "@type": "SoftwareSourceCode",
+            "@type": "CreativeWork",
             "name": PROGRAM,
             "version": software.packages.get(PROGRAM, "unknown"),
-            "runtimePlatform": f"Python {software.python} on {software.system}",
-            "description": "Versions of all packages are in documentation/software.json",
+            "description": f"Run by Python {software.python} on {software.system}; versions of "
+            "all packages are in documentation/software.json",
         },
     )
     results = [entity for path, entity in by_path.items() if path.startswith("results/")]
