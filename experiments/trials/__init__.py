@@ -6,11 +6,14 @@ A new kind is a folder here, its line in `KINDS`, and a file or folder of its na
 
 from experiments.columns.view import View
 from experiments.trials.clip_rating import CLIP_RATING
+from experiments.trials.continuous_rating import CONTINUOUS_RATING
 from experiments.trials.kind import Kind
 from experiments.trials.paired_comparison import PAIRED_COMPARISON
 from experiments.trials.threshold import THRESHOLD
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (CLIP_RATING, PAIRED_COMPARISON, THRESHOLD)}
+KINDS: dict[str, Kind] = {
+    kind.name: kind for kind in (CLIP_RATING, PAIRED_COMPARISON, THRESHOLD, CONTINUOUS_RATING)
+}
 """Every kind by the name that a TOML gives it; the first is meant where none is given."""
 
 

@@ -52,6 +52,7 @@ class Base(DeclarativeBase):
         dict[str, str]: JSON(none_as_null=True),
         dict[str, int]: JSON(none_as_null=True),
         list[str]: JSON(none_as_null=True),
+        list[float]: JSON(none_as_null=True),
         list[dict[str, Any]]: JSON(none_as_null=True),
         list[list[float]]: JSON(none_as_null=True),
     }

@@ -89,7 +89,10 @@ class Clip(Base):
 
 
 class VersionClip(Base):
-    """A clip's place in a study version: its cell, levels and exemplar."""
+    """A clip's place in a study version: its cell, levels and exemplar.
+
+    blinks_s: onsets of the blinks of a performance in s; None for other clips.
+    """
 
     __tablename__ = "version_clips"
     __table_args__ = (UniqueConstraint("version_id", "cell", "exemplar"),)
@@ -103,6 +106,7 @@ class VersionClip(Base):
     profile_id: Mapped[str] = mapped_column(String(200), default="")
     file: Mapped[str] = mapped_column(String(200))
     width_mm: Mapped[float | None]
+    blinks_s: Mapped[list[float] | None]
 
     version: Mapped[StudyVersion] = relationship(back_populates="clips")
     clip: Mapped[Clip] = relationship()

@@ -126,9 +126,10 @@ def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Ca
     """A link whose runs are simulated, and the maker of raters, who know the levels of each clip."""
     with services.database.write() as session:
         study = find_study(session, name)
-        query = select(VersionClip.clip_sha256, VersionClip.levels)
+        query = select(VersionClip.clip_sha256, VersionClip.levels, VersionClip.blinks_s)
         version = active_version(session, study)
-        rows = session.execute(query.where(VersionClip.version_id == version.id))
+        rows = session.execute(query.where(VersionClip.version_id == version.id)).all()
+        blinks: dict[str, list[float]] = {row.clip_sha256: row.blinks_s or [] for row in rows}
         levels: dict[str, dict[str, str]] = {row.clip_sha256: row.levels for row in rows}
         link = create_link(
             session, services.settings.key, study, "general", label="simulation", synthetic=True
@@ -139,7 +140,7 @@ def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Ca
         elif observed:
             raise InputError(f"--observer: expected a study of thresholds, got {experiment.trial.kind}")
         token = derived_token(services.settings.key, PURPOSE, link.public_id)
-    return token, lambda number, seed: Rater(number, seed, levels, observer)
+    return token, lambda number, seed: Rater(number, seed, levels, observer, blinks)
 
 
 def _one(address: str, token: str, rater: Rater) -> int:

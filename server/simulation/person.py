@@ -3,7 +3,7 @@
 import hashlib
 import random
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -27,6 +27,7 @@ class Rater:
     seed: of this person. effects_seed: of the effects, shared by all people of a simulation.
     levels_of: levels of each clip by its hash; a real participant never learns them, so the effects are
     put in from outside. observer: their psychometric function, in a study of thresholds.
+    blinks_of: onsets of the blinks of each performance by the clip's hash, in s.
     """
 
     def __init__(
@@ -35,7 +36,9 @@ class Rater:
         effects_seed: int,
         levels_of: Mapping[str, Mapping[str, str]],
         observer: Observer | None = None,
+        blinks_of: Mapping[str, Sequence[float]] | None = None,
     ) -> None:
+        self.blinks_of = blinks_of or {}
         self.seed, self.effects_seed, self.levels_of = seed, effects_seed, levels_of
         self.rng = random.Random(f"{effects_seed}/person/{seed}")
         self.shift = self.rng.gauss(0, PERSON_SD)
@@ -49,6 +52,10 @@ class Rater:
     def sees(self, clip: str) -> float:
         """How likely this person says yes to a clip, or names it rightly; a guess without an observer."""
         return self.observer.sees(clip) if self.observer else 0.5
+
+    def blinks(self, clip: str) -> Sequence[float]:
+        """When the blinks of a clip's performance begin."""
+        return self.blinks_of.get(clip, ())
 
     def likes(self, clip: str) -> float:
         """How well this person likes a clip: effects of levels and exemplar, and the person's own shift."""

@@ -118,5 +118,6 @@ def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> N
                 profile_id=clip.profile,
                 file=clip.file,
                 width_mm=clip.width_mm,
+                blinks_s=list(clip.blinks_s) or None,
             )
         )

@@ -126,10 +126,11 @@ def add_study(
     status: str = "live",
     frames: int = 4,
     clip_bytes: int = 0,
+    blinks_s: tuple[float, ...] = (),
 ) -> StudyInDatabase:
     """Make tiny clips for a declaration (at least `clip_bytes` each), and take both in."""
     experiment = parse_experiment(text)
-    manifest = make_clip_folder(experiment, folder, frames=frames, clip_bytes=clip_bytes)
+    manifest = make_clip_folder(experiment, folder, frames=frames, clip_bytes=clip_bytes, blinks_s=blinks_s)
     store_clips(services.clips, manifest, folder)
     with services.database.write() as session:
         study = create_study(session, name or experiment.name, experiment, None)

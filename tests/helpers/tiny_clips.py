@@ -27,6 +27,7 @@ def make_clip_folder(
     fps: int = 30,
     clip_bytes: int = 0,
     size_px: tuple[int, int] = (256, 96),
+    blinks_s: tuple[float, ...] = (),
 ) -> Manifest:
     """One playable mp4 for each clip of the design, of at least `clip_bytes`, and their manifest."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -52,6 +53,7 @@ def make_clip_folder(
                 height_px=size_px[1],
                 width_mm=120.0,
                 profile=f"blink{spec.exemplar:02d}",
+                blinks_s=blinks_s,
             )
         )
     manifest = Manifest(

@@ -2239,6 +2239,113 @@ export interface components {
             agreed: boolean;
         };
         /**
+         * ContinuousAnswer
+         * @description The answer; no values where the clip could not be shown.
+         *
+         *     values: the slider's place at frames 0, `step_frames`, 2 `step_frames` and so on. moves: how often it
+         *     began to move. chosen: the number given to an attention check, which has no clip.
+         */
+        ContinuousAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "continuous_rating";
+            /** Values */
+            values?: number[] | null;
+            /** Step Frames */
+            step_frames?: number | null;
+            /**
+             * Moves
+             * @default 0
+             */
+            moves?: number;
+            /** Chosen */
+            chosen?: number | null;
+        };
+        /**
+         * ContinuousRating
+         * @description A slider that is moved while the clip is shown; its place is sampled at frames of the clip.
+         */
+        ContinuousRating: {
+            /**
+             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "continuous_rating";
+            /**
+             * Expected Seconds
+             * @description Seconds a trial takes on average, from which the length of a visit is reckoned.
+             * @default 6
+             */
+            expected_seconds: number;
+            /**
+             * Question
+             * @description What is asked, in every language.
+             */
+            question: {
+                [key: string]: string;
+            };
+            /**
+             * Low
+             * @description Label of the low end.
+             */
+            low: {
+                [key: string]: string;
+            };
+            /**
+             * High
+             * @description Label of the high end.
+             */
+            high: {
+                [key: string]: string;
+            };
+            /**
+             * Minimum
+             * @description The number at the low end.
+             * @default 0
+             */
+            minimum: number;
+            /**
+             * Maximum
+             * @description The number at the high end.
+             * @default 100
+             */
+            maximum: number;
+            /**
+             * Input
+             * @description Moved by pointer or arrow keys a step a press (`slider`), or also by holding an arrow key, which
+             *     moves it evenly (`keys`).
+             * @default slider
+             * @enum {string}
+             */
+            input: "slider" | "keys";
+            /**
+             * Seconds Across
+             * @description Time that a held key takes from end to end, in seconds; with `input = "keys"`.
+             * @default 3
+             */
+            seconds_across: number;
+            /**
+             * Sample Hz
+             * @description Samples a second of the clip: its place when every so manyth frame is drawn.
+             * @default 10
+             */
+            sample_hz: number;
+            /**
+             * Max Lag S
+             * @description Longest lag of ratings behind what they answer that the analysis looks for, in seconds.
+             * @default 3
+             */
+            max_lag_s: number;
+            /**
+             * Pointer Delay Ms
+             * @description Time, in ms, for which a mouse that has not moved since its last press starts nothing.
+             * @default 1500
+             */
+            pointer_delay_ms: number;
+        };
+        /**
          * Creator
          * @description A person or an institution that made the data.
          */
@@ -2901,7 +3008,7 @@ export interface components {
              * Trial
              * @description What one trial shows and asks, by its kind.
              */
-            trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"] | components["schemas"]["Threshold"];
+            trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"] | components["schemas"]["Threshold"] | components["schemas"]["ContinuousRating"];
             /**
              * @description Size and surround of the clip, and what the device must offer.
              * @default {
@@ -4688,7 +4795,7 @@ export interface components {
              */
             play?: number;
             /** Answer */
-            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"];
+            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"] | components["schemas"]["ContinuousAnswer"];
             /**
              * Rt
              * @description From the clip's last frame to the answer, ms.
@@ -5338,7 +5445,7 @@ export interface components {
             /** Forms */
             forms: components["schemas"]["Form"][];
             /** Trial */
-            trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"];
+            trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"] | components["schemas"]["ShownContinuousRating"];
             display: components["schemas"]["Display"];
             playback: components["schemas"]["PlaybackRules"];
             /** Break Seconds Min */
@@ -5838,6 +5945,47 @@ export interface components {
             first?: components["schemas"]["ShownClip"] | null;
             second?: components["schemas"]["ShownClip"] | null;
             reference?: components["schemas"]["ShownClip"] | null;
+        };
+        /**
+         * ShownContinuousRating
+         * @description The declared continuous rating as the page gets it.
+         */
+        ShownContinuousRating: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "continuous_rating";
+            /** Question */
+            question: {
+                [key: string]: string;
+            };
+            /** Low */
+            low: {
+                [key: string]: string;
+            };
+            /** High */
+            high: {
+                [key: string]: string;
+            };
+            /** Minimum */
+            minimum: number;
+            /** Maximum */
+            maximum: number;
+            /**
+             * Input
+             * @enum {string}
+             */
+            input: "slider" | "keys";
+            /** Seconds Across */
+            seconds_across: number;
+            /** Sample Hz */
+            sample_hz: number;
+            /** Pointer Delay Ms */
+            pointer_delay_ms: number;
+            check_scale: components["schemas"]["Points"];
+            /** Expected Seconds */
+            expected_seconds: number;
         };
         /**
          * ShownPairedComparison
@@ -7223,6 +7371,8 @@ export type Completion = components['schemas']['Completion'];
 export type ConfirmCode = components['schemas']['ConfirmCode'];
 export type ConfirmPassword = components['schemas']['ConfirmPassword'];
 export type Consent = components['schemas']['Consent'];
+export type ContinuousAnswer = components['schemas']['ContinuousAnswer'];
+export type ContinuousRating = components['schemas']['ContinuousRating'];
 export type Creator = components['schemas']['Creator'];
 export type Dataset = components['schemas']['Dataset'];
 export type Declaration = components['schemas']['Declaration'];
@@ -7353,6 +7503,7 @@ export type ShownAnswer = components['schemas']['ShownAnswer'];
 export type ShownClip = components['schemas']['ShownClip'];
 export type ShownClipRating = components['schemas']['ShownClipRating'];
 export type ShownClips = components['schemas']['ShownClips'];
+export type ShownContinuousRating = components['schemas']['ShownContinuousRating'];
 export type ShownPairedComparison = components['schemas']['ShownPairedComparison'];
 export type ShownReference = components['schemas']['ShownReference'];
 export type ShownThreshold = components['schemas']['ShownThreshold'];

@@ -4,7 +4,7 @@ Nothing else joins them: the name in the declaration finds the file.
 """
 
 import random
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args
@@ -30,6 +30,9 @@ class Preference(Protocol):
 
     def sees(self, clip: str, /) -> float:
         """How likely they say yes to it, or name it rightly: their psychometric function."""
+
+    def blinks(self, clip: str, /) -> Sequence[float]:
+        """When the blinks of its performance begin, in s; none of other clips."""
 
 
 def asked_in(prompt: str) -> int:

@@ -1,0 +1,96 @@
+"""The analysis of continuous ratings: mean traces, and how ratings follow the blinks of the clips."""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.plans.plan import Plan
+from analysis.plans.prepare import Prepared, where
+from analysis.read.reading import Reading
+from analysis.report.contents import Contents
+from analysis.traces.lag import ClipTraces, MeanTrace, lag_of, mean_trace
+from experiments import design
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.trials.continuous_rating.columns import TRACES
+from experiments.trials.continuous_rating.declaration import ContinuousRating, continuous_rating_of
+
+READING = Reading(
+    TRACES,
+    texts=("cell", "clip_sha256", "trace", "blinks_s"),
+    numbers=("response", "step_frames", "clip_fps"),
+)
+
+
+def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
+    """Refuse a trace that is no list of numbers within the declared range."""
+    trial = continuous_rating_of(experiment)
+    for position, text in enumerate(rows["trace"].astype(str)):
+        if text in ("", "nan") or _is_trace(text, trial):
+            continue
+        raise InputError(
+            f"{source}: {where(rows, position)}: expected a trace of numbers from {trial.minimum:g} to "
+            f"{trial.maximum:g} as a JSON list, got {text[:40]}"
+        )
+
+
+def _is_trace(text: str, trial: ContinuousRating) -> bool:
+    try:
+        values = np.asarray(json.loads(text), dtype=float)
+    except (ValueError, TypeError):
+        return False
+    return (
+        values.ndim == 1
+        and values.size > 0
+        and bool(((values >= trial.minimum) & (values <= trial.maximum)).all())
+    )
+
+
+def analyse(prepared: Prepared) -> Contents:
+    """Mean traces of the cells, and the lag behind blinks."""
+    from analysis.report.trace_contents import contents_of
+
+    clips = clips_of(prepared)
+    lag = lag_of(clips, continuous_rating_of(prepared.experiment).max_lag_s)
+    return contents_of(prepared, cell_traces(prepared.experiment, clips), lag, len(clips))
+
+
+def clips_of(prepared: Prepared) -> list[ClipTraces]:
+    """The traces of each clip; a clip shown to a person twice counts by its last play."""
+    clips = []
+    rows = prepared.rows
+    rates = rows["clip_fps"].to_numpy(dtype=float) / rows["step_frames"].to_numpy(dtype=float)
+    if len(np.unique(np.round(rates[np.isfinite(rates)], 6))) > 1:
+        raise InputError(
+            f"{prepared.source}: expected traces of one sampling rate, got several; analyse clips of one "
+            "frame rate at a time"
+        )
+    for (cell, clip), mine in rows.assign(rate_hz=rates).groupby(["cell", "clip_sha256"], observed=True):
+        traces = {
+            str(who): json.loads(str(text))
+            for who, text in zip(mine["participant"], mine["trace"], strict=True)
+            if str(text) not in ("", "nan")
+        }
+        if not traces:
+            continue
+        samples = min(map(len, traces.values()))
+        blinks = str(mine["blinks_s"].iloc[0])
+        events = tuple(json.loads(blinks)) if blinks.startswith("[") else ()
+        values = np.array([trace[:samples] for trace in traces.values()], dtype=float)
+        rate = float(mine["rate_hz"].iloc[0])
+        clips.append(ClipTraces(str(clip), str(cell), rate, events, tuple(traces), values))
+    if not clips:
+        raise InputError(f"{prepared.source}: no trial has a trace; nothing to analyse")
+    return clips
+
+
+def cell_traces(experiment: Experiment, clips: Sequence[ClipTraces]) -> tuple[MeanTrace, ...]:
+    """The mean trace of every cell that has one, in declared order."""
+    order = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
+    groups = [[clip for clip in clips if clip.cell == name] for name in order]
+    return tuple(mean_trace(group) for group in groups if group)
+
+
+PLAN = Plan(READING, check, analyse)

@@ -1,0 +1,196 @@
+"""How far continuous ratings lag behind events, and how strongly they answer them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+RESAMPLES, SHIFTS = 1000, 999
+
+
+@dataclass(frozen=True, eq=False)
+class ClipTraces:
+    """The traces of one clip.
+
+    Attributes
+    ----------
+    clip, cell : str
+    rate_hz : float
+        Samples a second.
+    events_s : tuple of float
+        When its events are, in s from the first sample.
+    people : tuple of str
+        Whose trace each row is.
+    values : float64 array (people, samples)
+    """
+
+    clip: str
+    cell: str
+    rate_hz: float
+    events_s: tuple[float, ...]
+    people: tuple[str, ...]
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LagResult:
+    """Correlation of the ratings' change with events, by lag.
+
+    Attributes
+    ----------
+    lags_s : float64 array (n,)
+    mean, ci_low, ci_high : float64 array (n,)
+        Over people, with 95% t intervals.
+    lag_s : float
+        Where `mean` is greatest; `lag_low_s` and `lag_high_s` are the 2.5 and 97.5 percentiles of that place
+        when people are drawn again with replacement.
+    r, p : float
+        `mean` there, and its probability where events fall anywhere: by random circular shifts of each clip's
+        events, the greatest over lags against the greatest.
+    """
+
+    lags_s: Array
+    mean: Array
+    ci_low: Array
+    ci_high: Array
+    lag_s: float
+    lag_low_s: float
+    lag_high_s: float
+    r: float
+    p: float
+    people: int
+
+
+def event_train(events_s: Sequence[float], samples: int, rate_hz: float) -> Array:
+    """(samples,) number of events in each sample's interval; an event belongs to the sample at its end."""
+    train = np.zeros(samples)
+    for time_s in events_s:
+        place = int(np.ceil(time_s * rate_hz - 1e-9))
+        if place < samples:
+            train[place] += 1.0
+    return train
+
+
+def correlogram(values: Array, train: Array) -> Array:
+    """(people, samples) circular cross-correlation of change and events, r(l) = mean_t z_d(t + l) z_e(t).
+
+    d(t) = v(t) - v(t - 1), d(0) = 0; z is standardised over the clip. A constant trace has r = 0.
+    """
+    change = np.diff(values, axis=1, prepend=values[:, :1])
+    spectrum = np.conj(np.fft.rfft(_standard(train[None, :])))
+    together = np.fft.irfft(np.fft.rfft(_standard(change)) * spectrum, n=train.size, axis=1)
+    return np.asarray(together / train.size, np.float64)
+
+
+def _standard(rows: Array) -> Array:
+    spread = rows.std(axis=1, keepdims=True)
+    centred = rows - rows.mean(axis=1, keepdims=True)
+    divided = np.divide(centred, spread, out=np.zeros_like(centred), where=spread > 1e-12)
+    return np.asarray(divided, np.float64)
+
+
+def lag_of(clips: Sequence[ClipTraces], max_lag_s: float, seed: int = 0) -> LagResult | None:
+    """Find the lag at which ratings change most after events; None without events or with one person.
+
+    Each person's correlations are averaged over their clips that have events, then over people.
+    """
+    eventful = [clip for clip in clips if clip.events_s and clip.values.shape[1] > 2]
+    people = sorted({who for clip in eventful for who in clip.people})
+    if len(people) < 2:
+        return None
+    rate = eventful[0].rate_hz
+    lags = int(min(max_lag_s * rate, min(clip.values.shape[1] for clip in eventful) - 1)) + 1
+    place = {who: index for index, who in enumerate(people)}
+    sums, counts = np.zeros((len(people), lags)), np.zeros(len(people))
+    for clip in eventful:
+        train = event_train(clip.events_s, clip.values.shape[1], clip.rate_hz)
+        rows = [place[who] for who in clip.people]
+        np.add.at(sums, rows, correlogram(clip.values, train)[:, :lags])
+        np.add.at(counts, rows, 1)
+    each: Array = sums / counts[:, None]
+    mean = each.mean(axis=0)
+    half = stats.t.ppf(0.975, len(people) - 1) * each.std(axis=0, ddof=1) / np.sqrt(len(people))
+    rng = np.random.default_rng(seed)
+    drawn = each[rng.integers(len(people), size=(RESAMPLES, len(people)))].mean(axis=1).argmax(axis=1)
+    low, high = np.percentile(drawn, (2.5, 97.5)) / rate
+    best = int(mean.argmax())
+    return LagResult(
+        np.arange(lags) / rate,
+        mean,
+        mean - half,
+        mean + half,
+        best / rate,
+        float(low),
+        float(high),
+        float(mean[best]),
+        _chance(eventful, lags, rng),
+        len(people),
+    )
+
+
+def _chance(clips: Sequence[ClipTraces], lags: int, rng: np.random.Generator) -> float:
+    """How often shifted events correlate as much at their best lag: (1 + times) / (1 + SHIFTS)."""
+    means, weights = [], []
+    for clip in clips:
+        train = event_train(clip.events_s, clip.values.shape[1], clip.rate_hz)
+        means.append(correlogram(clip.values, train).mean(axis=0))
+        weights.append(len(clip.people))
+
+    def greatest(shifts: Sequence[int]) -> float:
+        rows = [np.roll(row, -shift)[:lags] for row, shift in zip(means, shifts, strict=True)]
+        return float(np.average(rows, axis=0, weights=weights).max())
+
+    seen = greatest([0] * len(means))
+    times = sum(
+        greatest([int(rng.integers(row.size)) for row in means]) >= seen - 1e-12 for _ in range(SHIFTS)
+    )
+    return (1 + times) / (1 + SHIFTS)
+
+
+@dataclass(frozen=True, eq=False)
+class MeanTrace:
+    """The mean trace of a cell over people, each person's clips averaged first; 95% t intervals."""
+
+    cell: str
+    times_s: Array
+    mean: Array
+    ci_low: Array
+    ci_high: Array
+    level: float
+    level_low: float
+    level_high: float
+    people: int
+
+
+def mean_trace(clips: Sequence[ClipTraces]) -> MeanTrace:
+    """The mean trace of one cell's clips, as long as the shortest of them."""
+    samples = min(clip.values.shape[1] for clip in clips)
+    of_person: dict[str, list[Array]] = {}
+    for clip in clips:
+        for who, row in zip(clip.people, clip.values, strict=True):
+            of_person.setdefault(who, []).append(row[:samples])
+    rows = np.array([np.mean(traces, axis=0) for traces in of_person.values()])
+    mean, low, high = _interval(rows)
+    level, level_low, level_high = (float(one[0]) for one in _interval(rows.mean(axis=1, keepdims=True)))
+    return MeanTrace(
+        clips[0].cell,
+        np.arange(samples) / clips[0].rate_hz,
+        mean,
+        low,
+        high,
+        level,
+        level_low,
+        level_high,
+        len(rows),
+    )
+
+
+def _interval(rows: Array) -> tuple[Array, Array, Array]:
+    mean = rows.mean(axis=0)
+    if len(rows) < 2:
+        return mean, np.full_like(mean, np.nan), np.full_like(mean, np.nan)
+    half = stats.t.ppf(0.975, len(rows) - 1) * rows.std(axis=0, ddof=1) / np.sqrt(len(rows))
+    return mean, mean - half, mean + half

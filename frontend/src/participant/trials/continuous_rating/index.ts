@@ -1,0 +1,37 @@
+/** The continuous rating as the registry of trial kinds finds it. */
+import type { TrialInfo } from "../../../api/schema";
+import { INT, OBJECT, plugin, type PluginClass, trial } from "../../jspsych";
+import type { Session } from "../../session";
+import type { TrialKind } from "../kind";
+import { placeIn } from "../shared/place";
+import { continuousRating, unrated } from "./screen";
+
+/** What it draws is loaded when a check comes: few studies have one, and no trial waits for it. */
+function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
+  const loaded = () => import("./attention-check");
+  return plugin<{ trial: TrialInfo }, { chosen: number }>({
+    name: "continuous-check",
+    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
+    data: { chosen: { type: INT, description: "the answer given" } },
+    show: async (display, parameters) => (await loaded()).check(session, display, parameters.trial),
+    async simulate(parameters) {
+      const chosen = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? "1");
+      await (await loaded()).store(session, parameters.trial, chosen, 0);
+      return { chosen };
+    },
+    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
+  });
+}
+
+export const kind: TrialKind = {
+  node: (session, what) =>
+    trial(continuousRating(session), {
+      trial: () => what().trial,
+      play: () => what().play,
+      next: () => what().next,
+      number: () => placeIn(session, what().trial).number,
+      total: () => placeIn(session, what().trial).total,
+    }),
+  attention: (session, what) => trial(continuousCheck(session), { trial: () => what().trial }),
+  unrated,
+};
