@@ -107,7 +107,7 @@ async function watch(session: Session, place: Stage, { trial, play, number, tota
     const values = traceOf(track.moves, showing.drawn, showing.frames, showing.fps, step_frames);
     const answer = { values, step_frames, moves: track.started() };
     const body = continuousBody(session, trial, play, answer, playbackRecord(trial.clip_sha256, [showing], session.screen.record()));
-    if (trial.kind === "practice") await procedureFeedback(session, place, [showing], 0);
+    if (trial.kind === "practice") await procedureFeedback(session, place, { trial, play, showings: [showing], rt_ms: 0 });
     return body;
   } finally {
     done();
