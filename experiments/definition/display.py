@@ -23,6 +23,9 @@ class Display(Declaration):
     calibration."""
     viewing_distance: bool = False
     """Adds the blind-spot test, which estimates `viewing_distance_mm` from where a dot vanishes."""
+    right_to_left_scales: Literal["mirrored", "same"] = "mirrored"
+    """Where a language is read from right to left: whether scales run that way too, their lowest point on the
+    right, or stay as in the other languages. Digits answer alike, arrow keys follow what is seen."""
     full_screen: bool = True
     """Asks for full screen before the first trial and again where it was left."""
     background: Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")] = "#808080"

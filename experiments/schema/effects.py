@@ -44,6 +44,7 @@ EFFECTS: Mapping[str, Effect] = {
     "display.calibration_repeats": "wording",
     "display.recheck_size": "wording",
     "display.viewing_distance": "wording",
+    "display.right_to_left_scales": "measured",
     "display.full_screen": "measured",
     "display.background": "measured",
     "display.minimum_width_px": "wording",

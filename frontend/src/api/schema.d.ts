@@ -2501,6 +2501,14 @@ export interface components {
              */
             viewing_distance: boolean;
             /**
+             * Right To Left Scales
+             * @description Where a language is read from right to left: whether scales run that way too, their lowest point on the
+             *     right, or stay as in the other languages. Digits answer alike, arrow keys follow what is seen.
+             * @default mirrored
+             * @enum {string}
+             */
+            right_to_left_scales: "mirrored" | "same";
+            /**
              * Full Screen
              * @description Asks for full screen before the first trial and again where it was left.
              * @default true
@@ -3017,6 +3025,7 @@ export interface components {
              *       "calibration_repeats": 2,
              *       "recheck_size": false,
              *       "viewing_distance": false,
+             *       "right_to_left_scales": "mirrored",
              *       "full_screen": true,
              *       "background": "#808080",
              *       "minimum_width_px": 800,

@@ -3,9 +3,8 @@ import "./style/index.css";
 import type { LinkState, RunStarted, RunState } from "../api/schema";
 import { Refused } from "./request";
 import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Translate } from "../i18n";
-import { setLanguage, setSurround } from "./flow/appearance";
+import { setLanguage, setScales, setSurround } from "./flow/appearance";
 import { fetchFirst } from "./flow/blocks";
-import { ended } from "./flow/ended";
 import { abilities, type Abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
 import { type Kept, KeptVisit } from "./flow/kept-visit";
@@ -22,7 +21,7 @@ import { IndexedDbStore } from "./outbox/indexed-db";
 import { Outbox } from "./outbox/outbox";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
 import { claimTab } from "./screen/one-tab";
-import { AnswersMissing, showCompletion } from "./screens/finish";
+import { AnswersMissing } from "./screens/finish";
 import { emptied, showNotice } from "./screens/notice";
 import type { Session } from "./session";
 import { loadKind } from "./trials";
@@ -151,7 +150,7 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
   }
   if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, found));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
-  await ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
+  await (await import("./flow/ended")).ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
 }
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
@@ -169,10 +168,11 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   const player = await choosePlayer(run.display);
   const session = openSession({ root, link, run, kind, player, outbox, unsent });
   setLanguage(run.language);
+  setScales(run.display.right_to_left_scales);
   const over = (): Promise<void> => {
     keeping.forget();
-    return persistently(root, session.t, () => fetchRun(started.run_token)).then((now) =>
-      ended(root, session.t, now, started, identity, wayBack(session.t, link)),
+    return persistently(root, session.t, () => fetchRun(started.run_token)).then(async (now) =>
+      (await import("./flow/ended")).ended(root, session.t, now, started, identity, wayBack(session.t, link)),
     );
   };
   if (run.status !== "active") return over();
@@ -243,8 +243,9 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
     end();
   });
   root.addEventListener("taken-over", end);
-  // Asked for now, so that it is here when it is wanted, also without a connection.
+  // Asked for now, so that they are here when they are wanted, also without a connection.
   const dialog = import("./screens/stop-dialog");
+  const last = import("./screens/completion");
   root.addEventListener("stop", () => void dialog.then(({ openStopDialog }) => openStopDialog(session)));
   watch(session);
   fetchFirst(session);
@@ -259,7 +260,7 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
   await runTimeline(root, timeline(session, started.run_token), simulation(run));
   if (!session.completion) return;
   storageOf("sessionStorage")?.removeItem(RETURNED);
-  showCompletion(session, emptied(root), session.completion);
+  (await last).showCompletion(session, emptied(root), session.completion);
 }
 
 /** Only previews and synthetic runs may answer themselves. */

@@ -145,6 +145,10 @@ it("ink on the surround is chosen by luminance", () => {
   expect(luminance("#ffffff")).toBeCloseTo(1);
 });
 
+it("digits of an Arabic keyboard answer as the others do", () => {
+  expect(["٤", "4", "٠", "٨", "ب"].map((key) => valueOf(key, { minimum: 1, maximum: 7 }))).toEqual([4, 4, null, null, null]);
+});
+
 describe("repeated measurements", () => {
   it("count where they agree, else are followed by one more, at most two", () => {
     expect(settled([3.7], 2)).toBeNull();

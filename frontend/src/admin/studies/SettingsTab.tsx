@@ -8,6 +8,7 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
+import { PageLanguages } from "./PageLanguages";
 import { Running } from "./Running";
 
 export function SettingsTab() {
@@ -18,6 +19,7 @@ export function SettingsTab() {
         <Stack key={detail.summary.revision} maw={900}>
           <Running detail={detail} />
           <Versions detail={detail} />
+          <PageLanguages />
           {detail.summary.status === "draft" && <Delete name={detail.summary.name} />}
         </Stack>
       )}

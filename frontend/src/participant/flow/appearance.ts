@@ -7,6 +7,11 @@ export function setLanguage(language: string): void {
   document.dir = direction(language);
 }
 
+/** Which way scales run, as declared for pages that are read from right to left. */
+export function setScales(order: "mirrored" | "same"): void {
+  document.documentElement.dataset["scales"] = order;
+}
+
 /** The surround as declared, and ink that reads on it (WCAG relative luminance). */
 export function setSurround(background: string): void {
   const root = document.documentElement;

@@ -1,7 +1,7 @@
 /** Practice and blocks: clips fetched first, trials in the stored order, failed clips again at the end. */
 import type { TrialInfo } from "../../api/schema";
 import { trial, type Node } from "../jspsych";
-import { blockBreak } from "../screens/block-break";
+import { blockBreak, loadRest } from "../screens/block-break";
 import { calibration, loadCalibration } from "../screens/calibration";
 import { preloadPage, sourcesOf } from "../screens/preload";
 import { needsScreenSetup, screenSetup } from "../screens/screen-setup";
@@ -18,6 +18,7 @@ const PRACTICE = 0;
 
 /** What is shown first is fetched while consent and questions are read; what fails is fetched again in its turn. */
 export function fetchFirst(session: Session): void {
+  void loadRest().catch(() => {});
   if (session.run.display.calibrate !== "off") void loadCalibration().catch(() => {});
   const open = session.run.trials.filter((one) => !one.answered);
   const first = open.find((one) => one.kind !== "practice")?.block;

@@ -2,7 +2,8 @@
 import type { RunStarted, RunState } from "../../api/schema";
 import type { Translate } from "../../i18n";
 import { button } from "../../ui/page";
-import { completed, showCompletion } from "../screens/finish";
+import { showCompletion } from "../screens/completion";
+import { completed } from "../screens/finish";
 import { emptied, type Back, showNotice } from "../screens/notice";
 import type { Identity } from "./identity";
 import { persistently } from "./link";

@@ -1,20 +1,18 @@
-/** The rest between blocks: where one stands, and at least as long as declared. */
-import { h } from "../../ui/element";
-import { markdown } from "../../ui/markdown";
-import { button, showPage } from "../../ui/page";
-import { progressBar } from "../../ui/progress";
+/** The rest between blocks; what draws it is loaded beside the first trials. */
 import { INT, plugin, type PluginClass } from "../jspsych";
-import { counted, type Session } from "../session";
-import { choose, codeNote, stopButton } from "./support";
+import type { Session } from "../session";
 
-interface Parameters {
+export interface Parameters {
   block: number;
   blocks: number;
   seconds_min: number;
 }
-interface Data {
+export interface Data {
   rested_ms: number;
 }
+
+/** Fetched with the first clips, so that it is here when its turn comes, also without a connection. */
+export const loadRest = (): Promise<typeof import("./rest")> => import("./rest");
 
 export function blockBreak(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
@@ -25,7 +23,7 @@ export function blockBreak(session: Session): PluginClass<Parameters> {
       seconds_min: { type: INT, description: "shortest rest in seconds" },
     },
     data: { rested_ms: { type: INT, description: "length of the rest in ms" } },
-    show: (display, parameters) => rest(session, display, parameters),
+    show: async (display, parameters) => (await loadRest()).rest(session, display, parameters),
     simulate: () => ({ rested_ms: 0 }),
     act(display) {
       const timer = setInterval(() => {
@@ -34,40 +32,4 @@ export function blockBreak(session: Session): PluginClass<Parameters> {
       }, 250);
     },
   });
-}
-
-async function rest(session: Session, display: HTMLElement, { block, blocks, seconds_min }: Parameters): Promise<Data> {
-  const { t, run } = session;
-  const started = performance.now();
-  const total = counted(run).length;
-  const bar = progressBar(t("break_progress", { done: session.answered, total }));
-  bar.set(session.answered, total);
-  const count = h("p", { class: "count" }, t("break_progress", { done: session.answered, total }));
-  const wait = h("p", { class: "status", role: "status" });
-  const footer = h("footer", { class: "actions" });
-  const text = markdown(run.texts.block_break || `# ${t("break_part", { block, blocks })}`);
-  const section = showPage(display, {
-    eyebrow: t("break_part", { block, blocks }),
-    body: [h("div", { class: "prose" }, ...text), bar.element, count, wait, footer, h("p", { class: "help" }, codeNote(session))],
-  });
-  section.classList.add("break");
-  section.append(stopButton(session));
-  await countDown(session, wait, footer, seconds_min);
-  wait.textContent = t("break_ready");
-  await choose(session, footer, [{ label: t("break_go_on"), value: true }]);
-  return { rested_ms: Math.round(performance.now() - started) };
-}
-
-async function countDown(session: Session, wait: HTMLElement, footer: HTMLElement, seconds: number): Promise<void> {
-  const locked = button(session.t("break_go_on"), () => {});
-  locked.disabled = true;
-  footer.append(locked);
-  for (let left = seconds; left > 0; left -= 1) {
-    // Spoken at the start and the end only: a screen reader need not count along.
-    wait.setAttribute("aria-live", left === seconds ? "polite" : "off");
-    wait.textContent = session.t("break_wait", { seconds: left });
-    await new Promise((resolve) => setTimeout(resolve, 1_000));
-  }
-  wait.setAttribute("aria-live", "polite");
-  locked.remove();
 }

@@ -1,6 +1,7 @@
 /** Points side by side: a press, a digit or the arrow keys; the two ends labelled, or every point. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
+import { scaleDirection } from "../../../ui/scale-direction";
 import { keyFor, valueOf } from "../shared/scale-keys";
 import type { Ask, Widget } from "../clip_rating/widget";
 import "./points.css";
@@ -24,8 +25,9 @@ export function widget({ scale, language, t, meant, choose }: Ask): Widget {
     const attributes = { type: "button", class: "key", "aria-label": name, "aria-pressed": "false", "data-value": value, onclick };
     return h("button", attributes, labels.length ? `${value} ` : value, labels.length ? h("span", { class: "key-label" }, text) : null);
   });
-  const row = h("div", { class: labels.length ? "keys keys-labelled" : "keys" }, ...keys);
-  const ends = h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, textOf(0)), h("span", {}, textOf(maximum - minimum)));
+  const dir = scaleDirection();
+  const row = h("div", { class: labels.length ? "keys keys-labelled" : "keys", dir }, ...keys);
+  const ends = h("div", { class: "ends", "aria-hidden": "true", dir }, h("span", {}, textOf(0)), h("span", {}, textOf(maximum - minimum)));
   row.style.setProperty("--points", String(keys.length));
 
   /** Arrow keys go along the scale; Enter or Space then presses. */
@@ -42,7 +44,7 @@ export function widget({ scale, language, t, meant, choose }: Ask): Widget {
     show: (value) => keys.forEach((key) => key.setAttribute("aria-pressed", String(Number(key.dataset["value"]) === value))),
     pressed(key) {
       const value = valueOf(key, scale);
-      if (value === null) move(keyFor(key, document.dir === "rtl"));
+      if (value === null) move(keyFor(key, dir === "rtl"));
       return value;
     },
   };

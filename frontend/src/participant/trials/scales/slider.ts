@@ -1,13 +1,15 @@
 /** A line between two labels: the browser's own slider, whose handle appears when it is first touched. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
+import { scaleDirection } from "../../../ui/scale-direction";
 import type { Ask, Widget } from "../clip_rating/widget";
 import "./slider.css";
 
 export function widget({ scale, question, language, t, meant, choose, enter }: Ask): Widget {
   if (scale.type !== "slider") throw new Error(`expected a slider, got ${scale.type}`);
   const { minimum, maximum, step, low, high, show_value } = scale;
-  const input = h("input", { type: "range", class: "slider", min: minimum, max: maximum, step, "aria-labelledby": question });
+  const dir = scaleDirection();
+  const input = h("input", { type: "range", class: "slider", dir, min: minimum, max: maximum, step, "aria-labelledby": question });
   const ends = [pick(low, language), pick(high, language)];
   const number = h("b", { class: "slider-value" });
 
@@ -38,7 +40,7 @@ export function widget({ scale, question, language, t, meant, choose, enter }: A
   return {
     parts: [
       input,
-      h("div", { class: "ends", "aria-hidden": "true" }, h("span", {}, ends[0]), show_value ? number : null, h("span", {}, ends[1])),
+      h("div", { class: "ends", "aria-hidden": "true", dir }, h("span", {}, ends[0]), show_value ? number : null, h("span", {}, ends[1])),
     ],
     settles: false,
     show,

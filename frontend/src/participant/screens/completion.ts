@@ -1,0 +1,51 @@
+/** The last page: thanks, the code, and the way back. */
+import type { Completion } from "../../api/schema";
+import { h } from "../../ui/element";
+import { markdown } from "../../ui/markdown";
+import { button, showPage } from "../../ui/page";
+import type { Session } from "../session";
+
+/** The last page, also of who is screened out. It lies outside the timeline, which clears what its screens have shown. */
+export function showCompletion(
+  session: Pick<Session, "t" | "run">,
+  display: HTMLElement,
+  done: Completion,
+  extra: HTMLElement[] = [],
+  why = "",
+): void {
+  const { t, run } = session;
+  const out = done.status === "screened_out";
+  const code =
+    done.completion_code &&
+    h(
+      "div",
+      { class: "code" },
+      h("p", { class: "help" }, t(out ? "out_code" : "done_code")),
+      codeRow(t("done_copy"), t("done_copied"), done.completion_code),
+    );
+  const back = done.redirect_url && h("a", { class: "button primary", href: done.redirect_url, rel: "noreferrer" }, t("done_return"));
+  const text = out ? run.texts.screened_out || `# ${t("screened_out_title")}\n\n${t("screened_out")}` : run.texts.debrief;
+  const prose = h("div", { class: "prose" }, ...markdown(text));
+  showPage(display, {
+    body: [
+      (done.reason || why) && h("p", { role: "alert" }, done.reason || why),
+      prose,
+      code,
+      h("p", { class: "status", role: "status" }, t(out ? "close" : "done_close")),
+    ],
+    actions: [back, ...extra],
+  });
+}
+
+function codeRow(copy: string, copied: string, code: string): HTMLElement {
+  const row = h("p", { class: "row" }, h("output", {}, code));
+  // Pages without a secure connection have no clipboard.
+  if (!("clipboard" in navigator)) return row;
+  const write = async (): Promise<void> => {
+    await navigator.clipboard.writeText(code);
+    press.textContent = copied;
+  };
+  const press = button(copy, () => void write().catch(() => {}), "quiet");
+  row.append(press);
+  return row;
+}
