@@ -7,6 +7,7 @@ from threading import Lock
 from sqlalchemy import Connection, select
 from sqlalchemy.orm import Session
 
+from experiments.checks import CHECK_CELL, CheckName
 from experiments.definition import Experiment
 from experiments.schema.stored import load_stored
 from server.models import Clip, StudyVersion, VersionClip
@@ -29,10 +30,20 @@ class PlacedClip:
 
 
 @dataclass(frozen=True)
+class CheckClip:
+    """A clip of a motion check: its id, what kind of check it is, and its right answer."""
+
+    ident: int
+    check: CheckName
+    answer: int
+
+
+@dataclass(frozen=True)
 class LoadedVersion:
     """A study version ready for use.
 
-    places: finds a clip's id by cell and exemplar. numbered: a clip's number and its cell's, for tallies.
+    clips: every clip by its id, those of checks too. places: finds a clip's id by cell and exemplar.
+    numbered: a clip's number and its cell's, for tallies. checks: the clips of motion checks.
     """
 
     experiment: Experiment
@@ -40,6 +51,11 @@ class LoadedVersion:
     clips: Mapping[int, PlacedClip]
     places: Mapping[tuple[str, int], int]
     numbered: Mapping[int, Place]
+    checks: tuple[CheckClip, ...] = ()
+
+    def check_of(self, clip: int) -> CheckClip:
+        """The motion check that the clip with this id belongs to."""
+        return next(check for check in self.checks if check.ident == clip)
 
 
 class Versions:
@@ -76,6 +92,13 @@ def _load(session: Session, version_id: int) -> LoadedVersion:
         sizes = (clip.frames, clip.fps, clip.bytes, clip.width_px, clip.height_px)
         clips[clip_id] = PlacedClip(clip.sha256, *sizes, width_mm)
         places[cell, exemplar] = clip_id
+    answers = {check["number"]: check for check in version.manifest.get("checks", ())}
+    checks = tuple(
+        CheckClip(clip, answers[number]["check"], answers[number]["answer"])
+        for (cell, number), clip in places.items()
+        if cell == CHECK_CELL
+    )
+    places = {place: clip for place, clip in places.items() if place[0] != CHECK_CELL}
     experiment = load_stored(version.definition, version.format)
     numbered = numbers([(clip, cell) for (cell, _), clip in places.items()])
-    return LoadedVersion(experiment, version.inter_ocular_px, clips, places, numbered)
+    return LoadedVersion(experiment, version.inter_ocular_px, clips, places, numbered, checks)

@@ -53,8 +53,10 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
     rows, aside = _with_run(ratings.rows), list[str]()
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
     main, attention = rows[(kind == "main").to_numpy()], rows[(kind == "attention").to_numpy()]
-    practice = n_plays(rows[~kind.isin(["main", "attention"]).to_numpy()])
+    practice = n_plays(rows[~kind.isin(["main", "attention", "check"]).to_numpy()])
+    checks = n_plays(rows[(kind == "check").to_numpy()])
     aside += [f"{practice} practice trials"] if practice else []
+    aside += [f"{checks} motion checks"] if checks else []
     unrated = np.isnan(main["response"].to_numpy())
     not_applicable = unrated & _not_applicable(main)
     silent = n_plays(main[unrated & ~not_applicable])

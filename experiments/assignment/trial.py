@@ -18,15 +18,17 @@ class Shown:
 class Trial:
     """One trial as assigned: practice has block 0; attention checks have no clip.
 
-    series: name of the adaptive series it belongs to, empty where there is none.
+    series: name of the adaptive series it belongs to, empty where there is none. check: which of the study's
+    check clips a motion check shows, from 0.
     """
 
-    kind: Literal["practice", "main", "attention"]
+    kind: Literal["practice", "main", "attention", "check"]
     block: int
     block_label: str
     shown: tuple[Shown, ...] = ()
     expected_response: int | None = None
     series: str = ""
+    check: int | None = None
 
     @property
     def clip(self) -> ClipSpec | None:

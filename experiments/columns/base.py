@@ -57,7 +57,13 @@ TRIAL: tuple[Column, ...] = (
         minimum=0,
         source="a",
     ),
-    Column("kind", "text", "What the trial is.", values=("practice", "main", "attention"), source="a"),
+    Column(
+        "kind",
+        "text",
+        "What the trial is; check is a motion check.",
+        values=("practice", "main", "attention", "check"),
+        source="a",
+    ),
     Column("block", "integer", "Block number from 1; 0 for practice.", minimum=0, source="a"),
     Column("block_label", "text", "Level of the factor that splits the blocks, or all.", source="a"),
     Column(
@@ -310,3 +316,15 @@ EVIDENCE: tuple[Column, ...] = (
         source="coalesce(r.evidence_verdict, 'not_judged')",
     ),
 )
+
+CHECK: tuple[Column, ...] = (
+    Column(
+        "check_response",
+        "integer",
+        "The choice in a motion check, whose right one is expected_response; empty in other trials.",
+        minimum=1,
+        source="t.payload",
+        member="check",
+    ),
+)
+"""Of motion checks, in studies of every kind of trial."""

@@ -9,6 +9,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from experiments.base import Declaration
 from experiments.trials import KINDS
+from experiments.trials.check import CheckAnswer
 from experiments.trials.kind import Answer, Kind, TrialDeclaration
 
 
@@ -19,14 +20,17 @@ class ByKind:
     Attributes
     ----------
     model: a kind's member of the union. implied: whether the first kind is meant where none is named.
+    further: members that are of no kind of trial, by their name.
     """
 
     model: Callable[[Kind], type[BaseModel]]
     implied: bool = False
+    further: tuple[tuple[str, type[BaseModel]], ...] = ()
 
     def __get_pydantic_core_schema__(self, _source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """A tagged union of the registered models."""
         choices = {name: handler.generate_schema(self.model(kind)) for name, kind in KINDS.items()}
+        choices |= {name: handler.generate_schema(model) for name, model in self.further}
         union = core_schema.tagged_union_schema(choices, discriminator="kind")
         return core_schema.no_info_before_validator_function(_with_kind, union) if self.implied else union
 
@@ -39,4 +43,4 @@ def _with_kind(value: Any) -> Any:
 
 AnyTrial = Annotated[TrialDeclaration, ByKind(lambda kind: kind.declaration, implied=True)]
 AnyPage = Annotated[Declaration, ByKind(lambda kind: kind.page)]
-AnyAnswer = Annotated[Answer, ByKind(lambda kind: kind.answer)]
+AnyAnswer = Annotated[Answer, ByKind(lambda kind: kind.answer, further=(("check", CheckAnswer),))]

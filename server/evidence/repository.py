@@ -6,8 +6,18 @@ from typing import Any, NamedTuple, cast
 from sqlalchemy import Connection, Table, bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
+from experiments.checks import CHECK_CELL, CheckName
 from server.db import insert_once
-from server.models import AnswerEvidence, AssignedTrial, Rating, RunEvent, StudyRun, TrialClip, View
+from server.models import (
+    AnswerEvidence,
+    AssignedTrial,
+    Rating,
+    RunEvent,
+    StudyRun,
+    TrialClip,
+    VersionClip,
+    View,
+)
 
 REFUSED = "answer_refused"
 """The event of a run that had an answer refused."""
@@ -67,25 +77,31 @@ def has_older_runs(session: Session, since: datetime) -> bool:
 
 
 class StoredAnswer(NamedTuple):
-    """An answer with its trial, whether that has a clip, and its evidence, None where it brought none."""
+    """An answer with its trial, whether that has a clip, and its evidence, None where it brought none.
+
+    check: what kind of motion check the trial is.
+    """
 
     rating: Any
     trial: Any
     has_clip: bool
     evidence: AnswerEvidence | None
+    check: CheckName | None = None
 
 
 def answers(session: Session, run: StudyRun) -> list[StoredAnswer]:
     """The answers of a run; of a rating only what is judged, since its frame log is large."""
-    rated = (Rating.trial_index, Rating.play, Rating.kind, Rating.payload, Rating.rt, Rating.saved_at)
-    query = select(*rated).where(Rating.study_run_id == run.id).order_by(Rating.id)
+    rated = (Rating.trial_index, Rating.play, Rating.kind, Rating.payload, Rating.rt, Rating.verdict)
+    query = select(*rated, Rating.saved_at).where(Rating.study_run_id == run.id).order_by(Rating.id)
     trials, shown, evidence = _trials(session, run), _with_clips(session, run), _stored(session, run)
+    checks = _checks(session, run) if any(trial.kind == "check" for trial in trials.values()) else {}
     return [
         StoredAnswer(
             row,
             trials[row.trial_index],
             row.trial_index in shown,
             evidence.get((row.trial_index, row.play)),
+            checks.get(row.trial_index),
         )
         for row in session.execute(query)
     ]
@@ -99,6 +115,15 @@ def _trials(session: Session, run: StudyRun) -> dict[int, Any]:
 
 def _with_clips(session: Session, run: StudyRun) -> set[int]:
     return set(session.scalars(select(TrialClip.trial_index).where(TrialClip.study_run_id == run.id)))
+
+
+def _checks(session: Session, run: StudyRun) -> dict[int, CheckName]:
+    """Kind of check of each motion check of a run."""
+    query = select(TrialClip.trial_index, VersionClip.levels).join(
+        VersionClip, VersionClip.id == TrialClip.version_clip_id
+    )
+    rows = session.execute(query.where(TrialClip.study_run_id == run.id, VersionClip.cell == CHECK_CELL))
+    return {row.trial_index: cast(CheckName, row.levels["check"]) for row in rows}
 
 
 def _stored(session: Session, run: StudyRun) -> dict[tuple[int, int], AnswerEvidence]:

@@ -2,6 +2,7 @@
 
 from sqlalchemy.orm import Session
 
+from experiments.checks import CHECK_KINDS
 from experiments.trials import KINDS
 from server.evidence import repository
 from server.evidence.comparable import comparable
@@ -23,6 +24,9 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
     response = comparable(row.rating.payload)
     if trial.kind == "attention":
         response = KINDS[row.rating.kind].check_response(row.rating.payload)
+    if trial.kind == "check":
+        response = row.rating.payload.get("check")
+    told = row.check is not None and row.rating.verdict != "failed"
     given = (evidence.interaction if evidence else None) or {}
     unchecked = evidence is not None and evidence.digest is not None and evidence.digest_right is None
     return JudgedAnswer(
@@ -41,4 +45,6 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
         presses=given.get("presses"),
         trusted=given.get("trusted"),
         press_ms=given.get("press_ms"),
+        choices=len(CHECK_KINDS[row.check].choices) if row.check and told else 0,
+        other_way=trial.kind == "check" and bool(row.rating.payload.get("other_way")),
     )

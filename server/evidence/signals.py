@@ -14,6 +14,8 @@ MIN_FOR_SPREAD = 8
 """Answers from which on a spread or a pattern is told."""
 GUESSED_BY_CHANCE = 0.01
 """Motion checks are passed where guesses would be right as often with less than this probability."""
+SEEN, POWER = 0.95, 0.99
+"""What people see of motion checks at least, and how surely somebody who sees so many must pass."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class Signals:
     same_answer: share of the most frequent answer. cycle: share of answers equal to the one some trials
     before, at the best distance from two to four. checks: share of attention checks answered as asked.
     motion_checks: share of motion checks answered rightly, of the `motion_checks_asked` that tell something.
-    motion_checks_guessed: how likely guesses are right as often as that; None where too few were asked for
-    guesses to be unlikely to get all of them right.
+    motion_checks_guessed: how likely guesses are right as often as that; None where too few were asked to
+    tell guesses from people.
     motion_checks_other_way: how many were answered the other way that the study offers.
     """
 
@@ -129,17 +131,24 @@ def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
 def guessed(right: int, choices: Sequence[int]) -> float | None:
     """How likely somebody who guesses is right at least `right` times; None where too few were asked.
 
-    The number of right guesses is Poisson-binomial: check i is guessed with 1 / choices[i]. Too few are those
-    that guesses get all right with at least `GUESSED_BY_CHANCE`.
+    The number of right guesses is Poisson-binomial: check i is guessed with 1 / choices[i]. Enough are asked
+    where somebody who sees `SEEN` of the checks passes (guesses do as well with less than
+    `GUESSED_BY_CHANCE`) with at least `POWER`.
     """
-    if math.prod(1 / number for number in choices) >= GUESSED_BY_CHANCE:
+    guesses = _at_least([1 / number for number in choices])
+    needed = next((number for number, chance in enumerate(guesses) if chance < GUESSED_BY_CHANCE), None)
+    if needed is None or _at_least([SEEN] * len(choices))[needed] < POWER:
         return None
-    chances = [1.0]
-    for number in choices:
-        hit = 1 / number
-        missed, taken = [*chances, 0.0], [0.0, *chances]
-        chances = [(1 - hit) * a + hit * b for a, b in zip(missed, taken, strict=True)]
-    return min(1.0, sum(chances[right:]))
+    return guesses[right]
+
+
+def _at_least(chances: Sequence[float]) -> list[float]:
+    """The probability of at least 0, 1, 2 ... hits where the i-th comes with chances[i]."""
+    exactly = [1.0]
+    for chance in chances:
+        missed, hit = [*exactly, 0.0], [0.0, *exactly]
+        exactly = [(1 - chance) * a + chance * b for a, b in zip(missed, hit, strict=True)]
+    return [min(1.0, sum(exactly[number:])) for number in range(len(exactly))]
 
 
 def _share(facts: Sequence[bool]) -> float | None:

@@ -115,10 +115,13 @@ class RecruiterIdentity(Base):
 
 
 class AssignedTrial(Base):
-    """One trial of a run in its stored order. Attention checks have no clips, but an expected response."""
+    """One trial of a run in its stored order. Attention checks have no clips, but an expected response.
+
+    Of a motion check `expected_response` is the right answer, which no participant is sent.
+    """
 
     __tablename__ = "assigned_trials"
-    __table_args__ = (one_of("kind", "practice", "main", "attention"),)
+    __table_args__ = (one_of("kind", "practice", "main", "attention", "check"),)
 
     study_run_id: Mapped[int] = mapped_column(
         ForeignKey("study_runs.id", ondelete="CASCADE"), primary_key=True, autoincrement=False

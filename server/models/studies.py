@@ -92,6 +92,7 @@ class VersionClip(Base):
     """A clip's place in a study version: its cell, levels and exemplar.
 
     blinks_s: onsets of the blinks of a performance in s; None for other clips.
+    The clips of motion checks have no cell (`CHECK_CELL`); their level is `check`, their exemplar its number.
     """
 
     __tablename__ = "version_clips"

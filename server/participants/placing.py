@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.assignment.checks import with_checks
 from experiments.assignment.groups import name_of, names, place_of
 from experiments.assignment.trial import Trial
 from experiments.definition import Experiment
@@ -31,9 +32,10 @@ def place(session: Session, run: StudyRun, loaded: LoadedVersion, turns: Sequenc
         run.slot = repository.free_slot_of(session, run.version_id, run.origin, lease, every, turns)
     run.group_name = name_of(place_of(experiment, run.slot).levels)
     trials = _trials(session, run, experiment, lease)
+    trials = with_checks(experiment, trials, run.seed, len(loaded.checks))
     run.trials_total = len(trials)
     session.flush()
-    repository.add_trials(session, _trial_rows(run, trials), _clip_rows(run, loaded, trials))
+    repository.add_trials(session, _trial_rows(run, loaded, trials), _clip_rows(run, loaded, trials))
     if KINDS[experiment.trial.kind].adapts:
         series.add_places(session.connection(), run, loaded, trials)
 
@@ -46,7 +48,7 @@ def _trials(session: Session, run: StudyRun, experiment: Experiment, lease: time
     return kind.assign_by(experiment, run.seed, run.slot, stored)
 
 
-def _trial_rows(run: StudyRun, trials: list[Trial]) -> list[dict[str, Any]]:
+def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
     return [
         {
             "study_run_id": run.id,
@@ -54,10 +56,14 @@ def _trial_rows(run: StudyRun, trials: list[Trial]) -> list[dict[str, Any]]:
             "kind": trial.kind,
             "block": trial.block,
             "block_label": trial.block_label,
-            "expected_response": trial.expected_response,
+            "expected_response": _expected(loaded, trial),
         }
         for index, trial in enumerate(trials)
     ]
+
+
+def _expected(loaded: LoadedVersion, trial: Trial) -> int | None:
+    return trial.expected_response if trial.check is None else loaded.checks[trial.check].answer
 
 
 def _clip_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> list[dict[str, Any]]:
@@ -65,10 +71,17 @@ def _clip_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> lis
         {
             "study_run_id": run.id,
             "trial_index": index,
-            "role": shown.role,
+            "role": role,
             "position": position,
-            "version_clip_id": loaded.places[shown.clip.cell, shown.clip.exemplar],
+            "version_clip_id": clip,
         }
         for index, trial in enumerate(trials)
-        for position, shown in enumerate(trial.shown)
+        for position, (role, clip) in enumerate(_shown(loaded, trial))
     ]
+
+
+def _shown(loaded: LoadedVersion, trial: Trial) -> list[tuple[str, int]]:
+    """Role and id of each clip of a trial."""
+    if trial.check is not None:
+        return [("shown", loaded.checks[trial.check].ident)]
+    return [(shown.role, loaded.places[shown.clip.cell, shown.clip.exemplar]) for shown in trial.shown]

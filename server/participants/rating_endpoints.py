@@ -31,7 +31,7 @@ async def put_rating(
 
     receipt, is_new = await services.group_commit.run(token, save)
     left_out: dict[str, Any] = {} if receipt.warning else {"receipt": {"warning"}}
-    if KINDS[rating.answer.kind].adapts:
+    if rating.answer.kind in KINDS and KINDS[rating.answer.kind].adapts:
         receipt, following = await run_in_threadpool(next_trials, services, token, receipt)
         content = RatingSaved(receipt=receipt, next=following).model_dump_json(exclude=left_out)
     else:

@@ -17,6 +17,7 @@ from server.evidence.service import judge_run
 from server.evidence.tickets import issue, tickets
 from server.models import NO_SLOT, Calibration, RunEvent, StudyRun
 from server.participants import bounds, repository, screening
+from server.participants.checks import shown_checks
 from server.participants.completion import completion_code
 from server.participants.links import find_link
 from server.participants.lookup import find_run, open_run
@@ -84,6 +85,7 @@ def state_of(services: Services, session: Session, run: StudyRun, moment: dateti
         awaits_group=run.slot == NO_SLOT,
         blocks=blocks,
         trials=trials,
+        checks=shown_checks(experiment, run.language),
         elapsed_ms_before=run.elapsed_ms,
         completion_code=completion_code(session, run, loaded) if run.status == "complete" else None,
         resumable_until=resumable_until(experiment, run),

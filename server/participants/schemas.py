@@ -6,6 +6,7 @@ from uuid import UUID
 
 from pydantic import BaseModel, Field, StringConstraints
 
+from experiments.checks import CheckName
 from experiments.definition import Display, Texts
 from experiments.definition.forms import Form
 from experiments.rules import PlaybackRules
@@ -137,6 +138,27 @@ class CalibrationState(BaseModel):
     recheck_percent: float | None
 
 
+class ShownCheck(BaseModel):
+    """What is asked about the clips of one kind of motion check; answers are numbered from 1."""
+
+    question: str
+    choices: list[str]
+
+
+class ShownOtherWay(BaseModel):
+    """The way around motion checks: its button, and the Markdown behind it."""
+
+    label: str
+    text: str
+
+
+class ShownChecks(BaseModel):
+    """The motion checks of a study as the page gets them, in the run's language."""
+
+    by_kind: dict[CheckName, ShownCheck]
+    other_way: ShownOtherWay | None
+
+
 class RunState(BaseModel):
     """Everything the page needs to begin or to go on."""
 
@@ -158,6 +180,9 @@ class RunState(BaseModel):
     awaits_group: bool = Field(description="There are no trials yet: an answer of a form decides the group.")
     blocks: list[BlockInfo]
     trials: list[TrialInfo]
+    checks: ShownChecks | None = Field(
+        default=None, description="Words of the motion checks; null where there are none."
+    )
     elapsed_ms_before: float
     completion_code: str | None
     resumable_until: datetime | None = Field(

@@ -1,7 +1,10 @@
 """A run's trials as the page gets them: in stored order, with what is still to be shown of each."""
 
+from typing import Any
+
 from sqlalchemy.orm import Session
 
+from experiments.checks import CheckName
 from experiments.trials import KINDS
 from server.models import StudyRun
 from server.participants import repository
@@ -43,7 +46,8 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
                 width_mm=clip.width_mm if clip else None,
                 inter_ocular_px=loaded.inter_ocular_px if clip else None,
                 clips=[_clip(loaded, role, clip_id) for role, clip_id in shown.items()],
-                prompt=_prompt(loaded, run.language, row.expected_response),
+                prompt=_prompt(loaded, run.language, row),
+                check=_check(loaded, first) if row.kind == "check" else None,
                 plays_done=len(plays),
                 plays_wanted=len(plays) if settled else len(plays) + 1,
                 answered=settled,
@@ -82,9 +86,14 @@ def _clip(loaded: LoadedVersion, role: str, clip_id: int) -> TrialClip:
     )
 
 
-def _prompt(loaded: LoadedVersion, language: str, expected: int | None) -> str | None:
-    if expected is None:
+def _check(loaded: LoadedVersion, clip: int | None) -> CheckName | None:
+    return None if clip is None else loaded.check_of(clip).check
+
+
+def _prompt(loaded: LoadedVersion, language: str, row: Any) -> str | None:
+    """What an attention check asks for; the right answer of a motion check is never told."""
+    if row.kind != "attention":
         return None
     texts = loaded.experiment.attention.text
     text = texts.get(language) or texts.get("en") or next(iter(texts.values()))
-    return text.replace("{response}", str(expected))
+    return text.replace("{response}", str(row.expected_response))

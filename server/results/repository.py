@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, Select, and_, case, func, select
 from sqlalchemy.orm import Session
 
+from experiments.checks import CHECK_CELL
 from server.models import Rating, SeriesAnswer, SeriesTrial, Study, StudyRun, StudyVersion, VersionClip
 from server.results.cache import Revision
 
@@ -41,7 +42,7 @@ def cells_of(session: Session, of: Pool) -> dict[int, str]:
 
 def clips_of(session: Session, version: StudyVersion, answered: Iterable[int]) -> list[VersionClip]:
     """The clips of a version, and those of older versions with these ids."""
-    mine = VersionClip.version_id == version.id
+    mine = (VersionClip.version_id == version.id) & (VersionClip.cell != CHECK_CELL)
     return list(session.scalars(select(VersionClip).where(mine | VersionClip.id.in_(set(answered)))))
 
 

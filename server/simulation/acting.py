@@ -11,7 +11,7 @@ from server.context import SIMULATED_TIME
 from server.evidence.clip_bytes import clip_digest, clip_hash
 from server.simulation.http import JsonClient, Refused
 from server.simulation.manners import Manner, person
-from server.simulation.person import Person, Rater
+from server.simulation.person import SEES_MOTION, Person, Rater
 
 MAX_HELD = 12
 """Answers kept while the network is away."""
@@ -34,6 +34,7 @@ class Actor(Person):
         self.ended = False
         self.run_id = ""
         self.tickets: dict[str, Any] | None = None
+        self.offers_other_way = False
         self._held: list[dict[str, Any]] = []
         self._holds = 0
 
@@ -67,6 +68,7 @@ class Actor(Person):
         self._tell_time()
         state: dict[str, Any] = self.client.get("/api/run")
         self.tickets = state["tickets"]
+        self.offers_other_way = bool(state["checks"] and state["checks"]["other_way"])
         return state
 
     def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:
@@ -80,6 +82,8 @@ class Actor(Person):
         body = self.rating(trial, declared) | {"rt": round(rt, 2)}
         if body["answer"]["kind"] == "clip_rating":  # other kinds are answered as the rater model does
             self._answer_in_manner(body["answer"]["answers"], trial, declared)
+        if body["answer"]["kind"] == "check":
+            body |= self._checked(trial)
         body["answered_at_client"] = (self.moment + self.clock_off).isoformat()
         if manner.tickets:
             body["evidence"] = self._evidence(trial)
@@ -113,6 +117,14 @@ class Actor(Person):
             elif self.manner.answers == "any" or trial["kind"] == "attention":
                 drawn = self.rng.uniform(scale.minimum - scale.step / 2, scale.maximum + scale.step / 2)
                 answers[scale.name] = {"response": scale.nearest(drawn)}
+
+    def _checked(self, trial: dict[str, Any]) -> dict[str, Any]:
+        """What this manner makes of a motion check: seen, guessed, or gone around where that is offered."""
+        if self.manner.checks == "goes around" and self.offers_other_way:
+            answer = {"kind": "check", "check": None, "other_way": True}
+            return {"answer": answer, "playback": {"method": "none"}}
+        sees = SEES_MOTION if self.manner.checks == "sees" else 0.0
+        return {"answer": {"kind": "check", "check": self.rater.check_answer(trial, self.rng, sees)}}
 
     def _evidence(self, trial: dict[str, Any]) -> dict[str, Any] | None:
         if self.tickets is None:

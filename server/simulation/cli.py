@@ -139,8 +139,9 @@ def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Ca
             observer = observer_of(experiment, levels, observed)
         elif observed:
             raise InputError(f"--observer: expected a study of thresholds, got {experiment.trial.kind}")
+        checks = {check["sha256"]: check["answer"] for check in version.manifest.get("checks", ())}
         token = derived_token(services.settings.key, PURPOSE, link.public_id)
-    return token, lambda number, seed: Rater(number, seed, levels, observer, blinks)
+    return token, lambda number, seed: Rater(number, seed, levels, observer, blinks, checks)
 
 
 def _one(address: str, token: str, rater: Rater) -> int:

@@ -19,6 +19,7 @@ class Manner:
     tickets: sends the server's tickets. fetches: fetches clips, and shows it. waits: lets the clips play.
     rt_ms: response time of one answer. interaction: presses between two answers, None where none are told.
     answers: by the rater model, always the same, or any; reads: does what attention checks ask.
+    checks: what it makes of motion checks, in which single pictures show nothing.
     offline, reloads, clock_jumps: chances of each before an answer.
     """
 
@@ -29,6 +30,7 @@ class Manner:
     interaction: Callable[[random.Random, "Person"], Interaction | None]
     answers: Literal["model", "same", "any"] = "model"
     reads: bool = True
+    checks: Literal["sees", "guesses", "goes around"] = "guesses"
     offline: float = 0.0
     reloads: float = 0.0
     clock_jumps: float = 0.0
@@ -105,7 +107,11 @@ MANNERS: dict[str, Manner] = {
         tickets=True, fetches=True, waits=True, rt_ms=_polling_rt, interaction=_synthetic_click, answers="any"
     ),
     "frames": Manner(tickets=True, fetches=True, waits=True, rt_ms=_human_rt, interaction=_driver),
+    "flow": Manner(
+        tickets=True, fetches=True, waits=True, rt_ms=_human_rt, interaction=_driver, checks="sees"
+    ),
     "careless": Manner(
+        checks="sees",
         tickets=True,
         fetches=True,
         waits=True,
@@ -115,6 +121,7 @@ MANNERS: dict[str, Manner] = {
         reads=False,
     ),
     "honest": Manner(
+        checks="sees",
         tickets=True,
         fetches=True,
         waits=True,
@@ -124,9 +131,16 @@ MANNERS: dict[str, Manner] = {
         reloads=0.01,
         clock_jumps=0.01,
     ),
-    "assistive": Manner(tickets=True, fetches=True, waits=True, rt_ms=_slow_rt, interaction=_screen_reader),
+    "assistive": Manner(
+        tickets=True,
+        fetches=True,
+        waits=True,
+        rt_ms=_slow_rt,
+        interaction=_screen_reader,
+        checks="goes around",
+    ),
 }
 """http: plain HTTP. http-slow: HTTP with plausible waits and fetched clips. script: a headless browser whose
-page a script clicks. frames: a driven browser that answers from single frames. careless: a person, fast
-and always the same. honest: a person whose network goes away, who reloads, whose clock jumps. assistive: a
-screen reader."""
+page a script clicks. frames: a driven browser that answers from single frames. flow: one that computes
+optical flow, and so sees what motion checks show. careless: a person, fast and always the same. honest: a
+person whose network goes away, who reloads, whose clock jumps. assistive: a screen reader."""

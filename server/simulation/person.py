@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from experiments.checks import CHECK_KINDS, CheckName
 from experiments.definition.forms import FormField
 from server.simulation.http import JsonClient
 from server.simulation.observer import Observer
@@ -19,6 +20,10 @@ FLAGGED_SHARE, FAILED_SHARE = 0.03, 0.01
 """Shares of plays with a frame lost (flagged) and with the focus lost (failed)."""
 
 
+SEES_MOTION = 0.97
+"""Share of motion checks whose content people see; the others they guess."""
+
+
 class Rater:
     """The rater model of one person: mean of the scale + level effects + person + exemplar + noise.
 
@@ -28,6 +33,7 @@ class Rater:
     levels_of: levels of each clip by its hash; a real participant never learns them, so the effects are
     put in from outside. observer: their psychometric function, in a study of thresholds.
     blinks_of: onsets of the blinks of each performance by the clip's hash, in s.
+    checks: right answer to each motion check by its clip's hash, likewise put in from outside.
     """
 
     def __init__(
@@ -37,9 +43,11 @@ class Rater:
         levels_of: Mapping[str, Mapping[str, str]],
         observer: Observer | None = None,
         blinks_of: Mapping[str, Sequence[float]] | None = None,
+        checks: Mapping[str, int] | None = None,
     ) -> None:
         self.blinks_of = blinks_of or {}
         self.seed, self.effects_seed, self.levels_of = seed, effects_seed, levels_of
+        self.checks = checks or {}
         self.rng = random.Random(f"{effects_seed}/person/{seed}")
         self.shift = self.rng.gauss(0, PERSON_SD)
         own = random.Random(f"{effects_seed}/observer/{seed}")
@@ -56,6 +64,13 @@ class Rater:
     def blinks(self, clip: str) -> Sequence[float]:
         """When the blinks of a clip's performance begin."""
         return self.blinks_of.get(clip, ())
+
+    def check_answer(self, trial: Mapping[str, Any], rng: random.Random, sees: float = SEES_MOTION) -> int:
+        """The choice in a motion check by somebody who sees its clip with this probability, else guesses."""
+        if rng.random() < sees and trial["clip_sha256"] in self.checks:
+            return self.checks[trial["clip_sha256"]]
+        name: CheckName = trial["check"]
+        return rng.randint(1, len(CHECK_KINDS[name].choices))
 
     def likes(self, clip: str) -> float:
         """How well this person likes a clip: effects of levels and exemplar, and the person's own shift."""
@@ -154,13 +169,18 @@ class Person:
         return {
             "trial_index": trial["trial_index"],
             "play": trial["plays_done"] + 1,
-            "answer": served(declared["kind"]).simulated(self.rater, trial, declared, rng),
+            "answer": self._answer(trial, declared),
             "rt": round(rt, 2),
             "rt_from_first_frame": round(rt + length_ms, 2),
             "time_elapsed": round(self.elapsed_ms, 2),
             "changes": 0,
             "playback": self._playback(trial) if clip else {"method": "none"},
         }
+
+    def _answer(self, trial: dict[str, Any], declared: dict[str, Any]) -> dict[str, Any]:
+        if trial["kind"] == "check":
+            return {"kind": "check", "check": self.rater.check_answer(trial, self.rater.rng)}
+        return served(declared["kind"]).simulated(self.rater, trial, declared, self.rater.rng)
 
     def _playback(self, trial: dict[str, Any]) -> dict[str, Any]:
         rng, frames = self.rater.rng, _frames(trial)

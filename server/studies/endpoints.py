@@ -7,6 +7,7 @@ from fastapi.params import File
 from fastapi.responses import PlainTextResponse
 from sqlalchemy import select
 
+from experiments.checks import CHECK_CELL
 from server.accounts.identity import Experimenter, Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
@@ -139,7 +140,8 @@ def list_clips(services: ServicesDep, _who: Viewer, study: str) -> list[ClipOut]
     with services.database.read() as session:
         version = active_version(session, find_study(session, study))
         curves = {clip["sha256"]: clip for clip in version.manifest["clips"]}
-        query = select(VersionClip).where(VersionClip.version_id == version.id).order_by(VersionClip.id)
+        query = select(VersionClip).where(VersionClip.version_id == version.id)
+        query = query.where(VersionClip.cell != CHECK_CELL).order_by(VersionClip.id)
         return [_clip_out(row, curves[row.clip_sha256].get("closure", [])) for row in session.scalars(query)]
 
 

@@ -5,9 +5,11 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from experiments import design
+from experiments.checks import CHECK_CELL
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.manifest import Manifest, check_files
+from experiments.manifest import CheckClip, Manifest, check_files
+from experiments.manifest import Clip as DesignClip
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.upgrades import FORMAT
 from server.accounts.audit import record
@@ -36,13 +38,28 @@ def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
         )
     if len(found) != len(wanted):
         raise InputError(f"expected each of {len(wanted)} clips once, the manifest lists {len(found)}")
+    _check_checks(experiment, manifest)
+
+
+def _check_checks(experiment: Experiment, manifest: Manifest) -> None:
+    """InputError where there are fewer check clips than a participant is asked, or of kinds not declared."""
+    declared = experiment.evidence.motion_checks
+    asked = declared.per_block * len(design.blocks(experiment))
+    if not asked:
+        return
+    fitting = [clip for clip in manifest.checks if clip.check in declared.kinds]
+    if len(fitting) < asked or len(fitting) < len(manifest.checks):
+        raise InputError(
+            f"expected clips of at least {asked} motion checks ({', '.join(declared.kinds)}), the manifest "
+            f"has {len(fitting)} of {len(manifest.checks)}; make them with `stimuli checks` and upload them"
+        )
 
 
 def store_clips(store: ClipStore, manifest: Manifest, folder: Path) -> int:
     """Check every file's hash, then copy what is new into the clip store; return how many were new."""
     check_files(manifest, folder)
     added = 0
-    for clip in manifest.clips:
+    for clip in manifest.files:
         with (folder / clip.file).open("rb") as stream:
             added += store.add(stream, clip.sha256)
     return added
@@ -96,7 +113,7 @@ def add_version(
 
 
 def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> None:
-    for clip in manifest.clips:
+    for clip in manifest.files:
         if session.get(Clip, clip.sha256) is None:
             session.add(
                 Clip(
@@ -109,15 +126,18 @@ def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> N
                 )
             )
             session.flush()
-        version.clips.append(
-            VersionClip(
-                clip_sha256=clip.sha256,
-                cell=clip.cell,
-                levels=clip.levels,
-                exemplar=clip.exemplar,
-                profile_id=clip.profile,
-                file=clip.file,
-                width_mm=clip.width_mm,
-                blinks_s=list(clip.blinks_s) or None,
-            )
-        )
+        version.clips.append(_placed(clip))
+
+
+def _placed(clip: DesignClip | CheckClip) -> VersionClip:
+    shared = {"clip_sha256": clip.sha256, "file": clip.file, "width_mm": clip.width_mm}
+    if isinstance(clip, CheckClip):
+        return VersionClip(cell=CHECK_CELL, levels={"check": clip.check}, exemplar=clip.number, **shared)
+    return VersionClip(
+        cell=clip.cell,
+        levels=clip.levels,
+        exemplar=clip.exemplar,
+        profile_id=clip.profile,
+        blinks_s=list(clip.blinks_s) or None,
+        **shared,
+    )

@@ -55,10 +55,14 @@ def _texts(asked: OwnClips) -> dict[str, str]:
 
 
 def merged_manifest(known: Manifest, added: Manifest) -> Manifest:
-    """`known` with the clips of `added`: those of a cell and exemplar known already take its place."""
+    """`known` with the clips of `added`: those of a cell and exemplar known already take its place.
+
+    Checks that are added take the place of all that were known.
+    """
     clips = {(clip.cell, clip.exemplar): clip for clip in known.clips}
     clips |= {(clip.cell, clip.exemplar): clip for clip in added.clips}
-    return known.model_copy(update={"clips": tuple(clips.values())})
+    checks = {"checks": added.checks, "checks_seed": added.checks_seed} if added.checks else {}
+    return known.model_copy(update={"clips": tuple(clips.values()), **checks})
 
 
 def check_declared(added: Manifest, experiment: Experiment) -> None:

@@ -60,7 +60,7 @@ def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
     """
     clips = {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
     for version in reversed(study.versions):
-        known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips}
+        known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips if clip.cell}
         changes = difference(definition_of(version), experiment)
         if known == clips and not changes_what_is_measured(changes):
             return version.series

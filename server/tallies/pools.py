@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
+from experiments.checks import CHECK_CELL
 from server.models import RunTally, StudyRun, VersionClip
 from server.tallies.tally import ONSET_BINS, UNIT, Place, numbers, packed_codes, unpacked
 
@@ -101,7 +102,8 @@ class _Versions:
     def clips(self, version: int) -> list[CellClip]:
         if version not in self._clips:
             query = select(VersionClip.id, VersionClip.cell, VersionClip.levels)
-            query = query.where(VersionClip.version_id == version).order_by(VersionClip.id)
+            query = query.where(VersionClip.version_id == version, VersionClip.cell != CHECK_CELL)
+            query = query.order_by(VersionClip.id)
             self._clips[version] = [CellClip(*row) for row in self._session.execute(query)]
         return self._clips[version]
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from server.db import Database
 from server.models import AssignedTrial, Rating, RunTally, StudyRun, TrialClip
-from server.tallies.tally import Play, Tally, tally_of
+from server.tallies.tally import Counted, Play, Tally, tally_of
 from server.trials.kinds import served
 from server.versions import Versions
 
@@ -74,8 +74,10 @@ class Recount:
         """A play from its rows, one for each clip of its trial."""
         row, is_main = shown[0], shown[0].part == "main"
         numbered = self._versions.get(session, row.version_id).numbered
-        places = {one.role: numbered[one.version_clip_id] for one in shown if one.role}
-        answers = tuple(served(row.kind).counted(places, row.payload)) if is_main else ()
+        answers: tuple[Counted, ...] = ()
+        if is_main:
+            places = {one.role: numbered[one.version_clip_id] for one in shown if one.role}
+            answers = tuple(served(row.kind).counted(places, row.payload))
         return Play(
             row.trial_index,
             is_main,

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from experiments.checks import CheckName
 from experiments.trials.clip_rating.declaration import MAX_FRAMES_LOGGED
 from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.union import AnyAnswer
@@ -137,7 +138,7 @@ class TrialInfo(BaseModel):
     """One trial as the page needs it; nothing tells the participant which cell it is."""
 
     trial_index: int
-    kind: Literal["practice", "main", "attention"]
+    kind: Literal["practice", "main", "attention", "check"]
     block: int
     clip_sha256: str | None
     clip_url: str | None
@@ -150,6 +151,9 @@ class TrialInfo(BaseModel):
     inter_ocular_px: float | None
     clips: list[TrialClip] = Field(description="Every clip, in the order of its places.")
     prompt: str | None = Field(description="Markdown of an attention check.")
+    check: CheckName | None = Field(
+        default=None, description="What kind of motion check it is; its answer is told nobody."
+    )
     plays_done: int
     plays_wanted: int
     answered: bool

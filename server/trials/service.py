@@ -1,5 +1,6 @@
 """Store a rating once, judge its playback, and write the receipt."""
 
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
 
@@ -7,11 +8,12 @@ from sqlalchemy import Connection
 
 from experiments.definition import Experiment
 from experiments.trials import KINDS
+from experiments.trials.check import CheckAnswer
 from server.errors import Conflict, Invalid, NotFound
 from server.evidence.intake import Answer, Intake
-from server.tallies.tally import Play, Tally
+from server.tallies.tally import Counted, Play, Tally
 from server.tokens import hash_token
-from server.trials import repository, warnings
+from server.trials import checks, repository, warnings
 from server.trials.attention import by_attention
 from server.trials.kinds import Part, served
 from server.trials.refusals import ConsentMissing, RunClosed, RunUnknown
@@ -73,11 +75,12 @@ def save_rating(
         receipt = _receipt(rating_id, known.saved_at, ruling, again, left, run.status)
         receipt.warning = warnings.warning_of(connection, run.id, loaded.experiment, known.rating_id)
         return receipt, False
-    _check(run, loaded.experiment, trial.kind, rating)
+    _check(run, loaded, trial, rating)
     if run.evidence == "asked":
         rated = rating.answer.given
         intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at, rated=rated))
-    ruling = served(kind).judge(loaded, trial.clips, rating)
+    judge = checks.judge if trial.kind == "check" else served(kind).judge
+    ruling = judge(loaded, trial.clips, rating)
     repository.add_rating(connection, _row(run, rating_id, kind, answer, rating, ruling, saved_at))
     _count(connection, run.id, trial, _play(loaded, trial, rating, answer, ruling))
     settles = is_settled(trial.kind, rating.play, ruling[0], most)
@@ -114,8 +117,10 @@ def _play(
     ruling: Ruling,
 ) -> Play:
     is_main = trial.kind == "main"
-    places = {role: loaded.numbered[clip] for role, clip in trial.clips.items()}
-    counted = served(loaded.experiment.trial.kind).counted(places, answer) if is_main else ()
+    counted: Iterable[Counted] = ()
+    if is_main:
+        places = {role: loaded.numbered[clip] for role, clip in trial.clips.items()}
+        counted = served(loaded.experiment.trial.kind).counted(places, answer)
     playback = rating.playback
     return Play(
         rating.trial_index,
@@ -155,12 +160,16 @@ def _short(answer: dict[str, Any]) -> Any:
     return next(iter(answer.values()))
 
 
-def _check(run: Any, experiment: Experiment, part: Part, rating: RatingIn) -> None:
+def _check(run: Any, loaded: LoadedVersion, trial: repository.StoredTrial, rating: RatingIn) -> None:
     if run.status != "active":
         raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
-    served(experiment.trial.kind).validate(experiment, part, rating)
+    experiment = loaded.experiment
+    if trial.kind == "check":
+        checks.validate(loaded, trial.clips, rating)
+    else:
+        served(experiment.trial.kind).validate(experiment, trial.kind, rating)
     most = experiment.playback.max_repeats + 1
     if rating.play > most:
         raise PlayOutOfRange(f"A clip is shown at most {most} times, got play {rating.play}.")
@@ -176,7 +185,7 @@ def _answer(
     rated: bool,
 ) -> Answer:
     clips = [loaded.clips[ident] for ident in roles.values()]
-    views = getattr(loaded.experiment.trial, "views", 1)
+    views = 1 if isinstance(rating.answer, CheckAnswer) else getattr(loaded.experiment.trial, "views", 1)
     return Answer(
         run=run.id,
         run_id=run.public_id,

@@ -11,8 +11,9 @@ import av
 import numpy as np
 
 from experiments import design
+from experiments.checks import CHECK_KINDS
 from experiments.definition import Experiment
-from experiments.manifest import MANIFEST_NAME, Clip, Manifest
+from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, Manifest
 from experiments.schema.canonical import definition_sha256
 
 BARCODE_CELL_PX, BARCODE_BITS = 16, 12
@@ -63,9 +64,30 @@ def make_clip_folder(
         seed=1,
         inter_ocular_px=128.0,
         clips=tuple(clips),
+        checks=_checks(experiment, folder, frames, fps),
     )
     (folder / MANIFEST_NAME).write_text(json.dumps(manifest.model_dump(mode="json")), encoding="utf-8")
     return manifest
+
+
+def _checks(experiment: Experiment, folder: Path, frames: int, fps: int) -> tuple[CheckClip, ...]:
+    """Clips of the declared motion checks, their answers in turn; what they show is grey."""
+    declared = experiment.evidence.motion_checks
+    made = []
+    for number in range(1, declared.clips + 1) if declared.per_block else ():
+        check = declared.kinds[(number - 1) % len(declared.kinds)]
+        data = encoded_video(frames, fps) + _free_box(f"{experiment.name} check {number}".encode())
+        sha256 = hashlib.sha256(data).hexdigest()
+        (folder / f"{sha256}.mp4").write_bytes(data)
+        answer = 1 + (number * 5) % len(CHECK_KINDS[check].choices)
+        shared = {"sha256": sha256, "bytes": len(data), "fps": fps, "frames": frames, "width_px": 256}
+        made.append(
+            CheckClip(
+                check=check, number=number, answer=answer, file=f"{sha256}.mp4", height_px=96, width_mm=120.0,
+                **shared,
+            )
+        )  # fmt: skip
+    return tuple(made)
 
 
 @lru_cache(maxsize=8)

@@ -17,15 +17,20 @@ ANSWER: tuple[Column, ...] = (
         source="e.value",
         member="response",
     ),
-    Column("expected_response", "integer", "The answer asked for in an attention check.", source="a"),
+    Column(
+        "expected_response",
+        "integer",
+        "The answer asked for in an attention check, or right in a motion check.",
+        source="a",
+    ),
 )
 
 SCALE: tuple[Column, ...] = (
     Column(
         "scale",
         "text",
-        "Name of the scale: rating where the study has one; empty in attention checks.",
-        source="CASE WHEN a.kind = 'attention' THEN NULL ELSE e.key END",
+        "Name of the scale: rating where the study has one; empty in checks.",
+        source="CASE WHEN a.kind IN ('attention', 'check') THEN NULL ELSE e.key END",
     ),
     Column(
         "not_applicable",
@@ -77,6 +82,7 @@ RATINGS = View(
         *SCALE,
         *base.VIEWS,
         *base.EVIDENCE,
+        *base.CHECK,
     ),
     rows=_rows,
 )

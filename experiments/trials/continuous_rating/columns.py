@@ -16,7 +16,12 @@ ANSWER: tuple[Column, ...] = (
         source="t.payload",
         member="response",
     ),
-    Column("expected_response", "integer", "The answer asked for in an attention check: 1 to 7.", source="a"),
+    Column(
+        "expected_response",
+        "integer",
+        "The answer asked for in an attention check (1 to 7), or right in a motion check.",
+        source="a",
+    ),
     Column(
         "trace",
         "text",
@@ -69,6 +74,7 @@ TRACES = View(
         *base.ORIGIN,
         *base.CLOCK,
         *base.VIEWS,
+        *base.CHECK,
     ),
     rows=rows_of("continuous_rating", {"shown": "c"}, "LEFT JOIN clips k ON k.sha256 = c.clip_sha256\n"),
 )

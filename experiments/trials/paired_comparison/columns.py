@@ -59,7 +59,8 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "expected_response",
         "integer",
-        "The answer asked for in an attention check: 1 left or first, 2 right or second, 3 tie.",
+        "The answer asked for in an attention check (1 left or first, 2 right or second, 3 tie), or right in "
+        "a motion check.",
         source="a",
     ),
 )
@@ -84,6 +85,7 @@ COMPARISONS = View(
         *base.CLOCK,
         *base.VIEWS,
         *base.EVIDENCE,
+        *base.CHECK,
     ),
     rows=rows_of("paired_comparison", _ROLES),
 )

@@ -38,7 +38,12 @@ ANSWER: tuple[Column, ...] = (
         "count.",
         source="w",
     ),
-    Column("expected_response", "integer", "The answer asked for in an attention check: 1 or 2.", source="a"),
+    Column(
+        "expected_response",
+        "integer",
+        "The answer asked for in an attention check (1 or 2), or right in a motion check.",
+        source="a",
+    ),
 )
 
 ESTIMATE: tuple[Column, ...] = (
@@ -115,6 +120,7 @@ THRESHOLDS = View(
         *base.CLOCK,
         *base.VIEWS,
         *base.EVIDENCE,
+        *base.CHECK,
     ),
     rows=rows_of("threshold", {}, _TABLES),
 )

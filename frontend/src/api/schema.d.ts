@@ -1970,6 +1970,28 @@ export interface components {
             status: "draft" | "pilot" | "live" | "closed";
         };
         /**
+         * CheckAnswer
+         * @description The number of the choice; none where the clip could not be shown, or the other way was taken.
+         */
+        CheckAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "check";
+            /**
+             * Check
+             * @description Number of the choice, from 1.
+             */
+            check: number | null;
+            /**
+             * Other Way
+             * @description True where the way around was taken that the study offers.
+             * @default false
+             */
+            other_way?: boolean;
+        };
+        /**
          * CheckWording
          * @description The words of one kind of check, for a study in other languages than English and German.
          */
@@ -4804,7 +4826,7 @@ export interface components {
              */
             play?: number;
             /** Answer */
-            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"] | components["schemas"]["ContinuousAnswer"];
+            answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"] | components["schemas"]["ContinuousAnswer"] | components["schemas"]["CheckAnswer"];
             /**
              * Rt
              * @description From the clip's last frame to the answer, ms.
@@ -5473,6 +5495,8 @@ export interface components {
             blocks: components["schemas"]["BlockInfo"][];
             /** Trials */
             trials: components["schemas"]["TrialInfo"][];
+            /** @description Words of the motion checks; null where there are none. */
+            checks?: components["schemas"]["ShownChecks"] | null;
             /** Elapsed Ms Before */
             elapsed_ms_before: number;
             /** Completion Code */
@@ -5896,6 +5920,27 @@ export interface components {
             };
         };
         /**
+         * ShownCheck
+         * @description What is asked about the clips of one kind of motion check; answers are numbered from 1.
+         */
+        ShownCheck: {
+            /** Question */
+            question: string;
+            /** Choices */
+            choices: string[];
+        };
+        /**
+         * ShownChecks
+         * @description The motion checks of a study as the page gets them, in the run's language.
+         */
+        ShownChecks: {
+            /** By Kind */
+            by_kind: {
+                [key: string]: components["schemas"]["ShownCheck"];
+            };
+            other_way: components["schemas"]["ShownOtherWay"] | null;
+        };
+        /**
          * ShownClip
          * @description One of several clips of a trial; the log of drawn frames is that of all, since one clock draws them.
          */
@@ -5995,6 +6040,16 @@ export interface components {
             check_scale: components["schemas"]["Points"];
             /** Expected Seconds */
             expected_seconds: number;
+        };
+        /**
+         * ShownOtherWay
+         * @description The way around motion checks: its button, and the Markdown behind it.
+         */
+        ShownOtherWay: {
+            /** Label */
+            label: string;
+            /** Text */
+            text: string;
         };
         /**
          * ShownPairedComparison
@@ -6828,7 +6883,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "practice" | "main" | "attention";
+            kind: "practice" | "main" | "attention" | "check";
             /** Block */
             block: number;
             /** Clip Sha256 */
@@ -6859,6 +6914,11 @@ export interface components {
              * @description Markdown of an attention check.
              */
             prompt: string | null;
+            /**
+             * Check
+             * @description What kind of motion check it is; its answer is told nobody.
+             */
+            check?: ("digit" | "direction" | "shape" | "first_blink" | "first_eye") | null;
             /** Plays Done */
             plays_done: number;
             /** Plays Wanted */
@@ -7369,6 +7429,7 @@ export type ChangeOut = components['schemas']['ChangeOut'];
 export type ChangePassword = components['schemas']['ChangePassword'];
 export type ChangeSettings = components['schemas']['ChangeSettings'];
 export type ChangeStatus = components['schemas']['ChangeStatus'];
+export type CheckAnswer = components['schemas']['CheckAnswer'];
 export type CheckWording = components['schemas']['CheckWording'];
 export type Checked = components['schemas']['Checked'];
 export type ChoiceField = components['schemas']['ChoiceField'];
@@ -7509,10 +7570,13 @@ export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
 export type ShownAnswer = components['schemas']['ShownAnswer'];
+export type ShownCheck = components['schemas']['ShownCheck'];
+export type ShownChecks = components['schemas']['ShownChecks'];
 export type ShownClip = components['schemas']['ShownClip'];
 export type ShownClipRating = components['schemas']['ShownClipRating'];
 export type ShownClips = components['schemas']['ShownClips'];
 export type ShownContinuousRating = components['schemas']['ShownContinuousRating'];
+export type ShownOtherWay = components['schemas']['ShownOtherWay'];
 export type ShownPairedComparison = components['schemas']['ShownPairedComparison'];
 export type ShownReference = components['schemas']['ShownReference'];
 export type ShownThreshold = components['schemas']['ShownThreshold'];

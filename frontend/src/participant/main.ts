@@ -164,9 +164,10 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   if (!kept) keeping.begin({ link, started, run });
   const kind = known ?? (await loadKind(run.trial.kind));
   identity.keepTab();
+  const checks = run.checks ? await loadKind("motion_check") : kind;
   await loadMessages(run.language);
   const player = await choosePlayer(run.display);
-  const session = openSession({ root, link, run, kind, player, outbox, unsent });
+  const session = openSession({ root, link, run, kind, checks, player, outbox, unsent });
   setLanguage(run.language);
   setScales(run.display.right_to_left_scales);
   const over = (): Promise<void> => {

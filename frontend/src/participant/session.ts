@@ -29,6 +29,8 @@ export interface Session {
   interaction: InteractionLog;
   /** The screens of the declared kind of trial. */
   kind: TrialKind;
+  /** The screens of motion checks, where the study declares any. */
+  checks: TrialKind;
   /** Warnings of the server that wait to be shown, before the next trial. */
   warnings: WarningShown[];
   /** Aborted when this page must do nothing more: another tab took over, or the participant stopped. */

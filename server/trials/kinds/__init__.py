@@ -19,7 +19,7 @@ from server.trials.verdict import Ruling
 if TYPE_CHECKING:
     from server.versions import LoadedVersion
 
-Part = Literal["practice", "main", "attention"]
+Part = Literal["practice", "main", "attention", "check"]
 
 
 class Preference(Protocol):

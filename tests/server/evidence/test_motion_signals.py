@@ -29,16 +29,21 @@ def test_guesses_are_counted_as_the_binomial_distribution_has_them() -> None:
     expected = sum(comb(10, k) * 0.25**k * 0.75 ** (10 - k) for k in range(6, 11))
     assert guessed(6, [4] * 10) == pytest.approx(expected)
     assert guessed(0, [4] * 10) == pytest.approx(1)
-    assert guessed(3, [2, 4, 25]) == pytest.approx(1 / 200)
+    assert guessed(10, [9] * 4 + [4] * 6) == pytest.approx(9**-4 * 4**-6)
 
 
 def test_too_few_checks_say_nothing() -> None:
+    """Where one lapse would make somebody who sees them look like a guess."""
+    enough = {9: 6, 4: 8, 2: 20}
     assert guessed(0, []) is None
-    assert guessed(0, [2] * 6) is None
-    assert guessed(7, [2] * 7) == pytest.approx(2**-7)
+    for choices, number in enough.items():
+        assert guessed(number, [choices] * number) is not None
+    assert guessed(4, [9] * 4) is None
+    assert guessed(5, [4] * 5) is None
+    assert guessed(10, [2] * 10) is None
 
 
-@pytest.mark.parametrize("choices", [2, 4, 9])
+@pytest.mark.parametrize("choices", [4, 9])
 def test_guessing_passes_ten_checks_less_than_once_in_a_hundred_runs(choices: int) -> None:
     """By the distribution itself: the chance to reach the least number of right answers that passes."""
     passes = next(n for n in range(CHECKS + 1) if (guessed(n, [choices] * CHECKS) or 0) < 0.01)

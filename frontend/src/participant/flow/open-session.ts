@@ -33,12 +33,13 @@ export interface Opening {
   link: LinkState;
   run: RunState;
   kind: TrialKind;
+  checks: TrialKind;
   player: ClipPlayer;
   outbox: Outbox;
   unsent: OutboxItem[];
 }
 
-export function openSession({ root, link, run, kind, player, outbox, unsent }: Opening): Session {
+export function openSession({ root, link, run, kind, checks, player, outbox, unsent }: Opening): Session {
   const screen = new ScreenState();
   unsent.forEach((item) => applyWrite(run, item));
   screen.restore(run.calibration);
@@ -58,6 +59,7 @@ export function openSession({ root, link, run, kind, player, outbox, unsent }: O
     replays: new Replays(),
     warnings: run.warning ? [run.warning] : [],
     kind,
+    checks,
     interaction: new InteractionLog(window, over.signal),
     over,
     api: new RunApi(outbox),

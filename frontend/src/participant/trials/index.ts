@@ -17,5 +17,6 @@ export function loadKind(name: string): Promise<TrialKind> {
 
 /** The timeline node that shows what `what` names when its turn comes. */
 export function trialNode(session: Session, kind: TrialInfo["kind"], what: () => Showable): Node {
+  if (kind === "check") return session.checks.node(session, what);
   return kind === "attention" ? session.kind.attention(session, what) : session.kind.node(session, what);
 }

@@ -29,7 +29,7 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
 
 /** A play whose view was broken off has no answer; the trial comes once more at the end of its block. */
 export async function saveInterrupted(session: Session, trial: TrialInfo, play: number): Promise<void> {
-  const body = session.kind.unrated(session, trial, play);
+  const body = (trial.kind === "check" ? session.checks : session.kind).unrated(session, trial, play);
   await saveRating(session, trial, { ...body, playback: { ...body.playback, disturbances: { interrupted: 1 } } });
   if (trial.kind === "main" && play <= session.run.playback.max_repeats) session.replays.add(trial, play + 1);
 }

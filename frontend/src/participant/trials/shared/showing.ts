@@ -16,8 +16,16 @@ export interface Shown extends Showing {
 const FALLBACK_REFRESH_MS = 1000 / 60;
 
 /** The ready screen; resolves with the time of the press that starts the clip (absolute, ms). */
-export function waitForStart(session: Session, place: Stage, prompt: string, note: string, pointer_delay_ms: number): Promise<number> {
+export function waitForStart(
+  session: Session,
+  place: Stage,
+  prompt: string,
+  note: string,
+  pointer_delay_ms: number,
+  left?: AbortSignal,
+): Promise<number> {
   const { signal, done } = screenSignal(session);
+  left?.addEventListener("abort", done);
   const { t } = session;
   return new Promise((resolve) => {
     const meant = new MeantPress(pointer_delay_ms, signal);

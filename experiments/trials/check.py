@@ -1,0 +1,31 @@
+"""The answer to a motion check, the same in studies of every kind of trial."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StrictInt, model_validator
+
+from experiments.trials.kind import Answer
+
+MAX_CHOICES = 9
+"""A key each."""
+
+
+class CheckAnswer(Answer):
+    """The number of the choice; none where the clip could not be shown, or the other way was taken."""
+
+    kind: Literal["check"]
+    check: Annotated[StrictInt, Field(ge=1, le=MAX_CHOICES)] | None
+    """Number of the choice, from 1."""
+    other_way: bool = False
+    """True where the way around was taken that the study offers."""
+
+    @property
+    def given(self) -> bool:
+        """True where the check itself was answered."""
+        return self.check is not None
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> Self:
+        if self.other_way and self.check is not None:
+            raise ValueError(f"expected a choice or the other way, got both: {self.check}")
+        return self
