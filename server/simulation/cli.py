@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from sqlalchemy import select
 
+from experiments.checks import CHECK_CELL
 from experiments.errors import InputError
 from experiments.trials.threshold.declaration import Threshold
 from server.app import create_app
@@ -128,7 +129,8 @@ def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Ca
         study = find_study(session, name)
         query = select(VersionClip.clip_sha256, VersionClip.levels, VersionClip.blinks_s)
         version = active_version(session, study)
-        rows = session.execute(query.where(VersionClip.version_id == version.id)).all()
+        of_design = (VersionClip.version_id == version.id, VersionClip.cell != CHECK_CELL)
+        rows = session.execute(query.where(*of_design)).all()
         blinks: dict[str, list[float]] = {row.clip_sha256: row.blinks_s or [] for row in rows}
         levels: dict[str, dict[str, str]] = {row.clip_sha256: row.levels for row in rows}
         link = create_link(

@@ -21,6 +21,7 @@ from server.simulation.person import Person, Rater
 from server.studies.importing import add_version
 from server.studies.lookup import active_version
 from server.tallies.recount import Recount
+from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 from tests.helpers.thresholds import YES_NO, text_with
 from tests.server.trials.test_comparisons import PAIRS
@@ -185,6 +186,17 @@ def test_every_kind_of_trial_has_checks(services: Services, tmp_path: Path, text
     assert len(exported) == 2 * len({row["block"] for row in exported}) >= 2
     assert all(row["check_response"] for row in exported)
     assert all(row["expected_response"] in map(str, range(1, 10)) for row in exported)
+
+
+def test_the_command_simulates_observers_beside_checks(services: Services, tmp_path: Path) -> None:
+    """Clips of checks are no stimuli of the psychometric function."""
+    study = add_study(services, tmp_path / "clips", checked(text_with(SHORT, YES_NO)))
+    called = run_server_command(services.settings, "simulate", study.name, "--participants", "1")
+    assert (called.returncode, called.stderr.count("Traceback")) == (0, 0), called.stderr
+    assert "1 simulated participants" in called.stdout
+    kept = [row for row in rows(services, study.name) if row["kind"] == "check"]
+    assert kept
+    assert all(row["check_response"] for row in kept)
 
 
 MANNERS = {"honest": "likely", "frames": "unclear", "flow": "unclear", "assistive": "unclear"}
