@@ -2,6 +2,11 @@ import { defineConfig, type Plugin } from "vite";
 
 const BASE = "/assets/participant/";
 const OFFLINE = "service-worker";
+/** Six characters of the hash tell builds apart; the names stand in the page and in the service worker, gzipped badly. */
+const NAMED = "[name]-[hash:6].js";
+/** What every kind of trial and the pages beside them need. */
+const SHARED =
+  /src\/ui\/|participant\/(session|screens\/support|jspsych|playback\/protocol|trials\/(save-rating|shared\/(stage|already-seen|place|showing|feedback|broken)))/;
 
 /** Tells the service worker the names of the built files, which it keeps. */
 function listFiles(): Plugin {
@@ -33,7 +38,13 @@ export default defineConfig({
     manifest: true,
     rolldownOptions: {
       input: { index: "src/participant/index.html", [OFFLINE]: "src/participant/service-worker.ts" },
-      output: { entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : "[name]-[hash].js") },
+      output: {
+        entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : NAMED),
+        chunkFileNames: NAMED,
+        assetFileNames: "[name]-[hash:6][extname]",
+        // Left alone, every module that two pages share becomes a file of its own, and small files compress badly.
+        codeSplitting: { groups: [{ name: "base", test: SHARED }] },
+      },
     },
   },
   worker: { format: "es" },

@@ -38,9 +38,16 @@ function participant(manifest) {
     .filter((name) => /^(index\.html|boot-check\.js|service-worker\.js|worker-.*\.js)$/.test(name));
   const first = filesOf(manifest, "index.html", new Set(beside));
   const pages = manifest["index.html"].dynamicImports;
-  const largest = (pattern) =>
-    Math.max(...pages.filter((page) => pattern.test(page)).map((page) => sum(filesOf(manifest, page, new Set(first))) - sum(first)));
-  const [language, kind] = [largest(/\/languages\//), largest(/^trials\/[^/]+\/index\.ts$/)];
+  const further = (page, loaded) => sum(filesOf(manifest, page, new Set(loaded))) - sum(loaded);
+  const largest = (names, pattern, loaded, more = () => 0) =>
+    Math.max(...names.filter((name) => pattern.test(name)).map((name) => further(name, loaded) + more(name)));
+  /** The largest type of scale that a kind of trial loads before its first trial; none where it has none. */
+  const scale = (kind) => {
+    const parts = manifest[kind].dynamicImports ?? [];
+    return Math.max(0, largest(parts, /^trials\/scales\//, filesOf(manifest, kind, new Set(first))));
+  };
+  const language = largest(pages, /\/languages\//, first);
+  const kind = largest(pages, /^trials\/[^/]+\/index\.ts$/, first, scale);
   if (beside.length !== 4 || !Number.isFinite(language + kind)) {
     console.error("error: expected page, worker, service worker, languages and kinds in dist/participant; build the page again");
     process.exitCode = 1;

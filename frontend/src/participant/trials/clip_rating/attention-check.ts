@@ -3,7 +3,6 @@ import type { TrialInfo } from "../../../api/schema";
 import { h } from "../../../ui/element";
 import { markdown } from "../../../ui/markdown";
 import { focusHeading } from "../../../ui/page";
-import { INT, OBJECT, plugin, type PluginClass } from "../../jspsych";
 import { playbackRecord } from "../../playback/record";
 import { absoluteNow } from "../../playback/protocol";
 import { screenSignal, stopButton } from "../../screens/support";
@@ -13,30 +12,7 @@ import { onlyResponse } from "./answer";
 import { askScales, type Rated } from "./scale";
 import { saveRating } from "../save-rating";
 
-interface Parameters {
-  trial: TrialInfo;
-}
-interface Data {
-  response: number;
-}
-
-export function attentionCheck(session: Session): PluginClass<Parameters> {
-  return plugin<Parameters, Data>({
-    name: "attention-check",
-    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
-    data: { response: { type: INT, description: "the answer given" } },
-    show: (display, { trial }) => check(session, display, trial),
-    async simulate({ trial }) {
-      const response = Number(/\*\*(\d+)\*\*/.exec(trial.prompt ?? "")?.[1] ?? declaredRating(session).check_scale.minimum);
-      const answers = { [declaredRating(session).check_scale.name]: { response } };
-      await store(session, trial, absoluteNow(), { answers, at_ms: {}, answered_at_ms: absoluteNow(), changes: 0, comment: null });
-      return { response };
-    },
-    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
-  });
-}
-
-async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<Data> {
+export async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<{ response: number }> {
   const { signal, done } = screenSignal(session);
   const below = h("div", { class: "below" });
   const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
@@ -60,7 +36,7 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
   return { response: onlyResponse(rated.answers) ?? check_scale.minimum };
 }
 
-function store(session: Session, trial: TrialInfo, shown_at_ms: number, rated: Rated): Promise<void> {
+export function store(session: Session, trial: TrialInfo, shown_at_ms: number, rated: Rated): Promise<void> {
   return saveRating(session, trial, {
     trial_index: trial.trial_index,
     play: 1,

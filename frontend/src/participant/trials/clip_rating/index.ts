@@ -1,19 +1,46 @@
 /** The single-clip rating as the registry of trial kinds finds it. */
-import { trial } from "../../jspsych";
+import type { TrialInfo } from "../../../api/schema";
+import { INT, OBJECT, plugin, type PluginClass, trial } from "../../jspsych";
+import { absoluteNow } from "../../playback/protocol";
+import type { Session } from "../../session";
 import type { TrialKind } from "../kind";
-import { attentionCheck } from "./attention-check";
 import { placeIn } from "../shared/place";
+import { declaredRating } from "./declared";
 import { clipRating, unrated } from "./screen";
+import { loadWidgets } from "./widget";
+
+/** What it draws comes beside the first trial, which does not wait for it, and is here when a check is. */
+function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
+  const loaded = import("./attention-check");
+  return plugin<{ trial: TrialInfo }, { response: number }>({
+    name: "attention-check",
+    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
+    data: { response: { type: INT, description: "the answer given" } },
+    show: async (display, parameters) => (await loaded).check(session, display, parameters.trial),
+    async simulate(parameters) {
+      const { check_scale } = declaredRating(session);
+      const response = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? check_scale.minimum);
+      const answers = { [check_scale.name]: { response } };
+      const rated = { answers, at_ms: {}, answered_at_ms: absoluteNow(), changes: 0, comment: null };
+      await (await loaded).store(session, parameters.trial, absoluteNow(), rated);
+      return { response };
+    },
+    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
+  });
+}
 
 export const kind: TrialKind = {
-  node: (session, what) =>
-    trial(clipRating(session), {
+  node: (session, what) => {
+    // Asked for now, so that no scale waits; what cannot be had is asked for again where it is shown.
+    void loadWidgets(declaredRating(session).scales).catch(() => {});
+    return trial(clipRating(session), {
       trial: () => what().trial,
       play: () => what().play,
       next: () => what().next,
       number: () => placeIn(session, what().trial).number,
       total: () => placeIn(session, what().trial).total,
-    }),
+    });
+  },
   attention: (session, what) => trial(attentionCheck(session), { trial: () => what().trial }),
   unrated,
 };

@@ -5,7 +5,7 @@ import { h, uniqueId } from "../../../ui/element";
 import { listenKeys } from "../../../ui/keys";
 import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
-import { type Scale, makeWidget, type Widget } from "./widget";
+import { loadWidgets, makeWidget, type Scale, type Widget } from "./widget";
 
 type Answers = RatingAnswer["answers"];
 export interface Rated {
@@ -61,7 +61,8 @@ async function withOwnKeys<T>(signal: AbortSignal, ask: (signal: AbortSignal) =>
 }
 
 /** Show the scales in `place`; resolves with the answers. Their times are those of the presses that chose them. */
-export function askScales(place: HTMLElement, options: ScaleOptions): Promise<Rated> {
+export async function askScales(place: HTMLElement, options: ScaleOptions): Promise<Rated> {
+  await loadWidgets(options.scales);
   return new Promise((resolve) => new ScalesView(place, options, resolve));
 }
 

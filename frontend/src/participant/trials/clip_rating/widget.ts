@@ -28,10 +28,22 @@ export interface Widget {
 }
 type MakeWidget = (ask: Ask) => Widget;
 
-const files = import.meta.glob<MakeWidget>("../scales/*.ts", { import: "widget", eager: true });
+const files = import.meta.glob<MakeWidget>("../scales/*.ts", { import: "widget" });
+const makers = new Map<string, MakeWidget>();
 
+/** Fetch what draws these scales. The kind asks for it before its first trial, so that no scale waits. */
+export async function loadWidgets(scales: readonly Scale[]): Promise<void> {
+  for (const { type } of scales) {
+    if (makers.has(type)) continue;
+    const load = files[`../scales/${type}.ts`];
+    if (!load) throw new Error(`expected a scale this page knows, got ${type}; load the page again`);
+    makers.set(type, await load());
+  }
+}
+
+/** The widget of a scale that `loadWidgets` has fetched. */
 export function makeWidget(ask: Ask): Widget {
-  const make = files[`../scales/${ask.scale.type}.ts`];
-  if (!make) throw new Error(`expected a scale this page knows, got ${ask.scale.type}; load the page again`);
+  const make = makers.get(ask.scale.type);
+  if (!make) throw new Error(`expected the scale ${ask.scale.type} to be loaded`);
   return make(ask);
 }

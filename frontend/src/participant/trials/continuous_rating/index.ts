@@ -6,17 +6,17 @@ import type { TrialKind } from "../kind";
 import { placeIn } from "../shared/place";
 import { continuousRating, unrated } from "./screen";
 
-/** What it draws is loaded when a check comes: few studies have one, and no trial waits for it. */
+/** What it draws comes beside the first trial, which does not wait for it, and is here when a check is. */
 function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
-  const loaded = () => import("./attention-check");
+  const loaded = import("./attention-check");
   return plugin<{ trial: TrialInfo }, { chosen: number }>({
     name: "continuous-check",
     parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
     data: { chosen: { type: INT, description: "the answer given" } },
-    show: async (display, parameters) => (await loaded()).check(session, display, parameters.trial),
+    show: async (display, parameters) => (await loaded).check(session, display, parameters.trial),
     async simulate(parameters) {
       const chosen = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? "1");
-      await (await loaded()).store(session, parameters.trial, chosen, 0);
+      await (await loaded).store(session, parameters.trial, chosen, 0);
       return { chosen };
     },
     act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
