@@ -53,6 +53,17 @@ export function plugin<Parameters extends object, Data extends object>(screen: S
   };
 }
 
+/** What a simulated person does on a page: press these buttons from when it is there until it is gone. */
+export function pressWhile(display: HTMLElement, page: string, buttons: string[]): void {
+  let seen = false;
+  const timer = setInterval(() => {
+    const section = display.querySelector(page);
+    if (seen && !section) clearInterval(timer);
+    seen ||= section !== null;
+    for (const name of buttons) section?.querySelector<HTMLButtonElement>(name)?.click();
+  }, 250);
+}
+
 type OrFunction<Parameters> = { [Name in keyof Parameters]: Parameters[Name] | (() => Parameters[Name]) };
 export type Node = { type: PluginClass<never> } | Branch;
 interface Branch {

@@ -1,5 +1,5 @@
 /** The rest between blocks; what draws it is loaded beside the first trials. */
-import { INT, plugin, type PluginClass } from "../jspsych";
+import { INT, plugin, type PluginClass, pressWhile } from "../jspsych";
 import type { Session } from "../session";
 
 export interface Parameters {
@@ -25,11 +25,6 @@ export function blockBreak(session: Session): PluginClass<Parameters> {
     data: { rested_ms: { type: INT, description: "length of the rest in ms" } },
     show: async (display, parameters) => (await loadRest()).rest(session, display, parameters),
     simulate: () => ({ rested_ms: 0 }),
-    act(display) {
-      const timer = setInterval(() => {
-        display.querySelector<HTMLButtonElement>(".primary")?.click();
-        if (!display.querySelector(".break")) clearInterval(timer);
-      }, 250);
-    },
+    act: (display) => pressWhile(display, ".break", [".primary"]),
   });
 }

@@ -1,6 +1,6 @@
 /** The single-clip rating as the registry of trial kinds finds it. */
 import type { TrialInfo } from "../../../api/schema";
-import { INT, OBJECT, plugin, type PluginClass, trial } from "../../jspsych";
+import { INT, OBJECT, plugin, type PluginClass, pressWhile, trial } from "../../jspsych";
 import { absoluteNow } from "../../playback/protocol";
 import type { Session } from "../../session";
 import type { TrialKind } from "../kind";
@@ -21,11 +21,12 @@ function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
       const { check_scale } = declaredRating(session);
       const response = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? check_scale.minimum);
       const answers = { [check_scale.name]: { response } };
-      const rated = { answers, at_ms: {}, answered_at_ms: absoluteNow(), changes: 0, comment: null };
-      await (await loaded).store(session, parameters.trial, absoluteNow(), rated);
+      const shown_at_ms = absoluteNow();
+      const rated = { answers, at_ms: {}, answered_at_ms: shown_at_ms, changes: 0, comment: null };
+      await (await loaded).store(session, parameters.trial, shown_at_ms, rated);
       return { response };
     },
-    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
+    act: (display) => pressWhile(display, ".attention", [".key", ".primary"]),
   });
 }
 

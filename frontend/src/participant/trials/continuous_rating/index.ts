@@ -1,6 +1,6 @@
 /** The continuous rating as the registry of trial kinds finds it. */
 import type { TrialInfo } from "../../../api/schema";
-import { INT, OBJECT, plugin, type PluginClass, trial } from "../../jspsych";
+import { INT, OBJECT, plugin, type PluginClass, pressWhile, trial } from "../../jspsych";
 import type { Session } from "../../session";
 import type { TrialKind } from "../kind";
 import { placeIn } from "../shared/place";
@@ -19,7 +19,7 @@ function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
       await (await loaded).store(session, parameters.trial, chosen, 0);
       return { chosen };
     },
-    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
+    act: (display) => pressWhile(display, ".attention", [".key", ".primary"]),
   });
 }
 

@@ -3,7 +3,7 @@ import type { TrialInfo } from "../../../api/schema";
 import { h } from "../../../ui/element";
 import { markdown } from "../../../ui/markdown";
 import { focusHeading } from "../../../ui/page";
-import { OBJECT, plugin, STRING, type PluginClass } from "../../jspsych";
+import { OBJECT, plugin, STRING, type PluginClass, pressWhile } from "../../jspsych";
 import { absoluteNow } from "../../playback/protocol";
 import { playbackRecord } from "../../playback/record";
 import { stopButton } from "../../screens/support";
@@ -32,7 +32,7 @@ export function thresholdCheck(session: Session): PluginClass<Parameters> {
       await store(session, trial, chosen, 0);
       return { chosen };
     },
-    act: (display) => display.querySelector<HTMLButtonElement>(".key")?.click(),
+    act: (display) => pressWhile(display, ".attention", [".key", ".primary"]),
   });
 }
 
