@@ -2,8 +2,9 @@ import { defineConfig, type Plugin } from "vite";
 
 const BASE = "/assets/participant/";
 const OFFLINE = "service-worker";
-/** Six characters of the hash tell builds apart; the names stand in the page and in the service worker, gzipped badly. */
+/** Short: the names stand in the page and in the service worker, gzipped badly. What loads later goes by its hash alone. */
 const NAMED = "[name]-[hash:6].js";
+const LATER = "[hash:6].js";
 /** What every kind of trial and the pages beside them need. */
 const SHARED =
   /src\/ui\/|participant\/(session|screens\/support|jspsych|playback\/protocol|trials\/(save-rating|shared\/(stage|already-seen|place|showing|feedback|broken)))/;
@@ -40,7 +41,7 @@ export default defineConfig({
       input: { index: "src/participant/index.html", [OFFLINE]: "src/participant/service-worker.ts" },
       output: {
         entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : NAMED),
-        chunkFileNames: NAMED,
+        chunkFileNames: LATER,
         assetFileNames: "[name]-[hash:6][extname]",
         // Left alone, every module that two pages share becomes a file of its own, and small files compress badly.
         codeSplitting: { groups: [{ name: "base", test: SHARED }] },
