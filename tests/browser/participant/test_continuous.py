@@ -67,7 +67,7 @@ def test_a_held_key_moves_the_slider_and_the_trace_follows(
     assert len(values) == FRAMES // 3
     assert answer["step_frames"] == 3
     assert values == sorted(values)
-    # Three seconds from end to end: 0.6 s move it by a fifth of the way, from the middle; timers of a busy machine vary.
+    # Three seconds from end to end, so 0.6 s are a fifth of the way; timers of a busy machine vary.
     assert 5 <= values[-1] - values[0] <= 50
     assert answer["moves"] >= 1
 
