@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from experiments.load import DEMOS, load_experiment, locate
+from experiments.load import load_experiment, locate
 from server.app import create_app
 from server.simulation.person import Person, Rater
 from tests.browser.admin.conftest import Dashboard
@@ -20,6 +20,7 @@ from tests.server.trials.test_thresholds import Api
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 PEOPLE = {"pairs-demo": 3, "sliders-demo": 2, "threshold-demo": 1}
+DEMOS = tuple(PEOPLE)
 LABELS = {
     "pairs-demo": "Photorealistic, From the model",
     "sliders-demo": "Photorealistic",
