@@ -147,5 +147,5 @@ export function timePlot({ response_times }: AnyResults): Plot.PlotOptions {
 
 export function delayPlot({ playback }: AnyResults): Plot.PlotOptions {
   const bins = playback.key_to_first_frame_ms.map((count, place) => ({ from: 10 * place, count }));
-  return histogram(bins, 10, "ms from key to frame; last bin: 100 and more", "plays");
+  return histogram(bins, 10, "ms, key to frame (last bin: 100+)", "plays");
 }

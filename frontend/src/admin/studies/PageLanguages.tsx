@@ -15,6 +15,7 @@ export function PageLanguages() {
         an unreviewed language, or have it read, before people take part in it.
       </Text>
       <DataTable
+        label="Languages of the page"
         rows={SHIPPED}
         rowKey={(tag) => tag}
         empty="None."
@@ -25,7 +26,7 @@ export function PageLanguages() {
             title: "Read by",
             cell: (tag) => {
               const by = reviewed[tag];
-              return by ? `${by.by}, ${by.on}` : <Badge color="orange">unreviewed</Badge>;
+              return by ? `${by.by}, ${by.on}` : <Badge variant="default">unreviewed</Badge>;
             },
           },
         ]}

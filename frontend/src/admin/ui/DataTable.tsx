@@ -36,7 +36,8 @@ export function DataTable<Row>({ columns, rows, rowKey, empty, label, dense = fa
   const shown = paged ? rows.slice((current - 1) * ROWS_A_PAGE, current * ROWS_A_PAGE) : rows;
   return (
     <Stack gap="sm">
-      <div className="scroll-x">
+      {/* Reached by keyboard, so that it can be scrolled where it is wider than the screen. */}
+      <div className="scroll-x" tabIndex={0} role="group" aria-label={label ?? "Table"}>
         <Table highlightOnHover verticalSpacing={dense ? 4 : "xs"} aria-label={label}>
           <Table.Thead>
             <Table.Tr>
