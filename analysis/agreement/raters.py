@@ -112,7 +112,9 @@ def agreement(votes: Votes, level: Level = "interval") -> Agreement:
 def _usable(votes: Votes, level: Level) -> Floats:
     """Ratings (people, items) of the items that two people or more rated."""
     scores = votes.scores[:, np.isfinite(votes.scores).sum(axis=0) >= 2]
-    if len(votes.people) < 2 or scores.shape[1] < 2:
+    # Who rated only items that nobody else did tells nothing either.
+    scores = scores[np.isfinite(scores).any(axis=1)]
+    if len(scores) < 2 or scores.shape[1] < 2:
         raise InputError(
             f"{votes.source}: expected two people or more on each of two items or more, got "
             f"{len(votes.people)} people and {scores.shape[1]} items that two of them rated"

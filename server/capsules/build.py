@@ -1,10 +1,10 @@
 """Build a capsule: Psych-DS folder, clips, report, software versions and RO-Crate, then the zip of all."""
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
@@ -82,6 +82,15 @@ def build_capsule(
     return capsule
 
 
+def _without_answers(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """The manifest without what would answer the motion checks of a study that still runs."""
+    kept = {key: value for key, value in manifest.items() if key != "checks_seed"}
+    if "checks" in kept:
+        checks = kept["checks"]
+        kept["checks"] = [{key: one[key] for key in one if key != "answer"} for one in checks]
+    return kept
+
+
 def _write_study(
     session: Session, study: Study, version: StudyVersion, folder: Path, made: str, wanted: Wanted
 ) -> ReportSource:
@@ -93,7 +102,7 @@ def _write_study(
                 stream.write(piece)
     experiment, seal = definition_of(version), seal_of(session, study)
     texts = {
-        "materials/manifest.json": json_text(version.manifest),
+        "materials/manifest.json": json_text(_without_answers(version.manifest)),
         "analysis/plan.json": json_text(_plan(experiment)),
         "documentation/software.json": json_text(present_software().model_dump(mode="json")),
     }

@@ -106,14 +106,21 @@ class Intake:
         at_hand = [one for one in hashes if one is not None]
         if len(at_hand) < len(hashes):
             return None
-        if clip_digest(given.ticket, *at_hand) != given.digest and not self._is_older(answer, given):
+        right = True if clip_digest(given.ticket, *at_hand) == given.digest else self._is_older(answer, given)
+        if right is False:
             raise DigestDiffers("Expected the digest of this trial's clip, got another; nothing is stored.")
-        return True
+        return right
 
-    def _is_older(self, answer: Answer, given: RatingEvidence) -> bool:
-        """Whether the digest is right as a page makes it that was open before the last upgrade."""
-        clips = [self.clips.at_once(sha256, size) or b"" for sha256, size in answer.clips]
-        return older_digest(given.ticket, b"".join(clips)) == given.digest
+    def _is_older(self, answer: Answer, given: RatingEvidence) -> bool | None:
+        """Whether the digest is right as a page makes it that was open before the last upgrade.
+
+        None where the clips' bytes are not at hand: then nothing can be said.
+        """
+        clips = [self.clips.at_once(sha256, size) for sha256, size in answer.clips]
+        at_hand = [one for one in clips if one is not None]
+        if len(at_hand) < len(clips):
+            return None
+        return older_digest(given.ticket, b"".join(at_hand)) == given.digest
 
 
 def _in_time(connection: Connection, answer: Answer, batch: Batch) -> bool:

@@ -1,7 +1,7 @@
 """How much one run may hold beside its ratings: our page stays far below, a script fills no disk."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from server.errors import ApiError
@@ -10,6 +10,8 @@ DEVICE_KEYS, DEVICE_BYTES = 200, 32 * 1024
 EVENT_BYTES, EVENTS_A_RUN = 4 * 1024, 20_000
 """A heartbeat every few seconds makes some hundred events an hour."""
 CALIBRATIONS_A_RUN = 100
+SERVER_EVENTS = frozenset({"screened_out", "warned", "answer_refused", "answer_expired"})
+"""Types of events that say what the server did: codes and evidence rest on them, so no page may send them."""
 MAX_DEPTH = 8
 
 
@@ -32,6 +34,20 @@ def checked_data(data: dict[str, Any]) -> dict[str, Any]:
     """The data of one event; RunDataTooLarge where they are more than an event has to say."""
     _check_size(data, EVENT_BYTES, "the data of an event")
     return data
+
+
+class EventReserved(ApiError):
+    """A page sent an event that only the server writes."""
+
+    status = 422
+    code = "event_reserved"
+
+
+def check_event_types(types: Iterable[str]) -> None:
+    """EventReserved where one of the types is the server's own."""
+    reserved = sorted(SERVER_EVENTS.intersection(types))
+    if reserved:
+        raise EventReserved(f"Events of type '{reserved[0]}' are the server's own; nothing is stored.")
 
 
 def check_events(data: Sequence[dict[str, Any]], stored: int) -> None:

@@ -181,6 +181,7 @@ def save_events(session: Session, token: str, events: list[Event], moment: datet
     """Store events, each once; also after the run's end."""
     run = find_run(session, token, lock=True)
     run.last_seen_at = moment
+    bounds.check_event_types(event.type for event in events)
     bounds.check_events([event.data for event in events], repository.events(session, run))
     rows = [
         {

@@ -81,6 +81,13 @@ def test_krippendorffs_own_example(tmp_path, level, alpha) -> None:
     assert any("1 items rated by one person" in decision for decision in result.decisions)
 
 
+def test_who_rated_what_nobody_else_did_is_no_rater(tmp_path) -> None:
+    lines = [f"{who},c{clip},{1 + (clip + k) % 5}" for k, who in enumerate("ab") for clip in range(6)]
+    result = agreement(read_votes(votes_file(tmp_path, [*lines, "z,own,3"]), "clip", "id", "score"))
+    assert (result.n_people, result.n_items, result.n_complete_items) == (2, 6, 6)
+    assert result.icc
+
+
 @pytest.mark.parametrize(
     ("lines", "said"),
     [

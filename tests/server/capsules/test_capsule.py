@@ -19,7 +19,7 @@ from experiments.capsule.opening import CapsuleError, open_capsule
 from experiments.errors import InputError
 from experiments.load import FOLDER
 from server.app import create_app
-from server.capsules.build import Wanted, build_capsule
+from server.capsules.build import Wanted, _without_answers, build_capsule
 from server.context import Services, open_services
 from server.seals.service import seal_plan
 from server.settings import Settings
@@ -258,6 +258,12 @@ def test_the_crate_says_what_each_file_is(unpacked: Path) -> None:
         "data/study-exp3_description-ratings_data.csv",
         "data/study-exp3_description-runs_data.csv",
     ]
+
+
+def test_answers_to_motion_checks_stay_out() -> None:
+    check = {"kind": "digit", "sha256": "0" * 64, "answer": "7"}
+    kept = _without_answers({"name": "x", "clips": [], "checks_seed": 5, "checks": [check]})
+    assert kept == {"name": "x", "clips": [], "checks": [{"kind": "digit", "sha256": "0" * 64}]}
 
 
 def test_the_clips_can_stay_out(opened: Services, tmp_path: Path) -> None:

@@ -149,6 +149,18 @@ def test_events_are_stored_once_also_after_the_end(participant: Participant, ser
     assert participant.request("POST", "/events", many).status_code == 422
 
 
+@pytest.mark.parametrize("type", ["screened_out", "warned", "answer_refused", "answer_expired"])
+def test_a_page_cannot_write_the_servers_own_events(
+    participant: Participant, services: Services, type: str
+) -> None:
+    participant.agree()
+    event = {"id": str(uuid.uuid4()), "type": type, "at": None, "data": {"rule": "warnings"}}
+    answer = participant.request("POST", "/events", {"events": [event]})
+    assert error_code(answer) == (422, "event_reserved")
+    with services.database.read() as session:
+        assert session.query(RunEvent).count() == 0
+
+
 def test_completion_waits_for_every_trial(participant: Participant) -> None:
     participant.agree()
     trials = participant.state()["trials"]
