@@ -3,6 +3,7 @@
 import hashlib
 import json
 import lzma
+import shutil
 import zipfile
 import zlib
 from collections import Counter
@@ -85,6 +86,7 @@ def _unpacked(place: Path, into: Path) -> Capsule:
         (into / CAPSULE_FILE).write_bytes(archive.read(head))
         capsule = _read_list(into / CAPSULE_FILE, place)
         _refuse_other_names(names, capsule)
+        _refuse_more_than_fits(capsule, into)
         for file in capsule.files:
             _unpack_one(archive, file, into)
     return capsule
@@ -117,7 +119,7 @@ def _read_list(path: Path, place: Path) -> Capsule:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise CapsuleError(f"{CAPSULE_FILE}: {where}: {first['msg']}; it was changed or damaged") from error
-    except (ValueError, AttributeError, RecursionError) as error:
+    except (ValueError, AttributeError, TypeError, RecursionError) as error:
         raise CapsuleError(f"{CAPSULE_FILE}: not the JSON of a capsule ({error})") from error
     if own != capsule.sha256:
         raise CapsuleError(f"{CAPSULE_FILE}: its content was changed: it has another hash than it says")
@@ -125,7 +127,25 @@ def _read_list(path: Path, place: Path) -> Capsule:
         parts = PurePosixPath(file.path).parts
         if file.path.startswith("/") or ".." in parts or "\\" in file.path or file.path == CAPSULE_FILE:
             raise CapsuleError(f"{file.path[:100]!r}: no path inside a capsule")
+    _refuse_sources_outside(capsule)
     return capsule
+
+
+def _refuse_sources_outside(capsule: Capsule) -> None:
+    """What the report is made again from must be files of the list, whose hashes were compared."""
+    listed, report = {file.path for file in capsule.files}, capsule.report
+    for path in (report.definition, report.answers, report.runs, report.seal):
+        if path is not None and path not in listed:
+            raise CapsuleError(
+                f"{CAPSULE_FILE}: the report was made of {path[:100]!r}, no file of the capsule"
+            )
+
+
+def _refuse_more_than_fits(capsule: Capsule, into: Path) -> None:
+    """Before anything is written: a list may claim any size."""
+    claimed, free = sum(file.bytes for file in capsule.files), shutil.disk_usage(into).free
+    if claimed > free:
+        raise CapsuleError(f"{CAPSULE_FILE}: its files take {claimed} bytes; {into} has {free} free")
 
 
 def _refuse_other_names(names: list[str], capsule: Capsule) -> None:

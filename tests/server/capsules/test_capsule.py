@@ -202,6 +202,26 @@ def relist(folder: Path) -> None:
     (folder / CAPSULE_FILE).write_text(changed.text(), encoding="utf-8")
 
 
+@pytest.mark.parametrize("path", ["/etc/hostname", "../outside.csv", "data/none.csv"])
+def test_a_report_made_of_files_outside_is_refused(unpacked: Path, path: str) -> None:
+    from experiments.capsule.declaration import Capsule
+
+    data = json.loads((unpacked / CAPSULE_FILE).read_text(encoding="utf-8"))
+    data.pop("sha256")
+    data["report"]["answers"] = path
+    (unpacked / CAPSULE_FILE).write_text(Capsule.model_validate(data).text(), encoding="utf-8")
+    code, said = verify(unpacked)
+    assert code == 2
+    assert f"the report was made of '{path}', no file of the list" in " ".join(said.split())
+
+
+def test_a_list_that_is_no_object_gets_one_line(unpacked: Path) -> None:
+    (unpacked / CAPSULE_FILE).write_text("[1, 2]", encoding="utf-8")
+    code, said = verify(unpacked)
+    assert code == 2
+    assert "not the JSON of a capsule" in said
+
+
 def test_a_report_that_the_data_do_not_give_is_not_verified(unpacked: Path) -> None:
     tables = unpacked / "results/tables.tex"
     tables.write_text(tables.read_text(encoding="utf-8").replace("0.", "9.", 1), encoding="utf-8")
