@@ -1,7 +1,8 @@
 """Clips rated while they are shown: a slider's place, sampled at their frames."""
 
 from experiments.schema.effects import Effect
-from experiments.trials.clip_rating.plan import block_size, plan
+from experiments.trials.clip_rating.plan import block_size
+from experiments.trials.clip_rating.plan import plan as planned
 from experiments.trials.continuous_rating.answer import ContinuousAnswer, check_response
 from experiments.trials.continuous_rating.columns import TRACES
 from experiments.trials.continuous_rating.declaration import ContinuousRating
@@ -50,7 +51,7 @@ CONTINUOUS_RATING = Kind(
     shown=shown,
     assign=assign,
     block_size=block_size,
-    plan=plan,
+    plan=planned,
     shares_clips=True,
     example=EXAMPLE,
     check_response=check_response,

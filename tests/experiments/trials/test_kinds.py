@@ -54,6 +54,10 @@ def test_its_example_is_a_declaration_of_its_own_type(kind: Kind) -> None:
     assert experiment.trial.kind == kind.name
 
 
+def test_its_plan_is_lines(kind: Kind) -> None:
+    assert all(isinstance(line, str) for line in kind.plan(declared(kind)))
+
+
 def test_an_unknown_key_is_named_with_its_line_and_the_nearest_right_one(kind: Kind) -> None:
     text = text_with(kind.example.replace("[trial]", "[trial]\nexpected_secnds = 3.0"))
     line = text.splitlines().index("expected_secnds = 3.0") + 1
