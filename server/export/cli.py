@@ -14,7 +14,8 @@ from experiments.errors import InputError
 from server.accounts.audit import record
 from server.cli_common import migrated_services, out
 from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed
-from server.export.origins import ExportOrigin, runs_by_origin
+from server.export.origins import ExportOrigin
+from server.export.repository import runs_by_origin
 from server.export.scripts import LANGUAGES, script
 from server.studies.lookup import active_definition, find_study
 from server.text import encoded

@@ -10,21 +10,11 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
-
 from server.clock import iso
-from server.export.origins import ExportOrigin, of_origin
 from server.export.tables import ExportTable
-from server.models import Study, StudyRun
 
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
 MOVED = "All times of the dataset are moved alike, so that its first run starts with the year 2000."
-
-
-def first_start(session: Session, study: Study, origin: ExportOrigin) -> datetime | None:
-    """When the first of these runs started; None where there are none."""
-    return session.scalar(select(func.min(StudyRun.started_at)).where(of_origin(study, origin)))
 
 
 def deidentified(table: ExportTable, first: datetime | None) -> ExportTable:

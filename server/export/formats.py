@@ -7,7 +7,7 @@ from typing import Literal
 from sqlalchemy.orm import Session
 
 from server.clock import now
-from server.export import codebook, identities, psych_ds, runs
+from server.export import codebook, identities, psych_ds, repository, runs
 from server.export.converted import columns_json, converted
 from server.export.excel import guarded, marked
 from server.export.origins import ExportOrigin
@@ -43,7 +43,7 @@ def wide_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[b
 
 def raw_json(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
     """Everything stored, one JSON object a run and line; the last line tells that it is complete."""
-    number = runs.run_count(session, study, origin)
+    number = repository.run_count(session, study, origin)
     for line in whole(runs.raw_lines(session, study, origin), number):
         yield encoded(line)
     yield (json.dumps({"complete": True, "runs": number}) + "\n").encode()
@@ -65,7 +65,7 @@ def identities_csv(session: Session, study: Study, origin: ExportOrigin) -> Iter
     """One row a visit whose person is known, of any origin: the recruiter's id beside the pseudonym."""
     del origin
     rows = identities.identity_rows(session, study)
-    yield from csv_pieces(whole(rows, identities.identity_count(session, study), extra=1))
+    yield from csv_pieces(whole(rows, repository.known_person_count(session, study), extra=1))
 
 
 FORMATS: dict[Format, Pieces] = {
@@ -98,8 +98,8 @@ def proofed(pieces: Iterable[bytes], form: Format, bom: bool, guard: bool) -> It
 def row_count(form: Format, session: Session, study: Study, origin: ExportOrigin) -> int:
     """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
     if form == "identities":
-        return identities.identity_count(session, study)
+        return repository.known_person_count(session, study)
     if form in ("wide", "spss-wide", "parquet-wide"):
         cells_of(active_definition(session, study))  # refuses a kind without ratings before a download begins
-    count = rating_count if form in ("csv", "psych-ds", "spss", "parquet") else runs.run_count
+    count = rating_count if form in ("csv", "psych-ds", "spss", "parquet") else repository.run_count
     return count(session, study, origin)

@@ -13,9 +13,10 @@ from experiments.definition.dataset import Creator
 from experiments.trials import KINDS
 from experiments.trials.scales import scales_of
 from server.export.codebook import markdown, variables_measured
-from server.export.deidentified import MOVED, deidentified, first_start
+from server.export.deidentified import MOVED, deidentified
 from server.export.origins import ExportOrigin
 from server.export.pieces import csv_pieces
+from server.export.repository import first_start
 from server.export.scripts import LANGUAGES, script
 from server.export.tables import ExportTable, answers_table, runs_table, wide_table
 from server.export.wide import beside_runs

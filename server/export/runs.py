@@ -6,35 +6,16 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from experiments.columns.form_columns import FormColumn, run_columns
 from server.clock import iso
 from server.evidence.service import judge_run
-from server.export.origins import ExportOrigin, of_origin
-from server.models import NO_SLOT, FormAnswer, Study, StudyRun
-from server.runs import repository, service
-
-AT_ONCE = 100
-
-
-def each_run(session: Session, study: Study, origin: ExportOrigin) -> Iterator[StudyRun]:
-    """The runs of this origin, in the order they began."""
-    latest = 0
-    while True:
-        query = select(StudyRun).where(of_origin(study, origin), StudyRun.id > latest)
-        runs = session.scalars(query.order_by(StudyRun.id).limit(AT_ONCE)).all()
-        if not runs:
-            return
-        latest = runs[-1].id
-        yield from runs
-        session.expunge_all()
-
-
-def run_count(session: Session, study: Study, origin: ExportOrigin) -> int:
-    """Runs of this origin."""
-    return session.scalar(select(func.count()).select_from(StudyRun).where(of_origin(study, origin))) or 0
+from server.export import repository
+from server.export.origins import ExportOrigin
+from server.models import NO_SLOT, Study, StudyRun
+from server.runs import service
+from server.runs.repository import calibrations
 
 
 def run_rows(
@@ -43,14 +24,13 @@ def run_rows(
     """Rows of the runs CSV in the order the runs began: the columns of `run_columns(forms)`."""
     names = [column.name for column in run_columns(forms)]
     name = study.name
-    for run in each_run(session, study, origin):
+    for run in repository.each_run(session, study, origin):
         values = _values(session, run, forms) | {"study": name}
         yield [values[column] for column in names]
 
 
 def _values(session: Session, run: StudyRun, forms: Sequence[FormColumn]) -> dict[str, Any]:
-    query = select(FormAnswer.form, FormAnswer.answers).where(FormAnswer.study_run_id == run.id)
-    answers: dict[str, dict[str, Any]] = dict(session.execute(query).all())
+    answers = repository.answers_by_form(session, run)
     return {
         "run": run.public_id,
         "participant": run.participant,
@@ -81,7 +61,7 @@ def _values(session: Session, run: StudyRun, forms: Sequence[FormColumn]) -> dic
 
 def _calibration(session: Session, run: StudyRun) -> dict[str, Any]:
     """How the latest size and distance were measured; nothing where none were, or by a page of before."""
-    every = repository.calibrations(session, run)
+    every = calibrations(session, run)
     rechecks = [one.recheck_percent for one in every if one.recheck_percent is not None]
     latest = every[-1] if every else None
     values = {
@@ -118,6 +98,5 @@ def _json(value: Any) -> str:
 
 def raw_lines(session: Session, study: Study, origin: ExportOrigin) -> Iterator[str]:
     """One JSON object a run with every play, drawn frame, event, form and calibration."""
-    query = select(StudyRun.public_id).where(of_origin(study, origin))
-    for public_id in session.scalars(query.order_by(StudyRun.id)).all():
+    for public_id in repository.public_ids(session, study, origin):
         yield service.timeline(session, study, public_id).model_dump_json() + "\n"

@@ -13,7 +13,8 @@ from server.export.codebook import rating_columns
 from server.export.origins import ExportOrigin
 from server.export.pieces import rating_table, whole
 from server.export.ratings_csv import rating_count, view_of
-from server.export.runs import run_count, run_rows
+from server.export.repository import run_count
+from server.export.runs import run_rows
 from server.export.wide import wide_columns, wide_rows
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from sqlalchemy import text
 
 from server.context import Services
-from server.export import runs
+from server.export import repository, runs
 from server.settings import Settings
 from server.simulation.http import JsonClient
 from server.simulation.person import Person, Rater
@@ -128,7 +128,7 @@ def test_an_export_that_breaks_off_exits_with_an_error_and_leaves_no_file(
     stored: Participant, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runs, "raw_lines", lambda *_: iter(["{}\n"]))
-    monkeypatch.setattr(runs, "run_count", lambda *_: 2)
+    monkeypatch.setattr(repository, "run_count", lambda *_: 2)
     called = run_server_command(settings, "export", "short", "--format", "raw", "--out", str(tmp_path / "x"))
     assert called.returncode != 0
     assert "2" in called.stderr

@@ -1,0 +1,152 @@
+"""What exports read of the database: a study's runs and all they stored, batch by batch."""
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from functools import cache
+from typing import Any, NamedTuple
+
+from sqlalchemy import ColumnElement, CursorResult, Select, TextClause, func, select, text
+from sqlalchemy.orm import Session
+
+from experiments.columns import View, names_of
+from server.export.origins import EXPORTED, ExportOrigin
+from server.models import FormAnswer, Link, Rating, RecruiterIdentity, Study, StudyRun
+
+RUNS_AT_ONCE = 100
+RUNS_OF_ROWS_AT_ONCE = 200
+IDENTITIES_AT_ONCE = 500
+
+
+class KnownPerson(NamedTuple):
+    """A visit whose person is known: to the recruiter, or by the label of a personal link."""
+
+    run: str
+    participant: str
+    link_kind: str
+    label: str
+    identifier: str | None
+    parameters: dict[str, str] | None
+
+
+def _of_origin(study: Study, origin: ExportOrigin) -> ColumnElement[bool]:
+    origins = EXPORTED if origin == "all" else (origin,)
+    return (StudyRun.study_id == study.id) & StudyRun.origin.in_(origins)
+
+
+def runs_by_origin(session: Session, study: Study) -> dict[str, int]:
+    """How many runs there are of each exported origin."""
+    query = select(StudyRun.origin, func.count()).where(_of_origin(study, "all"))
+    return dict(session.execute(query.group_by(StudyRun.origin)).all())
+
+
+def run_count(session: Session, study: Study, origin: ExportOrigin) -> int:
+    """Runs of this origin."""
+    return session.scalar(select(func.count()).select_from(StudyRun).where(_of_origin(study, origin))) or 0
+
+
+def first_start(session: Session, study: Study, origin: ExportOrigin) -> datetime | None:
+    """When the first of these runs started; None where there are none."""
+    return session.scalar(select(func.min(StudyRun.started_at)).where(_of_origin(study, origin)))
+
+
+def each_run(session: Session, study: Study, origin: ExportOrigin) -> Iterator[StudyRun]:
+    """The runs of this origin, in the order they began; a batch of them is in memory at a time."""
+    latest = 0
+    while True:
+        query = select(StudyRun).where(_of_origin(study, origin), StudyRun.id > latest)
+        runs = session.scalars(query.order_by(StudyRun.id).limit(RUNS_AT_ONCE)).all()
+        if not runs:
+            return
+        latest = runs[-1].id
+        yield from runs
+        session.expunge_all()
+
+
+def public_ids(session: Session, study: Study, origin: ExportOrigin) -> Sequence[str]:
+    """The public ids of the runs of this origin, in the order they began."""
+    query = select(StudyRun.public_id).where(_of_origin(study, origin))
+    return session.scalars(query.order_by(StudyRun.id)).all()
+
+
+def answers_by_form(session: Session, run: StudyRun) -> dict[str, dict[str, Any]]:
+    """Form -> its answers, of one run."""
+    query = select(FormAnswer.form, FormAnswer.answers).where(FormAnswer.study_run_id == run.id)
+    return dict(session.execute(query).all())
+
+
+def play_count(session: Session, study: Study, origin: ExportOrigin, kind: str) -> int:
+    """Stored plays of trials of this kind."""
+    query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
+    return session.scalar(query.where(_of_origin(study, origin), Rating.kind == kind)) or 0
+
+
+def rows_in_view(session: Session, study: Study, origin: ExportOrigin, view: View) -> int:
+    """Rows that a kind's view has of a study."""
+    among = "" if origin == "all" else " AND run_origin = :origin"
+    rows = text(f"SELECT count(*) FROM {view.name} WHERE study = :study{among}")  # noqa: S608
+    values = {"study": study.name} if origin == "all" else {"study": study.name, "origin": origin}
+    return session.scalar(rows, values) or 0
+
+
+def view_rows(session: Session, study: Study, origin: ExportOrigin, view: View) -> Iterator[Sequence[Any]]:
+    """Rows of the view (values in the order of its names) by start of the run, then trial and play.
+
+    Booleans are 0 and 1. One run's rows are in memory at a time.
+    """
+    connection, latest = session.connection(), 0
+    of_a_run = _rows_of_a_run(view)
+    while runs := _runs_after(session, study, origin, latest):
+        latest = runs[-1].id
+        for run in runs:
+            yield from _plain_rows(connection.execute(of_a_run, {"run": run.public_id}))
+
+
+@cache
+def _rows_of_a_run(view: View) -> TextClause:
+    booleans = names_of(view.columns, "boolean")
+    # PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
+    columns = ", ".join(f"CAST({name} AS INTEGER)" if name in booleans else name for name in view.names)
+    order = ", ".join(name for name in ("trial_index", "play", "scale") if name in view.names)
+    return text(f"SELECT {columns} FROM {view.name} WHERE run = :run ORDER BY {order}")  # noqa: S608
+
+
+def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
+    """All rows as the driver gives them: SQLAlchemy's row objects would take a tenth of an export's time."""
+    rows = result.cursor.fetchall()
+    result.close()
+    return rows
+
+
+def _runs_after(session: Session, study: Study, origin: ExportOrigin, latest: int) -> Sequence[Any]:
+    query = select(StudyRun.id, StudyRun.public_id).where(_of_origin(study, origin), StudyRun.id > latest)
+    return session.execute(query.order_by(StudyRun.id).limit(RUNS_OF_ROWS_AT_ONCE)).all()
+
+
+def known_person_count(session: Session, study: Study) -> int:
+    """How many visits `known_people` gives."""
+    return session.scalar(_known_people(study).with_only_columns(func.count()).order_by(None)) or 0
+
+
+def known_people(session: Session, study: Study) -> Iterator[KnownPerson]:
+    """The visits whose person is known, in the order they began, read as they are asked for."""
+    query = _known_people(study).execution_options(yield_per=IDENTITIES_AT_ONCE)
+    return (KnownPerson(*row) for row in session.execute(query))
+
+
+def _known_people(study: Study) -> Select[str, str, str, str, str | None, dict[str, str] | None]:
+    columns = (
+        StudyRun.public_id,
+        StudyRun.participant,
+        Link.kind,
+        Link.label,
+        RecruiterIdentity.identifier,
+        RecruiterIdentity.parameters,
+    )
+    query = (
+        select(*columns)
+        .join(Link, Link.id == StudyRun.link_id)
+        .outerjoin(RecruiterIdentity, RecruiterIdentity.study_run_id == StudyRun.id)
+        .where(StudyRun.study_id == study.id, StudyRun.origin != "preview", StudyRun.erased_at.is_(None))
+    )
+    named = (Link.kind == "personal") | RecruiterIdentity.study_run_id.is_not(None)
+    return query.where(named).order_by(StudyRun.id)
