@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from html import escape
 
 from experiments.definition import Experiment
-from server.methods.numbers import Number
+from server.methods.repository import Number
 
 _HOLE = re.compile(r"\{(\w+)\}")
 LATEX_SIGNS = {

@@ -7,8 +7,8 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments.files import whole_file
-from server.methods.numbers import Number, numbers
 from server.methods.paragraph import Methods, sentences
+from server.methods.repository import Number, numbers
 from server.models import Study
 from server.participants.recruiter import Recruiter
 from server.studies.lookup import definition_of

@@ -7,7 +7,6 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from server.accounts.audit import record
@@ -18,7 +17,8 @@ from server.errors import Conflict, NotFound
 from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.methods.service import methods_of, read_results, write
-from server.models import Job, Study
+from server.models import Job
+from server.reports import repository
 from server.reports.process import LONGEST_S, run_analysis
 from server.reports.schemas import NewReport, ReportOut
 from server.seals.service import seal_of
@@ -26,7 +26,6 @@ from server.studies.lookup import find_study
 from server.studies.series import version_of_series
 from server.tokens import new_public_id
 
-KIND = "report"
 SEAL = "sealed-plan.json"
 _one_at_a_time = threading.Lock()
 
@@ -35,12 +34,12 @@ def start(services: Services, name: str, wanted: NewReport, who: Identity) -> Re
     """Queue a report and begin it in the background; Conflict where one of this study is under way."""
     with services.database.write() as session:
         study = find_study(session, name)
-        for job in _jobs(session, study):
+        for job in repository.latest_reports(session, study):
             if job.status in ("queued", "running") and not _abandoned(job):
                 raise Conflict("A report of this study is being built already; wait for it.")
         job = Job(
             public_id=new_public_id(),
-            kind=KIND,
+            kind=repository.KIND,
             study_id=study.id,
             message="waiting",
             parameters=wanted.model_dump(),
@@ -59,14 +58,11 @@ def _abandoned(job: Job) -> bool:
     return now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
 
 
-def _jobs(session: Session, study: Study) -> list[Job]:
-    query = select(Job).where(Job.study_id == study.id, Job.kind == KIND)
-    return list(session.scalars(query.order_by(Job.id.desc()).limit(20)))
-
-
 def reports(services: Services, session: Session, name: str) -> list[ReportOut]:
     """The latest reports of a study."""
-    return [report_out(services, job) for job in _jobs(session, find_study(session, name))]
+    return [
+        report_out(services, job) for job in repository.latest_reports(session, find_study(session, name))
+    ]
 
 
 def report_out(services: Services, job: Job) -> ReportOut:
@@ -102,7 +98,7 @@ def report_folder(services: Services, public_id: str) -> Path:
 def report_file(services: Services, session: Session, name: str, public_id: str, file: str) -> Path:
     """One file of a finished report; NotFound where it is not one of its files."""
     study = find_study(session, name)
-    job = session.scalar(select(Job).where(Job.study_id == study.id, Job.public_id == public_id))
+    job = repository.find_report(session, study, public_id)
     if job is None or file not in report_out(services, job).files:
         raise NotFound("There is no such report, or it has no such file.")
     return report_folder(services, public_id) / file
@@ -167,7 +163,7 @@ def _add_methods(services: Services, name: str, folder: Path, wanted: NewReport,
 
 def _note(services: Services, public_id: str, **values: Any) -> None:
     with services.database.write() as session:
-        job = session.scalar(select(Job).where(Job.public_id == public_id))
+        job = repository.job_called(session, public_id)
         if job is not None:
             for name, value in values.items():
                 setattr(job, name, value)

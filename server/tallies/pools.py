@@ -6,21 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import ColumnElement, select
+from sqlalchemy import ColumnElement
 from sqlalchemy.orm import Session
 
-from experiments.checks import CHECK_CELL
-from server.models import RunTally, StudyRun, VersionClip
+from server.tallies import repository
+from server.tallies.repository import CellClip
 from server.tallies.tally import ONSET_BINS, UNIT, Place, numbers, packed_codes, unpacked
-
-
-@dataclass(frozen=True)
-class CellClip:
-    """A clip of a version with its cell."""
-
-    id: int
-    cell: str
-    levels: dict[str, str]
 
 
 @dataclass
@@ -44,13 +35,10 @@ class PooledTally:
 
 def pooled(session: Session, runs: ColumnElement[bool], scale: str, factors: Sequence[str]) -> PooledTally:
     """The counts of the runs that fit, answers of excluded ones left out."""
-    query = select(
-        StudyRun.id, StudyRun.version_id, StudyRun.excluded, RunTally.counts, RunTally.answers
-    ).join(RunTally, RunTally.study_run_id == StudyRun.id)
     made = PooledTally()
     packed: dict[int, list[str]] = defaultdict(list)
     versions = _Versions(session, factors)
-    for run, version, excluded, counts, answers in session.execute(query.where(runs)):
+    for run, version, excluded, counts, answers in repository.counts_of(session, runs):
         counted = json.loads(counts)
         _add_plays(made, counted)
         if excluded:
@@ -101,10 +89,7 @@ class _Versions:
 
     def clips(self, version: int) -> list[CellClip]:
         if version not in self._clips:
-            query = select(VersionClip.id, VersionClip.cell, VersionClip.levels)
-            query = query.where(VersionClip.version_id == version, VersionClip.cell != CHECK_CELL)
-            query = query.order_by(VersionClip.id)
-            self._clips[version] = [CellClip(*row) for row in self._session.execute(query)]
+            self._clips[version] = repository.clips_of(self._session, version)
         return self._clips[version]
 
     def levels(self, version: int) -> list[tuple[str, ...]]:
@@ -112,9 +97,9 @@ class _Versions:
         if version not in self._levels:
             clips = self.clips(version)
             places: dict[int, Place] = numbers((clip.id, clip.cell) for clip in clips)
-            found: dict[int, tuple[str, ...]] = {}
+            by_cell: dict[int, tuple[str, ...]] = {}
             for clip in clips:
                 levels = tuple(clip.levels[name] for name in self._factors)
-                found.setdefault(places[clip.id].cell, levels)
-            self._levels[version] = [found[number] for number in sorted(found)]
+                by_cell.setdefault(places[clip.id].cell, levels)
+            self._levels[version] = [by_cell[number] for number in sorted(by_cell)]
         return self._levels[version]

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from sqlalchemy import text
 
 from server.context import Services
-from server.methods.numbers import Number
 from server.methods.paragraph import Methods
+from server.methods.repository import Number
 from server.methods.service import methods_of
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
