@@ -328,3 +328,40 @@ CHECK: tuple[Column, ...] = (
     ),
 )
 """Of motion checks, in studies of every kind of trial."""
+
+ASSUMED_REFRESH_HZ = 60
+ONSET_DELAY_REFRESHES = {"Firefox/": 3, "Chrome/": 2}
+"""Refreshes from drawing a picture to the frame buffer, by user agent; `make scope` measures them."""
+
+_REFRESH_MS = f"1000.0 / coalesce(t.refresh_rate_hz, {ASSUMED_REFRESH_HZ})"
+# PostgreSQL rounds `numeric` alone; the column is a plain number in both databases.
+_ROUNDED = "CAST(round(CAST({} AS numeric), 2) AS double precision)"
+_DELAYS = " ".join(
+    f"WHEN CAST(r.device AS text) LIKE '%{browser}%' THEN {refreshes}"
+    for browser, refreshes in ONSET_DELAY_REFRESHES.items()
+)
+
+PRESENTATION: tuple[Column, ...] = (
+    Column(
+        "onset_delay_ms",
+        "number",
+        "Add this to recorded times of pictures, and take it off rt_from_first_frame: the time from drawing "
+        "a picture to the frame buffer as measured for the browser (2 refreshes in Chromium, 3 in Firefox), "
+        "without the monitor's own delay. Empty for other browsers and where no frame was logged.",
+        unit="ms",
+        minimum=0,
+        source="CASE WHEN t.method = 'webcodecs' THEN "
+        f"{_ROUNDED.format(f'(CASE {_DELAYS} END) * {_REFRESH_MS}')} END",
+    ),
+    Column(
+        "onset_uncertainty_ms",
+        "number",
+        "How far a picture's time, onset_delay_ms added, may be from the frame buffer's: one refresh in good "
+        "plays. Empty for others, about which nothing is promised.",
+        unit="ms",
+        minimum=0,
+        source="CASE WHEN t.method = 'webcodecs' AND t.verdict = 'good' THEN "
+        f"{_ROUNDED.format(_REFRESH_MS)} END",
+    ),
+)
+"""What `make scope` knows of the way from the drawing to the screen (docs/participant.md)."""

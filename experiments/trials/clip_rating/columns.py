@@ -83,6 +83,7 @@ RATINGS = View(
         *base.VIEWS,
         *base.EVIDENCE,
         *base.CHECK,
+        *base.PRESENTATION,
     ),
     rows=_rows,
 )

@@ -75,6 +75,7 @@ TRACES = View(
         *base.CLOCK,
         *base.VIEWS,
         *base.CHECK,
+        *base.PRESENTATION,
     ),
     rows=rows_of("continuous_rating", {"shown": "c"}, "LEFT JOIN clips k ON k.sha256 = c.clip_sha256\n"),
 )

@@ -86,6 +86,7 @@ COMPARISONS = View(
         *base.VIEWS,
         *base.EVIDENCE,
         *base.CHECK,
+        *base.PRESENTATION,
     ),
     rows=rows_of("paired_comparison", _ROLES),
 )

@@ -121,6 +121,7 @@ THRESHOLDS = View(
         *base.VIEWS,
         *base.EVIDENCE,
         *base.CHECK,
+        *base.PRESENTATION,
     ),
     rows=rows_of("threshold", {}, _TABLES),
 )
