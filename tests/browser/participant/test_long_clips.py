@@ -8,15 +8,19 @@ import pytest
 from playwright.sync_api import Page, Route
 
 from experiments.load import parse_experiment
+from server.cli_common import migrated_services
+from server.models import ViewClip
+from server.views.frame_log import unpacked
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 from tests.helpers.tiny_clips import make_clip_folder
 
 pytestmark = pytest.mark.browser
-FRAMES, SIZE_PX = 300, (960, 360)
+FRAMES, SIZE_PX = 200, (960, 360)
+"""276 MB as pictures: more than the page keeps of a clip."""
 AHEAD_MAX = 40
-"""Pictures at once that the page may hold of a clip: 300 would be 415 MB."""
+"""Pictures at once that the page may hold of a clip."""
 
 # In front of the worker's own code: counts open pictures and video frames, and reads the barcode back.
 COUNT = """
@@ -67,6 +71,17 @@ LISTEN = """
 new BroadcastChannel("pictures").onmessage = ({ data }) => { window.pictures = data; };
 """
 ONE = without(PLAIN, ("per_cell = 3", "per_cell = 1"), ("trials = 1", "trials = 0"))
+PAIR = (
+    ONE[: ONE.index("[trial]")].replace('split_by = "character"\n', "")
+    + """
+[trial]
+kind = "paired_comparison"
+question = { en = "Which eyes looked more alive?", de = "Welche Augen wirkten lebendiger?" }
+pairs = { among = "all", exemplars = "matched" }
+presentation = { arrangement = "side_by_side", if_too_narrow = "stack" }
+"""
+    + ONE[ONE.index("[[forms]]") :]
+)
 
 
 def watched(page: Page) -> None:
@@ -79,17 +94,18 @@ def watched(page: Page) -> None:
 
 
 def played(
-    server: ServerProcess, folder: Path, page: Page, declared: str, frames: int, key: str
+    server: ServerProcess, folder: Path, page: Page, declared: str, answer: tuple[str, str]
 ) -> tuple[dict[str, Any], dict[str, Any], Visit]:
     """One trial of long clips: what the worker held, and the stored rating."""
-    make_clip_folder(parse_experiment(declared), folder, frames=frames, size_px=SIZE_PX)
+    make_clip_folder(parse_experiment(declared), folder, frames=FRAMES, size_px=SIZE_PX)
     study = server.add_built_study(folder, declared)
     server.start()
     watched(page)
     visit = Visit(page, server.address).open(study.link_token).begin().instructions()
     page.wait_for_selector(".ready")
     page.keyboard.press(" ")
-    page.wait_for_selector(".scale")
+    asked, key = answer
+    page.wait_for_selector(asked)
     page.keyboard.press(key)
     rows = server.rows_soon("SELECT t.* FROM trial_ratings t", 1)
     return page.evaluate("window.pictures"), rows[0], visit
@@ -100,10 +116,8 @@ def indices(row: dict[str, Any]) -> list[int]:
     return [index for index, _ in (json.loads(log) if isinstance(log, str) else log)]
 
 
-def test_a_clip_of_ten_seconds_is_decoded_while_it_is_shown(
-    server: ServerProcess, tmp_path: Path, page: Page
-) -> None:
-    held, row, visit = played(server, tmp_path / "clips", page, ONE, FRAMES, "4")
+def test_a_long_clip_is_decoded_while_it_is_shown(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    held, row, visit = played(server, tmp_path / "clips", page, ONE, (".scale", "4"))
     # Every frame was a picture once, and never many of them at once.
     assert held["made"] >= 0.9 * FRAMES
     assert held["most"] <= AHEAD_MAX
@@ -114,4 +128,24 @@ def test_a_clip_of_ten_seconds_is_decoded_while_it_is_shown(
     # A busy machine may lose a frame or two; a decoder that is too late would lose them by the dozen.
     assert row["frames_missing"] <= 15
     assert row["verdict"] in ("good", "flagged")
+    assert visit.problems == []
+
+
+def test_two_long_clips_side_by_side_are_drawn_by_one_clock(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    page.set_viewport_size({"width": 2000, "height": 800})
+    answer = (".pair-answers", "ArrowRight")
+    held, row, visit = played(server, tmp_path / "clips", page, PAIR, answer)
+    assert held["most"] <= 2 * AHEAD_MAX
+    assert held["frames_most"] <= 2 * AHEAD_MAX
+    # The two pictures of one refresh are of one frame, and the record names that frame for each.
+    left, right = held["seen"][0::2], held["seen"][1::2]
+    assert left == right
+    with migrated_services(server.settings) as services, services.database.read() as session:
+        clips = session.query(ViewClip).order_by(ViewClip.role).all()
+        logs = {clip.role: [index for index, _ in unpacked(clip.frame_log)] for clip in clips}
+    assert logs == {"left": left, "right": left}
+    assert FRAMES - len(set(left)) <= 15
+    assert row["payload"]
     assert visit.problems == []
