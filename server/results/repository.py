@@ -7,8 +7,20 @@ from sqlalchemy import ColumnElement, Select, and_, case, func, select
 from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL
-from server.models import Rating, SeriesAnswer, SeriesTrial, Study, StudyRun, StudyVersion, VersionClip
+from server.models import (
+    AssignedTrial,
+    Clip,
+    Rating,
+    SeriesAnswer,
+    SeriesTrial,
+    Study,
+    StudyRun,
+    StudyVersion,
+    TrialClip,
+    VersionClip,
+)
 from server.results.cache import Revision
+from server.results.mean_traces import Trace
 
 
 class Pool(NamedTuple):
@@ -101,6 +113,46 @@ def latest_estimates(session: Session, of: Pool) -> list[LatestEstimate]:
         ),
     )
     return [LatestEstimate(*row) for row in session.execute(query.order_by(SeriesAnswer.threshold))]
+
+
+def traces_of(session: Session, of: Pool) -> list[Trace]:
+    """The traces of main trials that did not fail, of runs that are not excluded."""
+    on_trial = and_(
+        AssignedTrial.study_run_id == Rating.study_run_id, AssignedTrial.trial_index == Rating.trial_index
+    )
+    on_clip = and_(
+        TrialClip.study_run_id == Rating.study_run_id,
+        TrialClip.trial_index == Rating.trial_index,
+        TrialClip.role == "shown",
+    )
+    query = (
+        select(StudyRun.id, VersionClip.cell, Clip.fps, Rating.payload)
+        .select_from(Rating)
+        .join(StudyRun, StudyRun.id == Rating.study_run_id)
+        .join(AssignedTrial, on_trial)
+        .join(TrialClip, on_clip)
+        .join(VersionClip, VersionClip.id == TrialClip.version_clip_id)
+        .join(Clip, Clip.sha256 == VersionClip.clip_sha256)
+        .where(of.runs(), StudyRun.excluded.is_(False), AssignedTrial.kind == "main")
+        .where(Rating.kind == "continuous_rating", Rating.verdict != "failed")
+        .order_by(Rating.id)
+    )
+    return [
+        Trace(run, cell, payload["step_frames"] / fps, payload["values"])
+        for run, cell, fps, payload in session.execute(query)
+        if payload.get("values")
+    ]
+
+
+def blinks_of_cells(session: Session, of: Pool) -> dict[str, list[list[float]]]:
+    """Of each cell the blinks of each of its clips in s, clips of performances only."""
+    query = select(VersionClip.cell, VersionClip.blinks_s).where(VersionClip.version_id.in_(of.versions()))
+    rows = session.execute(query.order_by(VersionClip.id)).all()
+    blinks: dict[str, list[list[float]]] = {}
+    for cell, times_s in rows:
+        if times_s and list(times_s) not in blinks.setdefault(cell, []):
+            blinks[cell].append(list(times_s))
+    return blinks
 
 
 def revision(session: Session, study: Study, of: Pool) -> Revision:

@@ -160,6 +160,30 @@ class ThresholdResults(StudyResults):
     series_results: list[SeriesResult]
 
 
+class TraceCell(BaseModel):
+    """The mean trace of one cell over people, each person's plays averaged before."""
+
+    cell: str
+    people: int
+    traces: int
+    left_out: int = Field(description="Traces of another sampling rate than the cell's first.")
+    times_s: list[float] = Field(description="Seconds in the clip of each point.")
+    mean: list[float]
+    low: list[float] | None = Field(description="95% t interval over people; null of one person.")
+    high: list[float] | None
+    level: float = Field(description="Mean over the whole trace.")
+    blinks_s: list[list[float]] = Field(description="Of each clip of the cell, when its blinks begin.")
+
+
+class TraceResults(StudyResults):
+    """Continuous ratings."""
+
+    kind: Literal["continuous_rating"] = "continuous_rating"
+    minimum: float
+    maximum: float
+    cells: list[TraceCell]
+
+
 class OtherResults(StudyResults):
     """Of a kind of trial without a summary."""
 
@@ -167,4 +191,4 @@ class OtherResults(StudyResults):
     note: str
 
 
-AnyResults = Results | PairResults | ThresholdResults | OtherResults
+AnyResults = Results | PairResults | ThresholdResults | TraceResults | OtherResults

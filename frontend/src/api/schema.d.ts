@@ -6829,6 +6829,85 @@ export interface components {
             expires_at: string | null;
         };
         /**
+         * TraceCell
+         * @description The mean trace of one cell over people, each person's plays averaged before.
+         */
+        TraceCell: {
+            /** Cell */
+            cell: string;
+            /** People */
+            people: number;
+            /** Traces */
+            traces: number;
+            /**
+             * Left Out
+             * @description Traces of another sampling rate than the cell's first.
+             */
+            left_out: number;
+            /**
+             * Times S
+             * @description Seconds in the clip of each point.
+             */
+            times_s: number[];
+            /** Mean */
+            mean: number[];
+            /**
+             * Low
+             * @description 95% t interval over people; null of one person.
+             */
+            low: number[] | null;
+            /** High */
+            high: number[] | null;
+            /**
+             * Level
+             * @description Mean over the whole trace.
+             */
+            level: number;
+            /**
+             * Blinks S
+             * @description Of each clip of the cell, when its blinks begin.
+             */
+            blinks_s: number[][];
+        };
+        /**
+         * TraceResults
+         * @description Continuous ratings.
+         */
+        TraceResults: {
+            /** Study */
+            study: string;
+            /** Origin */
+            origin: string;
+            /** Series */
+            series: number;
+            /**
+             * Counted At
+             * Format: date-time
+             */
+            counted_at: string;
+            /** Participants */
+            participants: number;
+            /**
+             * Ratings
+             * @description Answers of any kind that count.
+             */
+            ratings: number;
+            /** Response Times */
+            response_times: components["schemas"]["TimeBin"][];
+            playback: components["schemas"]["Playback"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "continuous_rating";
+            /** Minimum */
+            minimum: number;
+            /** Maximum */
+            maximum: number;
+            /** Cells */
+            cells: components["schemas"]["TraceCell"][];
+        };
+        /**
          * TrialClip
          * @description One clip of a trial, and the role in which it is shown.
          */
@@ -7605,6 +7684,8 @@ export type TimelineEvent = components['schemas']['TimelineEvent'];
 export type TimelineForm = components['schemas']['TimelineForm'];
 export type TimelineTrial = components['schemas']['TimelineTrial'];
 export type TokenOut = components['schemas']['TokenOut'];
+export type TraceCell = components['schemas']['TraceCell'];
+export type TraceResults = components['schemas']['TraceResults'];
 export type TrialClip = components['schemas']['TrialClip'];
 export type TrialDeclaration = components['schemas']['TrialDeclaration'];
 export type TrialInfo = components['schemas']['TrialInfo'];
@@ -10104,7 +10185,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Results"] | components["schemas"]["PairResults"] | components["schemas"]["ThresholdResults"] | components["schemas"]["OtherResults"];
+                    "application/json": components["schemas"]["Results"] | components["schemas"]["PairResults"] | components["schemas"]["ThresholdResults"] | components["schemas"]["TraceResults"] | components["schemas"]["OtherResults"];
                 };
             };
             /** @description Nothing has changed. */

@@ -19,12 +19,15 @@ from tests.browser.visit import axe_violations
 from tests.server.trials.test_thresholds import Api
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
-PEOPLE = {"pairs-demo": 3, "sliders-demo": 2, "threshold-demo": 1}
+PEOPLE = {"pairs-demo": 3, "sliders-demo": 2, "threshold-demo": 1, "timing-continuous": 2}
 DEMOS = tuple(PEOPLE)
+FRAMES = {"timing-continuous": 60}
+"""Of each clip; two are enough for answers that come after it."""
 LABELS = {
     "pairs-demo": "Photorealistic, From the model",
     "sliders-demo": "Photorealistic",
     "threshold-demo": "Closes faster than it opens",
+    "timing-continuous": "Locked to events",
 }
 WIDE = """() => document.documentElement.scrollWidth > 390
   ? [`the page is ${document.documentElement.scrollWidth} px wide`] : []"""
@@ -50,7 +53,9 @@ def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> 
     process = ServerProcess(folder / "data")
     with TestClient(create_app(process.settings)) as client:
         for demo, people in PEOPLE.items():
-            study = process.add_study(folder / demo, locate(demo).read_text(encoding="utf-8"), frames=2)
+            study = process.add_study(
+                folder / demo, locate(demo).read_text(encoding="utf-8"), frames=FRAMES.get(demo, 2)
+            )
             link = process.link(study, "general", synthetic=True)
             for number in range(people):
                 person = Person(Api(client), Rater(number, 1, {}))  # type: ignore[arg-type]

@@ -16,6 +16,7 @@ import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from ".
 import { NoAnswers } from "./NoAnswers";
 import { Reports } from "./Reports";
 import { ThresholdResults } from "./ThresholdResults";
+import { TraceResults } from "./TraceResults";
 
 export function ResultsTab() {
   const { study = "" } = useParams({ strict: false });
@@ -97,6 +98,7 @@ function OfKind({ study, data, factors }: ShownProps<AnyResults>) {
       {data.kind === "clip_rating" && <Shown study={study} data={data} factors={factors} />}
       {data.kind === "paired_comparison" && <PairResults data={data} factors={factors} />}
       {data.kind === "threshold" && <ThresholdResults data={data} factors={factors} />}
+      {data.kind === "continuous_rating" && <TraceResults data={data} factors={factors} />}
       {data.kind === "other" && (
         <>
           <Text>{data.note}</Text>

@@ -4,7 +4,7 @@ import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../api";
 
 type Results = Schemas["Results"];
-export type AnyResults = Results | Schemas["PairResults"] | Schemas["ThresholdResults"] | Schemas["OtherResults"];
+export type AnyResults = Results | Schemas["PairResults"] | Schemas["ThresholdResults"] | Schemas["TraceResults"] | Schemas["OtherResults"];
 export type Factors = Schemas["DesignOut"]["factors"];
 
 /** The label of a level, and the labels of a factor in declared order. */

@@ -1,0 +1,69 @@
+/** The figures of continuous ratings. */
+
+import * as Plot from "@observablehq/plot";
+import type { Schemas } from "../api";
+
+type Data = Schemas["TraceResults"];
+type Cell = Schemas["TraceCell"];
+
+interface Point {
+  cell: string;
+  time_s: number;
+  mean: number;
+  low: number | undefined;
+  high: number | undefined;
+}
+
+export function pointsOf(cell: Cell, label: string): Point[] {
+  return cell.times_s.map((time_s, place) => ({
+    cell: label,
+    time_s,
+    mean: cell.mean[place] ?? NaN,
+    low: cell.low?.[place],
+    high: cell.high?.[place],
+  }));
+}
+
+const AXES = { height: 240, marginLeft: 44, marginBottom: 40 };
+const TIME = { label: "s in the clip", ticks: 6 };
+
+/** All cells' mean traces on one pair of axes. */
+export function tracesPlot({ cells, minimum, maximum }: Data, labels: Map<string, string>): Plot.PlotOptions {
+  const rows = cells.flatMap((cell) => pointsOf(cell, labels.get(cell.cell) ?? cell.cell));
+  return {
+    ...AXES,
+    x: TIME,
+    y: { domain: [minimum, maximum], grid: true, label: "rating" },
+    color: { legend: true, scheme: "observable10", domain: [...labels.values()] },
+    marks: [Plot.lineY(rows, { x: "time_s", y: "mean", stroke: "cell", tip: true })],
+  };
+}
+
+/** Height of the strip of blinks below the rating, as a share of the scale, and what stays free of a clip's row in it. */
+const STRIP = 0.16;
+const GAP = 0.3;
+
+/** A tick a blink, in a row a clip below the scale. */
+export function ticksOf({ blinks_s }: Cell, { minimum, maximum }: Data): { time_s: number; from: number; to: number }[] {
+  const row = (STRIP * (maximum - minimum)) / Math.max(1, blinks_s.length);
+  return blinks_s.flatMap((times, place) =>
+    times.map((time_s) => ({ time_s, from: minimum - (place + 1) * row, to: minimum - (place + GAP) * row })),
+  );
+}
+
+/** One cell's mean trace with its interval; below it a row a clip, a tick where it blinks. */
+export function cellTracePlot(cell: Cell, data: Data): Plot.PlotOptions {
+  const { minimum, maximum } = data;
+  const [rows, ticks] = [pointsOf(cell, ""), ticksOf(cell, data)];
+  const foot = ticks.length > 0 ? minimum - STRIP * (maximum - minimum) : minimum;
+  return {
+    ...AXES,
+    x: TIME,
+    y: { domain: [foot, maximum], ticks: [minimum, (minimum + maximum) / 2, maximum], grid: true, label: "rating" },
+    marks: [
+      ...(cell.low ? [Plot.areaY(rows, { x: "time_s", y1: "low", y2: "high", fill: "currentColor", fillOpacity: 0.18 })] : []),
+      Plot.ruleX(ticks, { x: "time_s", y1: "from", y2: "to", strokeWidth: 1.5 }),
+      Plot.lineY(rows, { x: "time_s", y: "mean", stroke: "currentColor", tip: true }),
+    ],
+  };
+}

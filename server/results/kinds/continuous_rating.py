@@ -1,0 +1,52 @@
+"""Continuous ratings: the mean trace of each cell, with the moments at which its clips blink."""
+
+from collections.abc import Mapping, Sequence
+
+from sqlalchemy.orm import Session
+
+from experiments import design
+from experiments.trials.continuous_rating.declaration import continuous_rating_of
+from server.clock import now
+from server.models import Study, StudyVersion
+from server.results.mean_traces import Trace, cell_trace
+from server.results.repository import Pool, blinks_of_cells, traces_of
+from server.results.schemas import TraceCell, TraceResults
+from server.results.service import playback_of, time_bins
+from server.studies.lookup import definition_of
+from server.tallies.pools import pooled
+
+
+def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> TraceResults:
+    """The traces of one pool, which is of the data series of `version`."""
+    definition = definition_of(version)
+    declared, tally = continuous_rating_of(definition), pooled(session, of.runs(), "", ())
+    order = ["/".join(level for _, level in cell) for cell in design.cells(definition)]
+    return TraceResults(
+        study=study.name,
+        origin=of.origin,
+        series=version.series,
+        counted_at=now(),
+        participants=len(tally.means),
+        ratings=tally.answers.total(),
+        minimum=declared.minimum,
+        maximum=declared.maximum,
+        cells=trace_cells(order, traces_of(session, of), blinks_of_cells(session, of)),
+        response_times=time_bins(tally),
+        playback=playback_of(tally),
+    )
+
+
+def trace_cells(
+    order: Sequence[str], traces: Sequence[Trace], blinks: Mapping[str, Sequence[Sequence[float]]]
+) -> list[TraceCell]:
+    """The cells that have traces, in declared order; `blinks` are those of each clip of a cell."""
+    cells = []
+    for name in order:
+        mine = [trace for trace in traces if trace.cell == name]
+        if not mine:
+            continue
+        values = vars(cell_trace(mine))
+        end_s = values["times_s"][-1]
+        shown = [[time_s for time_s in clip if time_s <= end_s] for clip in blinks.get(name, ())]
+        cells.append(TraceCell(blinks_s=shown, **values))
+    return cells
