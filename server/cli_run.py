@@ -10,8 +10,6 @@ from typing import Annotated
 
 import typer
 import uvicorn
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from server.accounts import service as accounts
@@ -19,12 +17,12 @@ from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
 from server.logs import logging_configuration
-from server.models import Account, Study
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.operations.modes import close_to_others
 from server.protocol import BoundedHttp
 from server.settings import Settings
 from server.studies.links import general_links, link_url
+from server.studies.repository import open_studies
 
 GRACE_S = 20
 WORKER_START_S = 60
@@ -111,19 +109,13 @@ def _welcome(services: Services) -> None:
     """Print where to go: participant links of open studies, the admin site, the first owner's link."""
     settings = services.settings
     with services.database.write() as session:
-        for study in session.scalars(
-            select(Study).where(Study.status.in_(("pilot", "live"))).order_by(Study.id)
-        ):
+        for study in open_studies(session):
             for link in general_links(session, settings.key, study):
                 url = link_url(settings.public_url, settings.key, link.public_id)
                 group = f", {link.group_name}" if link.group_name else ""
                 out.print(f"{study.name} ({study.status}{group}): {url}")
-        first = not _has_accounts(session)
+        first = not accounts.accounts_exist(session)
     out.print(f"admin site: {settings.public_url}/admin/")
     if first:
         _, token = accounts.invite(services.database, "owner", "first owner", None)
         out.print(f"make the first account (once): {invitation_url(settings.public_url, token)}")
-
-
-def _has_accounts(session: Session) -> bool:
-    return bool(session.scalar(select(func.count()).select_from(Account)))

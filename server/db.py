@@ -2,18 +2,17 @@
 
 import sqlite3
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import psycopg
 from sqlalchemy import Connection, create_engine, event
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
-from sqlalchemy.orm import DeclarativeBase, Session
+from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from server.settings import Settings
@@ -104,15 +103,6 @@ def checked_url(url: str) -> URL:
     if parsed.drivername.startswith("postgresql") and not parsed.database:
         raise InputError(f"{expected}; got one without a name of the database behind the host")
     return parsed
-
-
-def insert_once(session: Session, table: type[DeclarativeBase], rows: Sequence[dict[str, Any]]) -> None:
-    """Insert rows; those that a UNIQUE constraint already knows are left as they are."""
-    if not rows:
-        return
-    dialect = session.get_bind().dialect.name
-    statement = postgresql.insert(table) if dialect == "postgresql" else sqlite.insert(table)
-    session.execute(statement.on_conflict_do_nothing(), rows)
 
 
 def is_away(error: BaseException) -> bool:

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from fastapi import APIRouter
 from pydantic import BaseModel
-from sqlalchemy import select
 
 from server.context import ServicesDep
 from server.db import Database
 from server.errors import ERROR_RESPONSES, ApiError
 from server.migrate import current_revision, newest_revision
-from server.models import Clip
+from server.repository import newest_clip
 from server.settings import Settings
 
 LOCKED_AFTER_S = 3.0
@@ -83,7 +82,7 @@ def readyz(services: ServicesDep) -> Health:
             f"Another program has kept the database locked for {LOCKED_AFTER_S:g} s; end it, or wait for it."
         )
     with services.database.read() as session:
-        clip = session.scalar(select(Clip.sha256).order_by(Clip.created_at.desc()).limit(1))
+        clip = newest_clip(session)
     if problem := services.clips.problem(clip):
         raise NotReady(f"Clips cannot be read: {problem}; `server doctor` says what to do.")
     return Health(status="ready")

@@ -8,12 +8,11 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection
 
 import migrations
 from server.db import Database
-
-_LOCK = 7_202_611  # any number, the same for every worker
+from server.repository import wait_for_other_migrations
 
 
 def alembic_config(connection: Connection | None = None) -> Config:
@@ -34,7 +33,7 @@ def migrating(database: Database) -> Iterator[Connection]:
     with database.engine.execution_options(immediate=True).begin() as connection:
         if not database.is_sqlite:
             # Workers that start together must not migrate together.
-            connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+            wait_for_other_migrations(connection)
         yield connection
 
 

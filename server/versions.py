@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Lock
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL, CheckName
 from experiments.definition import Experiment
 from experiments.schema.stored import load_stored
-from server.models import Clip, StudyVersion, VersionClip
+from server.repository import clips_of_version, version_by_id
 from server.tallies.tally import Place, numbers
 
 _MAX_KEPT = 64
@@ -79,16 +79,10 @@ class Versions:
 
 
 def _load(session: Session, version_id: int) -> LoadedVersion:
-    version = session.get_one(StudyVersion, version_id)
-    query = (
-        select(VersionClip.id, VersionClip.cell, VersionClip.exemplar, VersionClip.width_mm, Clip)
-        .join(Clip, Clip.sha256 == VersionClip.clip_sha256)
-        .where(VersionClip.version_id == version_id)
-        .order_by(VersionClip.id)
-    )
+    version = version_by_id(session, version_id)
     clips: dict[int, PlacedClip] = {}
     places: dict[tuple[str, int], int] = {}
-    for clip_id, cell, exemplar, width_mm, clip in session.execute(query):
+    for clip_id, cell, exemplar, width_mm, clip in clips_of_version(session, version_id):
         sizes = (clip.frames, clip.fps, clip.bytes, clip.width_px, clip.height_px)
         clips[clip_id] = PlacedClip(clip.sha256, *sizes, width_mm)
         places[cell, exemplar] = clip_id

@@ -7,7 +7,6 @@ from sqlalchemy import Connection, Table, bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL, CheckName
-from server.db import insert_once
 from server.models import (
     AnswerEvidence,
     AssignedTrial,
@@ -18,6 +17,7 @@ from server.models import (
     VersionClip,
     View,
 )
+from server.repository import insert_once
 
 REFUSED = "answer_refused"
 """The event of a run that had an answer refused."""

@@ -11,7 +11,6 @@ from experiments.errors import did_you_mean
 from experiments.trials import KINDS
 from server.clock import now
 from server.context import Services
-from server.db import insert_once
 from server.evidence.schemas import Tickets
 from server.evidence.service import judge_run
 from server.evidence.tickets import issue, tickets
@@ -38,6 +37,7 @@ from server.participants.schemas import (
     Unsupported,
 )
 from server.participants.trial_list import trial_list
+from server.repository import insert_once
 from server.tokens import new_public_id
 from server.trials.refusals import ConsentMissing
 from server.trials.warnings import waiting

@@ -7,15 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select
-
 from experiments.errors import InputError, did_you_mean
 from server.app import create_app
 from server.cli_common import migrated_services
 from server.context import Services
 from server.evidence.service import judge_run
 from server.evidence.verdict import VERDICTS
-from server.models import StudyRun
+from server.repository import run_called
 from server.settings import Settings
 from server.simulation.acting import Actor
 from server.simulation.http import JsonClient, Refused, running_server
@@ -57,7 +55,7 @@ def act(
 
 def _record(services: Services, actor: Actor) -> dict[str, Any]:
     with services.database.read() as session:
-        run = session.scalar(select(StudyRun).where(StudyRun.public_id == actor.run_id))
+        run = run_called(session, actor.run_id)
         if run is None:
             raise InputError(f"a run was not begun: {', '.join(actor.refused) or 'no answer'}")
         judged = judge_run(session, run)

@@ -10,15 +10,12 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from sqlalchemy import select
 
-from experiments.checks import CHECK_CELL
 from experiments.errors import InputError
 from experiments.trials.threshold.declaration import Threshold
 from server.app import create_app
 from server.cli_common import migrated_services, out
 from server.context import Services
-from server.models import VersionClip
 from server.settings import Settings
 from server.simulation.adversaries import act, manner_called, summary, write
 from server.simulation.http import JsonClient, Refused, running_server
@@ -27,6 +24,7 @@ from server.simulation.observer import observer_of
 from server.simulation.person import Person, Rater
 from server.studies.links import PURPOSE, create_link
 from server.studies.lookup import active_version, find_study
+from server.studies.repository import clips_of_design
 from server.tokens import derived_token
 
 
@@ -127,10 +125,8 @@ def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Ca
     """A link whose runs are simulated, and the maker of raters, who know the levels of each clip."""
     with services.database.write() as session:
         study = find_study(session, name)
-        query = select(VersionClip.clip_sha256, VersionClip.levels, VersionClip.blinks_s)
         version = active_version(session, study)
-        of_design = (VersionClip.version_id == version.id, VersionClip.cell != CHECK_CELL)
-        rows = session.execute(query.where(*of_design)).all()
+        rows = clips_of_design(session, version)
         blinks: dict[str, list[float]] = {row.clip_sha256: row.blinks_s or [] for row in rows}
         levels: dict[str, dict[str, str]] = {row.clip_sha256: row.levels for row in rows}
         link = create_link(

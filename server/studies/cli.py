@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 from rich.table import Table
-from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError, did_you_mean
@@ -17,19 +16,19 @@ from server.accounts.audit import record
 from server.cli_common import migrated_services, out
 from server.clock import now
 from server.context import Services
-from server.models import Study, StudyRun, StudyVersion
+from server.models import Study, StudyVersion
+from server.studies import repository
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
 from server.studies.links import (
     LinkKind,
     LinkOptions,
-    add_links,
     check_group,
     general_links,
     link_url,
-    links_of,
     numbered_labels,
     prepared_links,
 )
+from server.studies.links_repository import add_links, links_of
 from server.studies.lookup import active_definition, active_version, find_study
 from server.studies.planned import planned_experiment
 
@@ -70,7 +69,7 @@ def add(
     with migrated_services() as services:
         new = store_clips(services.clips, manifest, clips)
         with services.database.write() as session:
-            study = session.scalar(select(Study).where(Study.name == (name or declared.name)))
+            study = repository.study_called(session, name or declared.name)
             study = study or create_study(session, name or declared.name, declared, None)
             version = _same_version(session, study, definition_sha256(declared), manifest)
             said = f"version {study.active_version}, nothing new"
@@ -142,21 +141,12 @@ def list_studies() -> None:
     """
     with migrated_services() as services, services.database.read() as session:
         table = Table("study", "status", "version", "runs", "complete", "title")
-        counts = _run_counts(session)
-        for study in session.scalars(select(Study).order_by(Study.id)):
+        counts = repository.runs_by_status(session)
+        for study in repository.all_studies(session):
             by_status = {status: number for (ident, status), number in counts.items() if ident == study.id}
             numbers = (str(sum(by_status.values())), str(by_status.get("complete", 0)))
             table.add_row(study.name, study.status, str(study.active_version), *numbers, study.title)
         out.print(table if table.row_count else "no studies yet; add one by `server study add`")
-
-
-def _run_counts(session: Session) -> dict[tuple[int, str], int]:
-    query = (
-        select(StudyRun.study_id, StudyRun.status, func.count())
-        .where(StudyRun.origin != "preview")
-        .group_by(StudyRun.study_id, StudyRun.status)
-    )
-    return {(study_id, status): number for study_id, status, number in session.execute(query)}
 
 
 @link_app.command("create")

@@ -5,15 +5,11 @@ from typing import Annotated
 from fastapi import APIRouter, UploadFile
 from fastapi.params import File
 from fastapi.responses import PlainTextResponse
-from sqlalchemy import select
 
-from experiments.checks import CHECK_CELL
 from server.accounts.identity import Experimenter, Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.models import VersionClip
 from server.studies import service, uploads
-from server.studies.lookup import active_version, find_study
 from server.studies.schemas import (
     ChangeSettings,
     ChangeStatus,
@@ -138,27 +134,4 @@ def change_settings(
 def list_clips(services: ServicesDep, _who: Viewer, study: str) -> list[ClipOut]:
     """Every clip of the active version with the closure curve it shows."""
     with services.database.read() as session:
-        version = active_version(session, find_study(session, study))
-        curves = {clip["sha256"]: clip for clip in version.manifest["clips"]}
-        query = select(VersionClip).where(VersionClip.version_id == version.id)
-        query = query.where(VersionClip.cell != CHECK_CELL).order_by(VersionClip.id)
-        return [_clip_out(row, curves[row.clip_sha256].get("closure", [])) for row in session.scalars(query)]
-
-
-def _clip_out(row: VersionClip, closure: list[float]) -> ClipOut:
-    clip = row.clip
-    return ClipOut(
-        clip_sha256=row.clip_sha256,
-        url=f"/clips/{row.clip_sha256}.mp4",
-        file=row.file,
-        cell=row.cell,
-        levels=row.levels,
-        exemplar=row.exemplar,
-        profile=row.profile_id,
-        fps=clip.fps,
-        frames=clip.frames,
-        width_px=clip.width_px,
-        height_px=clip.height_px,
-        bytes=clip.bytes,
-        closure=closure,
-    )
+        return service.clips(session, study)

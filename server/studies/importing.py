@@ -17,6 +17,7 @@ from server.accounts.identity import Identity
 from server.errors import Conflict
 from server.models import Clip, Study, StudyVersion, VersionClip
 from server.storage.clips import ClipStore
+from server.studies import repository
 from server.studies.series import series_for
 
 
@@ -67,7 +68,7 @@ def store_clips(store: ClipStore, manifest: Manifest, folder: Path) -> int:
 
 def create_study(session: Session, name: str, experiment: Experiment, who: Identity | None) -> Study:
     """A new draft; Conflict where the name is taken."""
-    if session.query(Study).filter_by(name=name).count():
+    if repository.study_called(session, name) is not None:
         raise Conflict(f"There is already a study called '{name}'; choose another name.")
     study = Study(
         name=name, title=experiment.title, active_version=0, created_by=who.account_id if who else None
@@ -114,7 +115,7 @@ def add_version(
 
 def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> None:
     for clip in manifest.files:
-        if session.get(Clip, clip.sha256) is None:
+        if not repository.is_known_clip(session, clip.sha256):
             session.add(
                 Clip(
                     sha256=clip.sha256,

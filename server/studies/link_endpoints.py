@@ -6,7 +6,6 @@ from datetime import timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
-from sqlalchemy import select
 
 from server.accounts.audit import record
 from server.accounts.identity import Experimenter
@@ -16,16 +15,14 @@ from server.errors import ERROR_RESPONSES, NotFound
 from server.models import Link
 from server.studies.links import (
     LinkOptions,
-    add_links,
     check_group,
     link_url,
     links_with_runs,
-    number_of_links,
     numbered_labels,
     page_of_links,
     prepared_links,
-    runs_by_link,
 )
+from server.studies.links_repository import add_links, find_link, number_of_links, runs_by_link
 from server.studies.lookup import active_definition, find_study
 from server.studies.schemas import LinkOut, LinkPage, NewLinks
 
@@ -103,7 +100,7 @@ def revoke_link(services: ServicesDep, who: Experimenter, study: str, link: str)
     """Withdraw a link; runs that began with it go on."""
     with services.database.write() as session:
         found = find_study(session, study)
-        row = session.scalar(select(Link).where(Link.study_id == found.id, Link.public_id == link))
+        row = find_link(session, found, link)
         if row is None or row.revoked_at is not None:
             raise NotFound("There is no such link.")
         row.revoked_at = now()

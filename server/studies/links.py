@@ -1,11 +1,10 @@
 """Links into a study. A link's token is derived from the server's key, so that it can be shown again."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal
 
-from sqlalchemy import Select, case, func, insert, select
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
@@ -13,7 +12,8 @@ from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from server.clock import now
 from server.errors import Invalid, NotFound
-from server.models import Link, Study, StudyRun
+from server.models import Link, Study
+from server.studies import links_repository as repository
 from server.studies.lookup import active_definition
 from server.tokens import derived_token, hash_token, new_public_id
 
@@ -70,11 +70,6 @@ def check_group(experiment: Experiment, kind: LinkKind, group: str) -> None:
         raise Invalid(f"Expected the group of the link, one of {', '.join(known)}; got none.")
 
 
-def add_links(session: Session, study: Study, rows: Sequence[dict[str, Any]]) -> None:
-    """Store prepared links in one statement, so that raters do not wait for a statement a link."""
-    session.execute(insert(Link), [row | {"study_id": study.id} for row in rows])
-
-
 def create_link(
     session: Session, key: bytes, study: Study, kind: LinkKind, *, label: str = "", **options: Any
 ) -> Link:
@@ -91,51 +86,23 @@ def link_url(public_url: str, key: bytes, public_id: str) -> str:
     return f"{public_url}/run/{derived_token(key, PURPOSE, public_id)}"
 
 
-def links_of(session: Session, study: Study) -> list[Link]:
-    """The links of a study that have not been withdrawn, in the order they were made."""
-    return list(session.scalars(_shown(study)))
-
-
-def number_of_links(session: Session, study: Study) -> int:
-    """How many links `links_of` would give."""
-    return session.scalar(select(func.count()).select_from(_shown(study).order_by(None).subquery())) or 0
-
-
 def page_of_links(session: Session, study: Study, after: str | None, limit: int) -> list[Link]:
     """At most `limit` links in the order they were made, those behind the link `after`."""
-    query = _shown(study).limit(limit)
-    if after is not None:
-        number = session.scalar(select(Link.id).where(Link.study_id == study.id, Link.public_id == after))
-        if number is None:
-            raise NotFound(f"There is no link '{after[:40]}' in the study '{study.name}'.")
-        query = query.where(Link.id > number)
-    return list(session.scalars(query))
-
-
-def runs_by_link(session: Session, links: Sequence[Link]) -> dict[int, tuple[int, int]]:
-    """Number of a link -> (runs, complete runs); for one page of links."""
-    complete = func.sum(case((StudyRun.status == "complete", 1), else_=0))
-    query = select(StudyRun.link_id, func.count(), complete).group_by(StudyRun.link_id)
-    rows = session.execute(query.where(StudyRun.link_id.in_([link.id for link in links])))
-    return {link: (int(runs), int(done)) for link, runs, done in rows}
+    last = None if after is None else repository.find_link(session, study, after)
+    if after is not None and last is None:
+        raise NotFound(f"There is no link '{after[:40]}' in the study '{study.name}'.")
+    return repository.links_after(session, study, last, limit)
 
 
 def links_with_runs(
     session: Session, study: Study, limit: int, kind: LinkKind | None = None
 ) -> Iterator[tuple[Link, int, int]]:
     """Every link (of one kind) with its runs and complete runs, read `limit` at a time."""
-    after = None
-    while links := page_of_links(session, study, after, limit):
-        runs = runs_by_link(session, links)
+    last = None
+    while links := repository.links_after(session, study, last, limit):
+        runs = repository.runs_by_link(session, links)
         yield from ((link, *runs.get(link.id, (0, 0))) for link in links if kind in (None, link.kind))
-        after = links[-1].public_id
-
-
-def _shown(study: Study) -> Select[Link]:
-    query = select(Link).where(
-        Link.study_id == study.id, Link.revoked_at.is_(None), Link.synthetic.is_(False)
-    )
-    return query.order_by(Link.id)
+        last = links[-1]
 
 
 def general_links(session: Session, key: bytes, study: Study) -> list[Link]:
@@ -146,7 +113,6 @@ def general_links(session: Session, key: bytes, study: Study) -> list[Link]:
 
 
 def _general_link(session: Session, key: bytes, study: Study, group: str) -> Link:
-    query = _shown(study).where(Link.kind == "general", Link.recruiter.is_(None), Link.group_name == group)
-    return session.scalar(query.limit(1)) or create_link(
+    return repository.first_general_link(session, study, group) or create_link(
         session, key, study, "general", label=group or "general", group_name=group
     )

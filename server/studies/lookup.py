@@ -1,6 +1,5 @@
 """Find a study, its active version and what that version declares."""
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
@@ -8,23 +7,21 @@ from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
 from server.errors import NotFound
 from server.models import Study, StudyVersion
+from server.studies import repository
 
 
 def find_study(session: Session, name: str) -> Study:
     """The study called `name`; NotFound, with the nearest name, where there is none."""
-    study = session.scalar(select(Study).where(Study.name == name))
+    study = repository.study_called(session, name)
     if study is None:
-        names = session.scalars(select(Study.name)).all()
-        raise NotFound(f"There is no study '{name[:60]}'{did_you_mean(name, names)}")
+        nearest = did_you_mean(name, repository.study_names(session))
+        raise NotFound(f"There is no study '{name[:60]}'{nearest}")
     return study
 
 
 def active_version(session: Session, study: Study) -> StudyVersion:
     """The version new runs of a study use."""
-    query = select(StudyVersion).where(
-        StudyVersion.study_id == study.id, StudyVersion.number == study.active_version
-    )
-    version = session.scalar(query)
+    version = repository.version_numbered(session, study, study.active_version)
     if version is None:
         raise NotFound(f"Study '{study.name}' has no version {study.active_version}.")
     return version
@@ -37,8 +34,7 @@ def active_definition(session: Session, study: Study) -> Experiment:
 
 def all_definitions(session: Session, study: Study) -> list[Experiment]:
     """The declarations of all versions of a study, oldest first."""
-    query = select(StudyVersion).where(StudyVersion.study_id == study.id).order_by(StudyVersion.number)
-    return [definition_of(version) for version in session.scalars(query)]
+    return [definition_of(version) for version in repository.versions_of(session, study)]
 
 
 def definition_of(version: StudyVersion) -> Experiment:

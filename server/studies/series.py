@@ -1,35 +1,25 @@
 """The data series of a study: versions that measure the same, and whose answers may be pooled."""
 
-from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.manifest import Manifest
 from experiments.schema.difference import changes_what_is_measured, difference
 from server.errors import NotFound
-from server.models import Study, StudyRun, StudyVersion
+from server.models import Study, StudyVersion
+from server.studies import repository
 from server.studies.lookup import active_version, definition_of
 from server.studies.schemas import ChangeOut, JudgedEdit, SeriesOut
 
 
 def series_of(session: Session, study: Study) -> list[SeriesOut]:
     """Every series of a study, oldest first, with its versions and its runs by origin."""
-    versions: dict[int, list[int]] = {}
-    query = select(StudyVersion.series, StudyVersion.number).where(StudyVersion.study_id == study.id)
-    for series, number in session.execute(query.order_by(StudyVersion.number)):
-        versions.setdefault(series, []).append(number)
     runs: dict[int, dict[str, int]] = {}
-    counts = (
-        select(StudyVersion.series, StudyRun.origin, func.count(StudyRun.id))
-        .join(StudyRun, StudyRun.version_id == StudyVersion.id)
-        .where(StudyVersion.study_id == study.id, StudyRun.origin != "preview")
-        .group_by(StudyVersion.series, StudyRun.origin)
-    )
-    for series, origin, count in session.execute(counts):
+    for series, origin, count in repository.runs_by_series(session, study):
         runs.setdefault(series, {})[origin] = count
     return [
         SeriesOut(number=series, versions=numbers, name=name_of(series, numbers), runs=runs.get(series, {}))
-        for series, numbers in sorted(versions.items())
+        for series, numbers in sorted(repository.versions_by_series(session, study).items())
     ]
 
 
@@ -46,8 +36,7 @@ def version_of_series(session: Session, study: Study, series: int | None) -> Stu
     """
     if series is None:
         return active_version(session, study)
-    query = select(StudyVersion).where(StudyVersion.study_id == study.id, StudyVersion.series == series)
-    version = session.scalar(query.order_by(StudyVersion.number.desc()).limit(1))
+    version = repository.newest_of_series(session, study, series)
     if version is None:
         raise NotFound(f"Study '{study.name}' has no data series {series}.")
     return version
@@ -71,13 +60,7 @@ def judged(session: Session, study: Study, experiment: Experiment) -> JudgedEdit
     """What saving this definition as a further version would do to the answers that are stored."""
     present = active_version(session, study)
     series = series_for(study, experiment, Manifest.model_validate(present.manifest))
-    runs = session.scalar(
-        select(func.count(StudyRun.id))
-        .join(StudyVersion, StudyVersion.id == StudyRun.version_id)
-        .where(
-            StudyRun.study_id == study.id, StudyVersion.series == present.series, StudyRun.origin != "preview"
-        )
-    )
+    runs = repository.run_count_of_series(session, study, present.series)
     known = {version.series for version in study.versions}
     return JudgedEdit(
         changes=[
@@ -86,6 +69,6 @@ def judged(session: Session, study: Study, experiment: Experiment) -> JudgedEdit
         ],
         series=series,
         present_series=present.series,
-        runs=runs or 0,
+        runs=runs,
         begins_series=bool(runs) and series not in known,
     )

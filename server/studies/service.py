@@ -1,10 +1,8 @@
 """Studies from the dashboard: create, edit as new versions, open and close."""
 
 import tomllib
-from collections import Counter
 from pathlib import Path
 
-from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 
 from experiments import design
@@ -22,8 +20,8 @@ from server.accounts.identity import Identity
 from server.clock import now
 from server.context import Services
 from server.errors import Conflict, Invalid, NotFound
-from server.models import Study, StudyRun, StudyVersion
-from server.studies import own_clips
+from server.models import Study, StudyVersion, VersionClip
+from server.studies import own_clips, repository
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
 from server.studies.lookup import active_version, find_study
 from server.studies.planned import planned_experiment
@@ -31,6 +29,7 @@ from server.studies.schemas import (
     BlockOut,
     ChangeSettings,
     Checked,
+    ClipOut,
     DesignOut,
     EditDefinition,
     EditedDefinition,
@@ -256,35 +255,19 @@ def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Id
 def delete(session: Session, name: str, who: Identity) -> None:
     """Delete a draft that nobody has taken part in."""
     study = find_study(session, name)
-    runs = session.scalar(
-        select(func.count()).where(StudyRun.study_id == study.id, StudyRun.origin != "preview")
-    )
-    if study.status != "draft" or runs:
+    if study.status != "draft" or repository.run_count(session, study):
         raise Conflict("Only a draft without runs can be deleted; close this study instead.")
-    for run in session.scalars(select(StudyRun).where(StudyRun.study_id == study.id)):
-        session.delete(run)
-    session.flush()
-    session.delete(study)
+    repository.delete_study(session, study)
     record(session, who, "study deleted", "study", name)
 
 
 def summaries(session: Session) -> list[StudySummary]:
     """Every study, the latest first."""
-    counts = _counts(session)
-    studies = session.scalars(select(Study).order_by(Study.id.desc()))
-    return [summary(study, counts) for study in studies]
+    counts = repository.shown_runs_by_status(session)
+    return [summary(study, counts) for study in reversed(repository.all_studies(session))]
 
 
-def _counts(session: Session) -> Counter[tuple[int, str]]:
-    # A study that is a pilot shows its pilot's runs, any other those of its participants.
-    shown = case((Study.status == "pilot", "pilot"), else_="participant")
-    query = select(StudyRun.study_id, StudyRun.status, func.count())
-    query = query.join(Study, Study.id == StudyRun.study_id).where(StudyRun.origin == shown)
-    rows = session.execute(query.group_by(StudyRun.study_id, StudyRun.status))
-    return Counter({(study, status): number for study, status, number in rows})
-
-
-def summary(study: Study, counts: Counter[tuple[int, str]]) -> StudySummary:
+def summary(study: Study, counts: repository.StatusCounts) -> StudySummary:
     """One line of the list of studies."""
     return StudySummary.model_validate(
         {
@@ -308,26 +291,15 @@ def detail(session: Session, name: str) -> StudyDetail:
     version = active_version(session, study)
     experiment = load_stored(version.definition)
     return StudyDetail(
-        summary=summary(study, _counts(session)),
+        summary=summary(study, repository.shown_runs_by_status(session)),
         design=design_out(experiment),
         definition=experiment,
         toml=version.definition_toml,
         definition_sha256=version.definition_sha256,
-        versions=[_version_out(row, number) for row, number in _versions(session, study)],
+        versions=[_version_out(row, number) for row, number in repository.versions_with_runs(session, study)],
         series=series_of(session, study),
         recruiter=study.recruiter,
     )
-
-
-def _versions(session: Session, study: Study) -> list[tuple[StudyVersion, int]]:
-    query = (
-        select(StudyVersion, func.count(StudyRun.id))
-        .outerjoin(StudyRun, (StudyRun.version_id == StudyVersion.id) & (StudyRun.origin != "preview"))
-        .where(StudyVersion.study_id == study.id)
-        .group_by(StudyVersion.id)
-        .order_by(StudyVersion.number.desc())
-    )
-    return [(version, number) for version, number in session.execute(query)]
 
 
 def _version_out(version: StudyVersion, runs: int) -> VersionOut:
@@ -341,3 +313,30 @@ def version_text(session: Session, name: str, number: int) -> str:
         if version.number == number:
             return version.definition_toml
     raise NotFound(f"Study '{name}' has no version {number}.")
+
+
+def clips(session: Session, name: str) -> list[ClipOut]:
+    """Every clip of the active version with the closure curve it shows."""
+    version = active_version(session, find_study(session, name))
+    curves = {clip["sha256"]: clip.get("closure", []) for clip in version.manifest["clips"]}
+    rows = repository.clips_of_design(session, version)
+    return [_clip_out(row, curves[row.clip_sha256]) for row in rows]
+
+
+def _clip_out(row: VersionClip, closure: list[float]) -> ClipOut:
+    clip = row.clip
+    return ClipOut(
+        clip_sha256=row.clip_sha256,
+        url=f"/clips/{row.clip_sha256}.mp4",
+        file=row.file,
+        cell=row.cell,
+        levels=row.levels,
+        exemplar=row.exemplar,
+        profile=row.profile_id,
+        fps=clip.fps,
+        frames=clip.frames,
+        width_px=clip.width_px,
+        height_px=clip.height_px,
+        bytes=clip.bytes,
+        closure=closure,
+    )

@@ -1,0 +1,147 @@
+"""Studies, their versions and clips, and how many runs each has."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, case, func, select
+from sqlalchemy.orm import Session
+
+from experiments.checks import CHECK_CELL
+from server.models import Clip, Study, StudyRun, StudyVersion, VersionClip
+
+_OF_PEOPLE = StudyRun.origin != "preview"
+StatusCounts = Counter[tuple[int, str]]
+"""(number of a study, status of a run) -> runs."""
+
+
+class SeriesRuns(NamedTuple):
+    """Runs of one origin in one data series."""
+
+    series: int
+    origin: str
+    runs: int
+
+
+def study_called(session: Session, name: str) -> Study | None:
+    """The study of this name."""
+    return session.scalar(select(Study).where(Study.name == name))
+
+
+def study_names(session: Session) -> Sequence[str]:
+    """The names of all studies."""
+    return session.scalars(select(Study.name)).all()
+
+
+def all_studies(session: Session) -> list[Study]:
+    """Every study in the order they were made."""
+    return list(session.scalars(select(Study).order_by(Study.id)))
+
+
+def open_studies(session: Session) -> list[Study]:
+    """The studies that people can take part in, in the order they were made."""
+    query = select(Study).where(Study.status.in_(("pilot", "live")))
+    return list(session.scalars(query.order_by(Study.id)))
+
+
+def version_numbered(session: Session, study: Study, number: int) -> StudyVersion | None:
+    """The version of a study with this number."""
+    query = select(StudyVersion).where(StudyVersion.study_id == study.id, StudyVersion.number == number)
+    return session.scalar(query)
+
+
+def versions_of(session: Session, study: Study) -> list[StudyVersion]:
+    """The versions of a study, oldest first."""
+    query = select(StudyVersion).where(StudyVersion.study_id == study.id).order_by(StudyVersion.number)
+    return list(session.scalars(query))
+
+
+def newest_of_series(session: Session, study: Study, series: int) -> StudyVersion | None:
+    """The newest version of a data series."""
+    query = select(StudyVersion).where(StudyVersion.study_id == study.id, StudyVersion.series == series)
+    return session.scalar(query.order_by(StudyVersion.number.desc()).limit(1))
+
+
+def versions_with_runs(session: Session, study: Study) -> list[tuple[StudyVersion, int]]:
+    """The versions of a study, newest first, each with its runs but previews."""
+    query = (
+        select(StudyVersion, func.count(StudyRun.id))
+        .outerjoin(StudyRun, (StudyRun.version_id == StudyVersion.id) & _OF_PEOPLE)
+        .where(StudyVersion.study_id == study.id)
+        .group_by(StudyVersion.id)
+        .order_by(StudyVersion.number.desc())
+    )
+    return [(version, runs) for version, runs in session.execute(query)]
+
+
+def versions_by_series(session: Session, study: Study) -> dict[int, list[int]]:
+    """Data series -> the numbers of its versions, ascending."""
+    query = select(StudyVersion.series, StudyVersion.number).where(StudyVersion.study_id == study.id)
+    versions: dict[int, list[int]] = {}
+    for series, number in session.execute(query.order_by(StudyVersion.number)):
+        versions.setdefault(series, []).append(number)
+    return versions
+
+
+def runs_by_series(session: Session, study: Study) -> list[SeriesRuns]:
+    """How many runs but previews each data series has of each origin."""
+    query = (
+        select(StudyVersion.series, StudyRun.origin, func.count(StudyRun.id))
+        .join(StudyRun, StudyRun.version_id == StudyVersion.id)
+        .where(StudyVersion.study_id == study.id, _OF_PEOPLE)
+        .group_by(StudyVersion.series, StudyRun.origin)
+    )
+    return [SeriesRuns(*row) for row in session.execute(query)]
+
+
+def run_count(session: Session, study: Study) -> int:
+    """Runs of a study but previews."""
+    return session.scalar(select(func.count()).where(StudyRun.study_id == study.id, _OF_PEOPLE)) or 0
+
+
+def run_count_of_series(session: Session, study: Study, series: int) -> int:
+    """Runs of a data series but previews."""
+    query = (
+        select(func.count(StudyRun.id))
+        .join(StudyVersion, StudyVersion.id == StudyRun.version_id)
+        .where(StudyRun.study_id == study.id, StudyVersion.series == series, _OF_PEOPLE)
+    )
+    return session.scalar(query) or 0
+
+
+def runs_by_status(session: Session) -> StatusCounts:
+    """The runs of all studies but previews."""
+    return _by_status(session, _OF_PEOPLE)
+
+
+def shown_runs_by_status(session: Session) -> StatusCounts:
+    """The runs of all studies: of a study that is a pilot its pilot's, of others those of participants."""
+    return _by_status(
+        session, StudyRun.origin == case((Study.status == "pilot", "pilot"), else_="participant")
+    )
+
+
+def _by_status(session: Session, counted: ColumnElement[bool]) -> StatusCounts:
+    query = select(StudyRun.study_id, StudyRun.status, func.count())
+    query = query.join(Study, Study.id == StudyRun.study_id).where(counted)
+    rows = session.execute(query.group_by(StudyRun.study_id, StudyRun.status))
+    return Counter({(study, status): runs for study, status, runs in rows})
+
+
+def delete_study(session: Session, study: Study) -> None:
+    """Delete a study and the runs it has."""
+    for run in session.scalars(select(StudyRun).where(StudyRun.study_id == study.id)):
+        session.delete(run)
+    session.flush()
+    session.delete(study)
+
+
+def clips_of_design(session: Session, version: StudyVersion) -> list[VersionClip]:
+    """The clips of a version but those of checks, by their numbers."""
+    query = select(VersionClip).where(VersionClip.version_id == version.id, VersionClip.cell != CHECK_CELL)
+    return list(session.scalars(query.order_by(VersionClip.id)))
+
+
+def is_known_clip(session: Session, sha256: str) -> bool:
+    """Whether some version has this clip already."""
+    return session.get(Clip, sha256) is not None
