@@ -87,6 +87,7 @@ EVIDENCE_COLUMNS = (
     _amount("motion_checks_asked", "Motion checks that tell something."),
     _share("motion_checks_guessed", "How likely guesses are right in as many of the motion checks."),
     _amount("motion_checks_other_way", "Motion checks answered the other way that the study offers."),
+    _amount("motion_checks_void", "Motion checks that tell nothing: their play failed, or none was given."),
 )
 """One column a signal, named as `Signals` of the server names it."""
 

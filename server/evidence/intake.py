@@ -17,8 +17,9 @@ from server.evidence.refusals import (
     TicketExpired,
     TicketMissing,
 )
+from server.evidence.repository import Spent
 from server.evidence.schemas import RatingEvidence
-from server.evidence.tickets import Batch, check_ticket, evidence_key
+from server.evidence.tickets import Batch, check_ticket, claimed_time, evidence_key
 from server.rate_limit import RateLimit
 from server.settings import Settings
 
@@ -36,7 +37,8 @@ class Answer:
 
     clips: hash and size of each clip of the trial, in order. clip_ms: how long the longest lasts, over all
     views, since clips may be shown side by side; 0 where nothing was rated.
-    received_at: by the server's clock. answered_at: by the client's.
+    received_at: by the server's clock. answered_at: by the client's. spent: what the run's answers took since
+    its ticket was issued (`issued_at`); None where there is no ticket.
     """
 
     run: int
@@ -50,6 +52,12 @@ class Answer:
     received_at: datetime
     answered_at: datetime | None
     evidence: RatingEvidence | None
+    spent: Spent | None
+
+
+def issued_at(evidence: RatingEvidence | None) -> datetime | None:
+    """When the ticket of an answer says it was issued; None without one, or where it says no time."""
+    return claimed_time(evidence.batch) if evidence else None
 
 
 class Intake:
@@ -125,7 +133,7 @@ class Intake:
 
 def _in_time(connection: Connection, answer: Answer, batch: Batch) -> bool:
     """Whether the answer came late; ClipsOutlastTickets where its clips cannot have been seen by then."""
-    spent = repository.spent(connection, answer.run, batch.issued_at)
+    spent = answer.spent or Spent(0.0, 0.0, None, None)
     first = min(filter(None, (spent.first_issued_at, batch.issued_at)))
     for issued_at, before_ms in ((batch.issued_at, spent.batch_ms), (first, spent.run_ms)):
         needed, there_was = before_ms + answer.clip_ms, _ms(answer.received_at - issued_at)

@@ -27,20 +27,26 @@ EXPIRED = "answer_expired"
 _evidence = cast(Table, AnswerEvidence.__table__)
 _INSERT = insert(_evidence).inline()
 _since = case((_evidence.c.issued_at >= bindparam("issued_at"), _evidence.c.clip_ms), else_=0.0)
-_SPENT = select(
-    func.coalesce(func.sum(_evidence.c.clip_ms), 0.0).label("run_ms"),
-    func.coalesce(func.sum(_since), 0.0).label("batch_ms"),
-    func.min(_evidence.c.issued_at).label("first_issued_at"),
-    func.max(_evidence.c.received_at).label("last_received_at"),
-).where(_evidence.c.study_run_id == bindparam("run"))
+SPENT = (
+    select(
+        func.coalesce(func.sum(_evidence.c.clip_ms), 0.0).label("run_ms"),
+        func.coalesce(func.sum(_since), 0.0).label("batch_ms"),
+        func.min(_evidence.c.issued_at).label("first_issued_at"),
+        func.max(_evidence.c.received_at).label("last_received_at"),
+    )
+    .where(_evidence.c.study_run_id == bindparam("run"))
+    .subquery("spent")
+)
+"""What the answers of `run` took of the time since `issued_at`: one row, to be read with others."""
 
 
-def spent(connection: Connection, run: int, issued_at: datetime) -> Any:
-    """Clip time of the run's answers, of those by tickets of `issued_at` or later; first and last times.
+class Spent(NamedTuple):
+    """Clip time of a run's answers, of those by tickets as young as one; first and last times."""
 
-    The row has run_ms, batch_ms, first_issued_at, last_received_at.
-    """
-    return connection.execute(_SPENT, {"run": run, "issued_at": issued_at}).one()
+    run_ms: float
+    batch_ms: float
+    first_issued_at: datetime | None
+    last_received_at: datetime | None
 
 
 def first_view(connection: Connection, run: int, trial_index: int, play: int) -> datetime | None:
@@ -124,6 +130,19 @@ def _checks(session: Session, run: StudyRun) -> dict[int, CheckName]:
     )
     rows = session.execute(query.where(TrialClip.study_run_id == run.id, VersionClip.cell == CHECK_CELL))
     return {row.trial_index: cast(CheckName, row.levels["check"]) for row in rows}
+
+
+def checks_passed_over(session: Session, run: StudyRun) -> list[CheckName]:
+    """Kinds of the motion checks without an answer that stand before a trial with one."""
+    rated = select(Rating.trial_index).where(Rating.study_run_id == run.id)
+    last = select(func.max(Rating.trial_index)).where(Rating.study_run_id == run.id).scalar_subquery()
+    query = (
+        select(VersionClip.levels)
+        .join(TrialClip, VersionClip.id == TrialClip.version_clip_id)
+        .where(TrialClip.study_run_id == run.id, VersionClip.cell == CHECK_CELL)
+        .where(TrialClip.trial_index < last, TrialClip.trial_index.not_in(rated))
+    )
+    return [cast(CheckName, levels["check"]) for levels in session.scalars(query)]
 
 
 def _stored(session: Session, run: StudyRun) -> dict[tuple[int, int], AnswerEvidence]:

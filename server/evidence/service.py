@@ -16,7 +16,8 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
     if run.evidence != "asked" or run.erased_at is not None:
         return NOT_JUDGED
     answers = [_answer(row) for row in repository.answers(session, run)]
-    return judge(answers, refused=repository.has_refusals(session, run))
+    passed_over = [len(CHECK_KINDS[check].choices) for check in repository.checks_passed_over(session, run)]
+    return judge(answers, refused=repository.has_refusals(session, run), passed_over=passed_over)
 
 
 def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
@@ -26,7 +27,6 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
         response = KINDS[row.rating.kind].check_response(row.rating.payload)
     if trial.kind == "check":
         response = row.rating.payload.get("check")
-    told = row.check is not None and row.rating.verdict != "failed"
     given = (evidence.interaction if evidence else None) or {}
     unchecked = evidence is not None and evidence.digest is not None and evidence.digest_right is None
     return JudgedAnswer(
@@ -45,6 +45,7 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
         presses=given.get("presses"),
         trusted=given.get("trusted"),
         press_ms=given.get("press_ms"),
-        choices=len(CHECK_KINDS[row.check].choices) if row.check and told else 0,
+        choices=len(CHECK_KINDS[row.check].choices) if row.check else 0,
+        void=row.check is not None and row.rating.verdict == "failed",
         other_way=trial.kind == "check" and bool(row.rating.payload.get("other_way")),
     )

@@ -23,9 +23,10 @@ class JudgedAnswer:
     """One answer with its evidence, as far as it brought any.
 
     part: practice, main, attention or check. expected: what an attention check asked for, or what a motion
-    check's clip shows. choices: how many answers a motion check offered; 0 where it tells nothing, since its
-    play failed. other_way: it was answered the way offered to those who cannot see it. needs_digest: it
-    rated a clip. issued_at: of its ticket, None where it had none. press_ms: median length of its presses.
+    check's clip shows. choices: how many answers a motion check offered. void: the check tells nothing, since
+    its play failed or it was passed over. other_way: it was answered the way offered to those who cannot see
+    it. needs_digest: it rated a clip. issued_at: of its ticket, None where it had none. press_ms: median
+    length of its presses.
     """
 
     trial_index: int
@@ -44,6 +45,7 @@ class JudgedAnswer:
     trusted: int | None = None
     press_ms: float | None = None
     choices: int = 0
+    void: bool = False
     other_way: bool = False
 
 
@@ -65,6 +67,7 @@ class Signals:
     motion_checks_guessed: how likely guesses are right as often as that; None where too few were asked to
     tell guesses from people.
     motion_checks_other_way: how many were answered the other way that the study offers.
+    motion_checks_void: how many tell nothing, since their play failed or they were passed over.
     """
 
     tickets: float | None = None
@@ -85,13 +88,14 @@ class Signals:
     motion_checks_asked: float | None = None
     motion_checks_guessed: float | None = None
     motion_checks_other_way: float | None = None
+    motion_checks_void: float | None = None
 
 
 SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
 
 
-def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
-    """The signals of a run's answers, in any order."""
+def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> Signals:
+    """The signals of a run's answers, in any order; passed_over: choices of the checks without an answer."""
     if not answers:
         return Signals()
     came = sorted(answers, key=lambda one: (one.received_at, one.trial_index))
@@ -101,7 +105,8 @@ def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
     lengths = [one.press_ms for one in answers if one.press_ms is not None]
     checks = [one for one in answers if one.part == "attention"]
     offered = [one for one in answers if one.part == "check"]
-    motion = [one for one in offered if one.choices and not one.other_way]
+    asked = [one for one in offered if one.choices and not one.other_way]
+    motion = [one for one in asked if not one.void]
     right = [one.response == one.expected for one in motion]
     clips = [one for one in answers if one.needs_digest]
     presses = sum(one.presses or 0 for one in answers)
@@ -123,23 +128,31 @@ def signals_of(answers: Sequence[JudgedAnswer]) -> Signals:
         checks=_share([one.response == one.expected for one in checks]),
         motion_checks=_share(right),
         motion_checks_asked=len(motion) or None,
-        motion_checks_guessed=guessed(sum(right), [one.choices for one in motion]),
+        motion_checks_guessed=guessed(
+            sum(right), [one.choices for one in motion], [*(one.choices for one in asked), *passed_over]
+        ),
         motion_checks_other_way=sum(one.other_way for one in offered) if offered else None,
+        motion_checks_void=len(asked) - len(motion) + len(passed_over) if offered or passed_over else None,
     )
 
 
-def guessed(right: int, choices: Sequence[int]) -> float | None:
+def guessed(right: int, choices: Sequence[int], asked: Sequence[int] | None = None) -> float | None:
     """How likely somebody who guesses is right at least `right` times; None where too few were asked.
 
     The number of right guesses is Poisson-binomial: check i is guessed with 1 / choices[i]. Enough are asked
     where somebody who sees `SEEN` of the checks passes (guesses do as well with less than
-    `GUESSED_BY_CHANCE`) with at least `POWER`.
+    `GUESSED_BY_CHANCE`) with at least `POWER`; whether they are is told by the choices of all that were
+    `asked`, so that nobody gets around the checks by having one of them fail.
     """
+    if not choices or not _tell(choices if asked is None else asked):
+        return None
+    return _at_least([1 / number for number in choices])[right]
+
+
+def _tell(choices: Sequence[int]) -> bool:
     guesses = _at_least([1 / number for number in choices])
     needed = next((number for number, chance in enumerate(guesses) if chance < GUESSED_BY_CHANCE), None)
-    if needed is None or _at_least([SEEN] * len(choices))[needed] < POWER:
-        return None
-    return guesses[right]
+    return needed is not None and _at_least([SEEN] * len(choices))[needed] >= POWER
 
 
 def _at_least(chances: Sequence[float]) -> list[float]:

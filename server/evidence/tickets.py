@@ -13,6 +13,7 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 
 from server.evidence.refusals import TicketExpired, TicketInvalid, TicketOfAnotherRun, TicketOfAnotherTrial
 
@@ -20,6 +21,8 @@ CODE_BYTES = 16
 NONCE_BYTES = 6
 LIFETIME = timedelta(days=60)
 """Longer than a visit may last anywhere, so that an outbox may be as late as its visit."""
+MAX_OPENED = 4096
+"""Batches kept open: the answers of a visit come by the same one, whose seal is looked at once."""
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -55,6 +58,7 @@ def ticket(key: bytes, batch: Batch, trial_index: int, play: int) -> str:
     return _code(key, f"ticket:{batch.text}:{trial_index}:{play}")
 
 
+@lru_cache(maxsize=MAX_OPENED)
 def open_batch(key: bytes, text: str) -> Batch:
     """The batch of this text; TicketInvalid where the seal does not fit."""
     head, _, seal = text.rpartition(".")
@@ -64,6 +68,15 @@ def open_batch(key: bytes, text: str) -> Batch:
     if len(parts) != 3 or not sealed:
         raise TicketInvalid("Expected a batch of tickets as this server issued it; nothing is stored.")
     return Batch(text, parts[0], _EPOCH + timedelta(milliseconds=int(parts[1])))
+
+
+def claimed_time(text: str) -> datetime | None:
+    """When a batch says it was issued, before its seal is looked at; None where it says no time."""
+    parts = text.split(".")
+    try:
+        return _EPOCH + timedelta(milliseconds=int(parts[1]))
+    except (IndexError, ValueError, OverflowError):
+        return None
 
 
 def check_ticket(

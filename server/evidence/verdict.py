@@ -46,6 +46,8 @@ BANDS: dict[str, tuple[Band, ...]] = {
 """Points of each signal; a value in none of its bands adds nothing. `late` is shown and adds nothing, as are
 `motion_checks` and its numbers: the same share says more or less by how many checks and choices there were,
 which `motion_checks_guessed` weighs."""
+VOID_SHARE = 0.2
+"""Share of motion checks that may tell nothing, as plays fail on honest people's machines; one may always."""
 REFUSED_POINTS = -4.0
 """Points where answers of the run were refused for their evidence."""
 WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -1}
@@ -71,18 +73,28 @@ def points_of(name: str, value: float | None) -> float:
     return next((band.points for band in BANDS.get(name, ()) if band.low <= value < band.high), 0.0)
 
 
-def judge(answers: Sequence[JudgedAnswer], *, refused: bool = False) -> Judgement:
+def judge(
+    answers: Sequence[JudgedAnswer], *, refused: bool = False, passed_over: Sequence[int] = ()
+) -> Judgement:
     """The verdict on a run whose page was asked for evidence.
 
     refused: answers of the run were refused for their evidence, which happens to no page of this program.
-    Where a motion check was answered the other way that the study offers, the verdict is at most unclear.
+    passed_over: number of choices of each motion check that was left out.
+    Where motion checks were answered the other way that the study offers, or too many of them tell nothing,
+    the verdict is at most unclear.
     """
-    signals = signals_of(answers)
+    signals = signals_of(answers, passed_over)
     points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
     if len(answers) < MIN_ANSWERS:
         few: Verdict = "unlikely" if refused else "unclear" if answers else "not_judged"
         return Judgement(few, points, signals)
     verdict: Verdict = "likely" if points >= LIKELY else "unlikely" if points <= UNLIKELY else "unclear"
-    if verdict == "likely" and signals.motion_checks_other_way:
+    if verdict == "likely" and (signals.motion_checks_other_way or _escapes(signals)):
         verdict = "unclear"
     return Judgement(verdict, points, signals)
+
+
+def _escapes(signals: Signals) -> bool:
+    """Whether the run got around its motion checks: all of them tell nothing, or more than may."""
+    void, told = signals.motion_checks_void or 0, signals.motion_checks_asked or 0
+    return void > max(1, VOID_SHARE * (void + told)) or (void > 0 and told == 0)

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, NamedTuple, cast
 
-from sqlalchemy import Connection, Table, bindparam, insert, or_, select, update
+from sqlalchemy import Connection, Table, bindparam, insert, or_, select, true, update
 
+from server.evidence.repository import SPENT, Spent
 from server.models import AssignedTrial, Rating, RunEvent, RunTally, StudyRun, TrialClip
 from server.tallies.tally import Tally, tally_of
 from server.trials.kinds import Part
@@ -50,6 +51,7 @@ _TRIAL = (
     )
     .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial_index"))
 )
+_TRIAL_AND_SPENT = _TRIAL.add_columns(*SPENT.c).join(SPENT, true())
 _STORED = select(
     _ratings.c.rating_id,
     _ratings.c.trial_index,
@@ -98,24 +100,36 @@ def run_for_rating(connection: Connection, token_hash: str) -> Any:
 
 
 class StoredTrial(NamedTuple):
-    """A trial as assigned: its part of the run, its clips' ids by role, the run's tally (None at first)."""
+    """A trial as assigned: its part of the run, its clips' ids by role, the run's tally (None at first).
+
+    spent: what the run's answers took of its time; None where no ticket was named.
+    """
 
     kind: Part
     clips: dict[str, int]
     tally: Tally | None
+    spent: Spent | None = None
 
 
-def trial(connection: Connection, run: int, trial_index: int) -> StoredTrial | None:
+def trial(
+    connection: Connection, run: int, trial_index: int, issued_at: datetime | None = None
+) -> StoredTrial | None:
     """Part and clips of a trial, with the run's tally; None where the run has no such trial.
 
     To be asked once the run is locked: another server may have written the tally before.
+    issued_at: of the ticket that an answer names, to get with it what the run's answers took since.
     """
-    rows = connection.execute(_TRIAL, {"run": run, "trial_index": trial_index}).all()
+    values = {"run": run, "trial_index": trial_index}
+    if issued_at is None:
+        rows = connection.execute(_TRIAL, values).all()
+    else:
+        rows = connection.execute(_TRIAL_AND_SPENT, values | {"issued_at": issued_at}).all()
     if not rows:
         return None
-    kind, _, _, *stored = rows[0]
+    kind, _, _, heat, not_good, counts, answers, *spent = rows[0]
     clips = {row.role: row.version_clip_id for row in rows if row.role is not None}
-    return StoredTrial(kind, clips, None if stored[0] is None else tally_of(*stored))
+    tally = None if heat is None else tally_of(heat, not_good, counts, answers)
+    return StoredTrial(kind, clips, tally, Spent(*spent) if spent else None)
 
 
 def stored_ratings(connection: Connection, run: int, trial_index: int, rating_id: str) -> list[Any]:

@@ -10,7 +10,7 @@ from experiments.definition import Experiment
 from experiments.trials import KINDS
 from experiments.trials.check import CheckAnswer
 from server.errors import Conflict, Invalid, NotFound
-from server.evidence.intake import Answer, Intake
+from server.evidence.intake import Answer, Intake, issued_at
 from server.tallies.tally import Counted, Play, Tally
 from server.tokens import hash_token
 from server.trials import checks, repository, warnings
@@ -54,7 +54,9 @@ def save_rating(
     run = repository.run_for_rating(connection, hash_token(token))
     if run is None:
         raise RunUnknown("This visit is not known; please open the link you were given again.")
-    trial = repository.trial(connection, run.id, rating.trial_index)
+    asked = run.evidence == "asked"
+    issued = issued_at(rating.evidence) if asked else None
+    trial = repository.trial(connection, run.id, rating.trial_index, issued)
     if trial is None:
         raise TrialNotInRun(
             f"Trial {rating.trial_index} is not in this run, which has trials 0 to {run.trials_total - 1}."
@@ -76,9 +78,8 @@ def save_rating(
         receipt.warning = warnings.warning_of(connection, run.id, loaded.experiment, known.rating_id)
         return receipt, False
     _check(run, loaded, trial, rating)
-    if run.evidence == "asked":
-        rated = rating.answer.given
-        intake.take(connection, _answer(run, loaded, trial.clips, rating, saved_at, rated=rated))
+    if asked:
+        intake.take(connection, _answer(run, loaded, trial, rating, saved_at))
     judge = checks.judge if trial.kind == "check" else served(kind).judge
     ruling = judge(loaded, trial.clips, rating)
     repository.add_rating(connection, _row(run, rating_id, kind, answer, rating, ruling, saved_at))
@@ -176,15 +177,10 @@ def _check(run: Any, loaded: LoadedVersion, trial: repository.StoredTrial, ratin
 
 
 def _answer(
-    run: Any,
-    loaded: LoadedVersion,
-    roles: dict[str, int],
-    rating: RatingIn,
-    received_at: datetime,
-    *,
-    rated: bool,
+    run: Any, loaded: LoadedVersion, trial: repository.StoredTrial, rating: RatingIn, received_at: datetime
 ) -> Answer:
-    clips = [loaded.clips[ident] for ident in roles.values()]
+    rated = rating.answer.given
+    clips = [loaded.clips[ident] for ident in trial.clips.values()]
     views = 1 if isinstance(rating.answer, CheckAnswer) else getattr(loaded.experiment.trial, "views", 1)
     return Answer(
         run=run.id,
@@ -198,6 +194,7 @@ def _answer(
         received_at=received_at,
         answered_at=_with_zone(rating.answered_at_client),
         evidence=rating.evidence,
+        spent=trial.spent,
     )
 
 

@@ -4,6 +4,7 @@ import random
 from collections import Counter
 from dataclasses import replace
 from math import comb
+from typing import Any
 
 import pytest
 
@@ -73,9 +74,56 @@ def test_the_other_way_caps_the_verdict_at_unclear() -> None:
     assert (judged.signals.motion_checks, judged.signals.motion_checks_other_way) == (None, CHECKS)
 
 
-def test_checks_whose_play_failed_say_nothing() -> None:
-    checked = with_checks(gamma_person(3), random.Random(1), 0.0)
-    failed = [replace(one, choices=0) if one.part == "check" else one for one in checked]
-    signals = signals_of(failed)
-    assert signals.motion_checks is None
-    assert signals.motion_checks_guessed is None
+def void(answers: list[JudgedAnswer], number: int, **changes: Any) -> list[JudgedAnswer]:
+    """The first `number` checks of a run with plays that failed."""
+    checks = [one.trial_index for one in answers if one.part == "check"][:number]
+    return [replace(one, void=True, **changes) if one.trial_index in checks else one for one in answers]
+
+
+def test_checks_whose_play_failed_are_neither_right_nor_wrong() -> None:
+    signals = signals_of(void(with_checks(gamma_person(3), random.Random(1), 0.0), CHECKS))
+    assert (signals.motion_checks, signals.motion_checks_guessed) == (None, None)
+    assert (signals.motion_checks_asked, signals.motion_checks_void) == (None, CHECKS)
+
+
+@pytest.mark.parametrize(
+    ("number", "changes", "verdict"),
+    [
+        (CHECKS, {"response": None}, "unclear"),
+        (CHECKS, {}, "unclear"),
+        (3, {}, "unclear"),
+        (2, {}, "likely"),
+        (1, {"response": None}, "likely"),
+    ],
+)
+def test_failed_plays_are_no_way_around_the_checks(number: int, changes: Any, verdict: str) -> None:
+    """Two of ten may fail, as they do on honest people's machines; more leave the run unclear."""
+    checked = with_checks(gamma_person(3), random.Random(1), 1.0)
+    assert judge(checked).verdict == "likely"
+    assert judge(void(checked, number, **changes)).verdict == verdict
+
+
+def test_an_answer_of_null_to_a_check_that_was_shown_is_wrong() -> None:
+    checked = with_checks(gamma_person(3), random.Random(1), 1.0)
+    silent = [replace(one, response=None) if one.part == "check" else one for one in checked]
+    assert judge(silent).signals.motion_checks == 0
+    assert judge(silent).verdict == "unclear"
+
+
+def test_somebody_who_guesses_gains_nothing_by_failing_the_most_that_may_fail() -> None:
+    """Of six digits, the fewest that tell anything, one may fail; the five left are still weighed."""
+    rng = random.Random(7)
+    person = gamma_person(3)
+    digits = [replace(one, choices=9) for one in with_checks(person, rng, 1 / 9) if one.part == "check"][:6]
+    others = [one for one in person if one.trial_index not in {one.trial_index for one in digits}]
+    guesses = [replace(one, response=0) for one in digits]
+    judged = judge([*others, *void(guesses, 1)])
+    assert judged.signals.motion_checks_guessed == pytest.approx(1)
+    assert judged.verdict == "unclear"
+
+
+def test_checks_that_were_passed_over_count_as_void() -> None:
+    checked = with_checks(gamma_person(3), random.Random(1), 1.0)
+    without = [one for one in checked if one.part != "check"]
+    judged = judge(without, passed_over=[4] * CHECKS)
+    assert (judged.verdict, judged.signals.motion_checks_void) == ("unclear", CHECKS)

@@ -3,6 +3,7 @@
 import csv
 import json
 import uuid
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from server.app import create_app
 from server.context import Services
 from server.export.formats import FORMATS
 from server.models import Study
+from server.simulation.acting import Actor
 from server.simulation.adversaries import act, manner_called
 from server.simulation.http import JsonClient, running_server
 from server.simulation.person import Person, Rater
@@ -218,6 +220,31 @@ def test_manners_differ_in_what_they_make_of_checks(services: Services, tmp_path
         assert sum(value >= 0.01 for value in guessed) >= 3
     else:
         assert [run["signals"]["motion_checks_other_way"] for run in runs] == [8] * 4
+
+
+def escaping(trial: Any, clip: dict[str, Any]) -> dict[str, Any]:
+    """A check whose clip is said not to have been shown."""
+    return {"answer": {"kind": "check", "check": None}, "playback": {"method": "none"}}
+
+
+def distracted(trial: Any, clip: dict[str, Any]) -> dict[str, Any]:
+    """A check that is answered, in a window said to have lost the focus."""
+    return {"answer": {"kind": "check", "check": 1}, "playback": {**clip, "focus_lost": 1}}
+
+
+@pytest.mark.parametrize("way", [escaping, distracted])
+def test_no_run_is_likely_a_person_s_whose_checks_all_tell_nothing(
+    services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: Any
+) -> None:
+    eight = CHECKS.replace("per_block = 2", "per_block = 4")
+    study = add_study(services, tmp_path / "clips", checked(SHORT, eight), frames=30)
+    monkeypatch.setattr(Actor, "_checked", lambda actor, trial: way(trial, actor._playback(trial)))
+    raters = [Rater(1, 1, {}, checks=right_answers(services, study.name))]
+    manner = replace(manner_called("honest"), offline=0, reloads=0, clock_jumps=0)
+    [run] = act(services.settings, study.link("general", synthetic=True), raters, manner, 1)
+    assert run["refused"] == {}
+    assert run["signals"]["motion_checks_void"] == 8
+    assert run["verdict"] == "unclear"
 
 
 def test_a_study_is_not_taken_in_without_the_checks_it_asks_for(
