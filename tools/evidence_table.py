@@ -26,8 +26,23 @@ from tests.helpers.studies import SHORT, add_study
 
 Run = dict[str, Any]
 STUDY = "evidence"
-# 36 clips of three seconds, two checks, warnings as they are by default.
-TEXT = SHORT.replace("per_cell = 2", "per_cell = 9").replace('"short"', f'"{STUDY}"', 1)
+# 36 clips of three seconds, two attention and ten motion checks, warnings as they are by default.
+MOTION_CHECKS = """
+[evidence.motion_checks]
+per_block = 5
+kinds = ["direction", "shape"]
+clips = 24
+
+[evidence.motion_checks.other_way]
+label = { en = "I cannot see moving patterns" }
+text = { en = "Thank you." }
+
+"""
+TEXT = (
+    SHORT.replace("per_cell = 2", "per_cell = 9")
+    .replace('"short"', f'"{STUDY}"', 1)
+    .replace("[trial]\n", f"{MOTION_CHECKS}[trial]\n", 1)
+)
 RULES = "".join(
     f'[[warnings.rules]]\nrule = "{rule}"\n\n' for rule in ("same_answer", "repeated_pattern", "fast_answers")
 )

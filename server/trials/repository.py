@@ -126,7 +126,8 @@ def trial(
         rows = connection.execute(_TRIAL_AND_SPENT, values | {"issued_at": issued_at}).all()
     if not rows:
         return None
-    kind, _, _, heat, not_good, counts, answers, *spent = rows[0]
+    kind, _, _, heat, not_good, counts, answers = rows[0][:7]
+    spent = rows[0][7:]
     clips = {row.role: row.version_clip_id for row in rows if row.role is not None}
     tally = None if heat is None else tally_of(heat, not_good, counts, answers)
     return StoredTrial(kind, clips, tally, Spent(*spent) if spent else None)
