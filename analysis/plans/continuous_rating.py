@@ -58,7 +58,10 @@ def analyse(prepared: Prepared) -> Contents:
 
 
 def clips_of(prepared: Prepared) -> list[ClipTraces]:
-    """The traces of each clip; a clip shown to a person twice counts by its last play."""
+    """The traces of each clip of each cell; a person has as many as times they rated it.
+
+    Clips without blinks are one file whatever their exemplar, so one file may be several trials.
+    """
     clips = []
     rows = prepared.rows
     rates = rows["clip_fps"].to_numpy(dtype=float) / rows["step_frames"].to_numpy(dtype=float)
@@ -68,19 +71,16 @@ def clips_of(prepared: Prepared) -> list[ClipTraces]:
             "frame rate at a time"
         )
     for (cell, clip), mine in rows.assign(rate_hz=rates).groupby(["cell", "clip_sha256"], observed=True):
-        traces = {
-            str(who): json.loads(str(text))
-            for who, text in zip(mine["participant"], mine["trace"], strict=True)
-            if str(text) not in ("", "nan")
-        }
+        given = mine[~mine["trace"].astype(str).isin(("", "nan"))]
+        traces = [json.loads(str(text)) for text in given["trace"]]
         if not traces:
             continue
-        samples = min(map(len, traces.values()))
+        samples = min(map(len, traces))
         blinks = str(mine["blinks_s"].iloc[0])
         events = tuple(json.loads(blinks)) if blinks.startswith("[") else ()
-        values = np.array([trace[:samples] for trace in traces.values()], dtype=float)
-        rate = float(mine["rate_hz"].iloc[0])
-        clips.append(ClipTraces(str(clip), str(cell), rate, events, tuple(traces), values))
+        values = np.array([trace[:samples] for trace in traces], dtype=float)
+        people = tuple(given["participant"].astype(str))
+        clips.append(ClipTraces(str(clip), str(cell), float(mine["rate_hz"].iloc[0]), events, people, values))
     if not clips:
         raise InputError(f"{prepared.source}: no trial has a trace; nothing to analyse")
     return clips

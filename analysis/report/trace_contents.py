@@ -131,36 +131,11 @@ def pictures(prepared: Prepared, traces: Sequence[MeanTrace], lag: LagResult | N
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     import matplotlib as mpl
 
-    from analysis.report.pictures import BESIDE, COLOURS, STYLE, as_bytes, new_figure, write_note
+    from analysis.report.pictures import STYLE
+    from analysis.report.trace_figures import lag_figure, traces_figure
 
     earlier_s = lag.lag_s if lag is not None and lag.p < SIGNIFICANCE else 0.0
-    made = []
+    labels = [cell_label(prepared, trace.cell) for trace in traces]
     with mpl.rc_context(STYLE):
-        figure = new_figure()
-        axes = figure.add_subplot()
-        for place, trace in enumerate(traces):
-            colour, times = COLOURS[place % len(COLOURS)], trace.times_s - earlier_s
-            axes.plot(times, trace.mean, color=colour, label=cell_label(prepared, trace.cell))
-            axes.fill_between(times, trace.ci_low, trace.ci_high, color=colour, alpha=0.18, linewidth=0)
-        axes.set_xlabel("Time in the clip in s" + (", less the lag" if earlier_s else ""))
-        axes.set_ylabel("Rating")
-        axes.legend(frameon=False, fontsize=8, **BESIDE)
-        note = f"Mean over people with 95% intervals; drawn {fixed(earlier_s)} s earlier than given."
-        write_note(figure, note, prepared.synthetic, "answers")
-        alt = f"Mean rating over time in {len(traces)} cells"
-        made.append(
-            Picture("figure-traces", "Mean traces", alt, as_bytes(figure, "svg"), as_bytes(figure, "png"))
-        )
-        if lag is not None:
-            figure = new_figure(height=3.4)
-            axes = figure.add_subplot()
-            axes.plot(lag.lags_s, lag.mean, color=COLOURS[0])
-            axes.fill_between(lag.lags_s, lag.ci_low, lag.ci_high, color=COLOURS[0], alpha=0.18, linewidth=0)
-            axes.axvline(lag.lag_s, color=COLOURS[1], linewidth=0.8, linestyle=":")
-            axes.axhline(0, color="#888888", linewidth=0.6)
-            axes.set_xlabel("Time after a blink in s")
-            axes.set_ylabel("Correlation with the rating's change")
-            write_note(figure, f"N = {lag.people}. Dotted: the lag.", prepared.synthetic, "answers")
-            alt = f"Correlation of ratings with blinks, greatest at {fixed(lag.lag_s)} s"
-            made.append(Picture("figure-lag", "Lag", alt, as_bytes(figure, "svg"), as_bytes(figure, "png")))
-    return made
+        made = [traces_figure(traces, labels, earlier_s, prepared.synthetic)]
+        return made if lag is None else [*made, lag_figure(lag, prepared.synthetic)]

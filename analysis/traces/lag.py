@@ -152,7 +152,10 @@ def _chance(clips: Sequence[ClipTraces], lags: int, rng: np.random.Generator) ->
 
 @dataclass(frozen=True, eq=False)
 class MeanTrace:
-    """The mean trace of a cell over people, each person's clips averaged first; 95% t intervals."""
+    """The mean trace of a cell over people, each person's clips averaged first; 95% t intervals.
+
+    `events_s` has a tuple for each clip of the cell: when its events are.
+    """
 
     cell: str
     times_s: Array
@@ -163,6 +166,7 @@ class MeanTrace:
     level_low: float
     level_high: float
     people: int
+    events_s: tuple[tuple[float, ...], ...] = ()
 
 
 def mean_trace(clips: Sequence[ClipTraces]) -> MeanTrace:
@@ -185,6 +189,7 @@ def mean_trace(clips: Sequence[ClipTraces]) -> MeanTrace:
         level_low,
         level_high,
         len(rows),
+        tuple(clip.events_s for clip in clips),
     )
 
 
