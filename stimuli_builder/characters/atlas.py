@@ -15,8 +15,9 @@ from stimuli_builder.characters.colour import srgb_to_linear
 from stimuli_builder.characters.declaration import (
     DECLARATION_FILE,
     Declaration,
-    Level,
+    LowerLidPose,
     Picture,
+    PictureOrFrame,
     read_declaration,
 )
 from stimuli_builder.characters.level_video import decode_level_video
@@ -75,9 +76,12 @@ class Atlas:
         """(h, w, 3) sRGB code values of one level's crop."""
         level = self.declaration.levels[index]
         what = f"atlas level {index} (closure {level.closure:g})"
-        if level.frame is None:
-            return self._decode(level, self.declaration.crop[2:], what)
-        return self._frame(level, level.frame, what)
+        return self._picture_or_frame(level, self.declaration.crop[2:], what)
+
+    def pose_srgb(self, pose: LowerLidPose, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB code values of one pose of the lower lid, which is of `size` (width, height)."""
+        what = f"lower-lid pose ({pose.vertical_mm:g}, {pose.horizontal_mm:g}) mm"
+        return self._picture_or_frame(pose, size, what)
 
     def levels_linear(self) -> NDArray[np.float32]:
         """(n, h, w, 3) linear light of every level's crop; decoded at each call, so keep it.
@@ -103,17 +107,21 @@ class Atlas:
         if self.has_lower_lid:
             _ = self.lower_lid_layer
 
-    def _frame(self, level: Level, number: int, what: str) -> NDArray[np.uint8]:
-        if level.file not in self._videos:
-            content = declared_bytes(self.folder, level, what)
-            self._videos[level.file] = decode_level_video(content, what, level.file)
-        frames, (width, height) = self._videos[level.file], self.declaration.crop[2:]
-        if number >= len(frames) or frames.shape[1:3] != (height, width):
+    def _picture_or_frame(
+        self, picture: PictureOrFrame, size: tuple[int, int], what: str
+    ) -> NDArray[np.uint8]:
+        if picture.frame is None:
+            return self._decode(picture, size, what)
+        if picture.file not in self._videos:
+            content = declared_bytes(self.folder, picture, what)
+            self._videos[picture.file] = decode_level_video(content, what, picture.file)
+        frames, (width, height) = self._videos[picture.file], size
+        if picture.frame >= len(frames) or frames.shape[1:3] != (height, width):
             raise InputError(
-                f"{what}: {level.file} holds {len(frames)} of {frames.shape[2]} x {frames.shape[1]} px, "
-                f"the declaration asks for frame {number} of {width} x {height} px"
+                f"{what}: {picture.file} holds {len(frames)} of {frames.shape[2]} x {frames.shape[1]} px, "
+                f"the declaration asks for frame {picture.frame} of {width} x {height} px"
             )
-        return np.asarray(frames[number], np.uint8)
+        return np.asarray(frames[picture.frame], np.uint8)
 
     def _decode(self, picture: Picture, size: Iterable[int], what: str) -> NDArray[np.uint8]:
         return decode_picture(self.folder, picture, tuple(size), what)

@@ -32,17 +32,19 @@ class Picture(_Declared):
         return self
 
 
-class Level(Picture):
-    """The crop as it looks at one eyelid closure (0 open, 1 closed).
+class PictureOrFrame(Picture):
+    """A picture of its own, or where `file` is a video the one of number `frame`, from 0."""
 
-    Where `file` is a video of levels, `frame` is the number of its picture, from 0.
-    """
-
-    closure: Closure
     frame: int | None = Field(None, ge=0)
 
 
-class LowerLidPose(Picture):
+class Level(PictureOrFrame):
+    """The crop as it looks at one eyelid closure (0 open, 1 closed)."""
+
+    closure: Closure
+
+
+class LowerLidPose(PictureOrFrame):
     """The lower lid's region of the open-eye frame with the lower lid moved.
 
     `vertical_mm` is up, `horizontal_mm` towards the nose, both of the lid's centre.
@@ -82,15 +84,19 @@ class LowerLid(_Declared):
         if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
             raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
         if any(matte.frame is not None for matte in self.mattes):
-            raise ValueError("lower_lid.mattes must be pictures; only levels may be frames of a video")
+            raise ValueError("lower_lid.mattes must be pictures; only levels and poses may be frames of a video")
         _require_ascending([matte.closure for matte in self.mattes], "lower_lid.mattes")
         return self
 
 
 class Declaration(_Declared):
-    """The whole of `character.toml`; lengths in mm on the screen at actual size, positions in px."""
+    """The whole of `character.toml`; lengths in mm on the screen at actual size, positions in px.
+
+    `version` counts the bakes of a name that were given to others: pictures that changed have another.
+    """
 
     name: str = Field(pattern="^[a-z0-9][a-z0-9_-]*$")
+    version: int = Field(1, ge=1)
     label: str
     size_px: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
     px_per_mm: float = Field(gt=0)

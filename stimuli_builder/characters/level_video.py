@@ -18,6 +18,8 @@ from stimuli_builder.characters.writing import write_bytes_declared
 
 QUANTISER = 7
 """x264's constant quantiser: 54 dB or more against the pictures given (decision 0636)."""
+STILL_CODES = 2
+"""Code values that the encoder may put on a pixel which stands still: skin away from the lids must not flicker."""
 
 
 def write_level_video(folder: Path, file: str, pictures: Sequence[NDArray[np.uint8]]) -> Picture:
@@ -47,7 +49,15 @@ def decode_level_video(content: bytes, what: str, file: str) -> NDArray[np.uint8
         raise InputError(f"{what} is damaged: cannot decode {file}; bake it again") from error
     if not frames:
         raise InputError(f"{what} is damaged: {file} holds no frame; bake it again")
-    return np.stack(frames)
+    return _held_still(np.stack(frames))
+
+
+def _held_still(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The frames with every pixel that changes by no more than the encoder's own noise as in the first."""
+    low, high = frames.min(axis=0), frames.max(axis=0)
+    first = frames[0]
+    moves = (np.maximum(high - first, first - low) > STILL_CODES).any(axis=-1)
+    return np.where(moves[None, ..., None], frames, first)
 
 
 def _rgb(frame: Any) -> NDArray[np.uint8]:

@@ -70,11 +70,10 @@ class LowerLidLayer:
     def _decode_poses(self) -> NDArray[np.float32]:
         """(vertical, horizontal, h, w, 3) change of each pose against the resting one."""
         size = self._lower.crop[2:]
-        images = {}
-        for pose in self._lower.poses:
-            at = (pose.vertical_mm, pose.horizontal_mm)
-            what = f"lower-lid pose ({at[0]:g}, {at[1]:g}) mm"
-            images[at] = srgb_to_linear(decode_picture(self._character.folder, pose, size, what))
+        images = {
+            (pose.vertical_mm, pose.horizontal_mm): srgb_to_linear(self._character.pose_srgb(pose, size))
+            for pose in self._lower.poses
+        }
         rest = images[(0.0, 0.0)]
         return np.stack(
             [np.stack([images[(v, h)] - rest for h in self.horizontal_mm]) for v in self.vertical_mm]

@@ -28,7 +28,7 @@ from stimuli_builder.characters.photorealistic.plan import (
 from stimuli_builder.characters.writing import write_bytes, write_declaration, write_picture
 
 STUDIO_EV = 0.15
-LEVELS_FILE = "levels.mkv"
+LEVELS_FILE, POSES_FILE = "levels.mkv", "lower_lid.mkv"
 NOTICE_FILE = Path(__file__).with_name("ICT-FaceKit-LICENSE.txt")
 """Goes beside every character rendered from the kit's geometry, as its licence asks."""
 Picture = NDArray[np.uint8]
@@ -108,11 +108,15 @@ class Assembly:
         """The grid of poses and the mattes, once every pose is rendered."""
         if not self._lower or not all(shot.file.exists() for shot in self._lower.values()):
             return None
-        poses, mattes = [], []
-        for pose, image in self.lower_lid_poses():
-            v, h = pose.vertical_mm, pose.horizontal_mm
-            picture = write_picture(folder, f"lower_{round(v * 100):03d}_{round(h * 100):03d}.webp", image)
-            poses.append(LowerLidPose(vertical_mm=v, horizontal_mm=h, **picture.model_dump()))
+        posed, pictures = zip(*self.lower_lid_poses(), strict=True)
+        video = write_level_video(folder, POSES_FILE, pictures)
+        poses = [
+            LowerLidPose(
+                vertical_mm=pose.vertical_mm, horizontal_mm=pose.horizontal_mm, frame=k, **video.model_dump()
+            )
+            for k, pose in enumerate(posed)
+        ]
+        mattes = []
         for closure in MATTE_CLOSURES:
             matte = upper_lid_matte(self._scene, LidPose(closure), self.lower_lid_crop)
             picture = write_picture(folder, f"matte_{round(closure * 256):03d}.webp", _grey(matte))

@@ -30,7 +30,7 @@ from stimuli_builder.characters.facekit.scene import FaceScene
 from stimuli_builder.characters.photorealistic.environment import BPY_VERSION, ensure_blender
 
 # Raise when geometry, textures, materials or lights change: work of another recipe is not resumed.
-RECIPE = 2
+RECIPE = 3
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 

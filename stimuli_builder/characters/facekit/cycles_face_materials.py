@@ -80,6 +80,7 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
         "film": film(),
         "tear": tear(),
         "flesh": flesh(look),
+        "seam": seam(look),
         "lash": hair("lash", [min(0.008, c * 0.25) for c in look["hair"]], 0.25),
         "brow": hair("brow", look["hair"], 0.33),
     }
@@ -194,6 +195,19 @@ def flesh(look: dict[str, Any]) -> Any:
     shader.inputs["Subsurface Scale"].default_value = 0.08
     wrinkles = n.noise(n.add("TexCoord").outputs["Object"], 14.0, 3)
     n.put(n.add("Bump", Strength=0.5, Distance=0.02, Height=wrinkles).outputs[0], shader.inputs["Normal"])
+    return n.surface(shader)
+
+
+def seam(look: dict[str, Any]) -> Any:
+    """Skin of the lids' own pigments, a little redder, where they meet by the nose."""
+    n = Nodes("seam")
+    melanin, blood = 1.15 * look["melanin"], look["haemoglobin"] + 0.12
+    shader = n.add("BsdfPrincipled", Roughness=0.45, Specular_IOR_Level=0.4)
+    colour = [base * math.exp(-melanin * m - blood * b) for base, m, b in zip(BASE, MELANIN, BLOOD, strict=True)]
+    shader.inputs["Base Color"].default_value = (*colour, 1)
+    shader.inputs["Subsurface Weight"].default_value = 1.0
+    shader.inputs["Subsurface Radius"].default_value = (1.0, 0.34, 0.17)
+    shader.inputs["Subsurface Scale"].default_value = 0.065
     return n.surface(shader)
 
 

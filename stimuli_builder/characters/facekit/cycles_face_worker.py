@@ -178,8 +178,10 @@ def render_box(box: list[int], size: list[int], draft: Path) -> Any:
     x, y, width, height = box
     render = bpy.context.scene.render
     render.use_border = render.use_crop_to_border = True
-    render.border_min_x, render.border_max_x = x / size[0], (x + width) / size[0]
-    render.border_min_y, render.border_max_y = 1 - (y + height) / size[1], 1 - y / size[1]
+    # Cycles truncates a share of the frame to whole pixels: a quarter of one guards against rounding down.
+    low = size[1] - y - height
+    render.border_min_x, render.border_max_x = (x + 0.25) / size[0], (x + width + 0.25) / size[0]
+    render.border_min_y, render.border_max_y = (low + 0.25) / size[1], (low + height + 0.25) / size[1]
     render.filepath = str(draft)
     try:
         bpy.ops.render.render(write_still=True)

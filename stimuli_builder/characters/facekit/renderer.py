@@ -140,7 +140,11 @@ def _settings(scene: FaceScene, setup: Setup, folder: Path) -> dict[str, Any]:
         "centre_y_cm": view.centre_y_cm,
         "plane_z_cm": framing.PLANE_Z_CM,
         "distance_cm": framing.DISTANCE_CM,
-        "look": {"melanin": identity.skin.melanin, "hair": list(identity.hair.colour)},
+        "look": {
+            "melanin": identity.skin.melanin,
+            "haemoglobin": identity.skin.haemoglobin,
+            "hair": list(identity.hair.colour),
+        },
         "lights": load_light(setup.light),
         "device": setup.device,
         "threads": setup.threads,

@@ -15,7 +15,7 @@ import numpy as np
 
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.eye_texture import eye_maps
-from stimuli_builder.characters.facekit.eyes import Mesh, caruncle, eyeball, tear_line, wet_film
+from stimuli_builder.characters.facekit.eyes import Mesh, caruncle, eyeball, seam, tear_line, wet_film
 from stimuli_builder.characters.facekit.framing import FRAMINGS, Box, View
 from stimuli_builder.characters.facekit.hair import Brow, Lashes, Strands
 from stimuli_builder.characters.facekit.identity import Identity
@@ -102,6 +102,7 @@ class FaceScene:
                 Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
                 Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
                 Part(f"flesh_{name}", "flesh", caruncle(self.path, coarse, side)),
+                Part(f"seam_{name}", "seam", seam(self.path, coarse, side)),
                 Part(f"brow_{name}", "brow", self._brows[side].at(posed)),
             ]
         return parts + [Part(name, "lash", row.at(coarse)) for name, row in self._lashes]
