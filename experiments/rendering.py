@@ -41,7 +41,8 @@ class RenderSettings(Declaration):
     """Everything the clip builder needs for one cell."""
 
     character: str = "photorealistic"
-    """A shipped character (`photorealistic`, `cartoon`), or the path of a character folder of your own."""
+    """A shipped character (`stimuli character list`: `alder`, `cartoon`), or the path of a folder of
+    your own. Left out, it is the retired `photorealistic`, so that old declarations keep their meaning."""
     profile: ProfileName = "real"
     """Blink profile: recorded (`real`), of the PCA model (`model`), a textbook curve (`SL`, `AL`, `SL_ease`,
     `AL_ease`: symmetric or asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""

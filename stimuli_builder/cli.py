@@ -49,6 +49,10 @@ COMMANDS = {
         "stimuli_builder.characters.cli",
         "Render a character's atlas of baked pictures.",
     ),
+    "character": (
+        "stimuli_builder.characters.cli",
+        "List the characters that are here, and bring back one of an earlier release.",
+    ),
     "plan": (
         "stimuli_builder.clips.cli",
         "Print an experiment's design: factors, cells, clips, trials, blocks and expected minutes.",

@@ -3,6 +3,7 @@
 The atlas holds one full open-eye frame and, for a rising list of closures, the crop that a blink changes.
 """
 
+import hashlib
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
@@ -99,6 +100,18 @@ class Atlas:
         """The decoded lower-lid layer; InputError where the character has none."""
         return LowerLidLayer(self)
 
+    def fingerprint(self) -> str:
+        """SHA-256 of the declaration and every picture file, in hexadecimal digits."""
+        digest = hashlib.sha256((self.folder / DECLARATION_FILE).read_bytes())
+        for file in dict.fromkeys(picture.file for picture in _pictures(self.declaration)):
+            try:
+                digest.update((self.folder / file).read_bytes())
+            except OSError as error:
+                raise InputError(
+                    f"character '{self.name}': {file} is missing from {self.folder}; bake it again"
+                ) from error
+        return digest.hexdigest()
+
     def check_files(self) -> None:
         """Decode every picture once; InputError names the first that is missing or damaged."""
         self.base_linear()
@@ -136,14 +149,17 @@ def load_atlas(folder: Path) -> Atlas:
         The declaration is missing or wrong, or a declared file is not there.
     """
     declaration = read_declaration(folder)
-    lower = declaration.lower_lid
-    pictures: list[Picture] = [declaration.base, *declaration.levels]
-    if lower is not None:
-        pictures += [*lower.poses, *lower.mattes]
-    for picture in pictures:
+    for picture in _pictures(declaration):
         if not (folder / picture.file).is_file():
             raise InputError(
                 f"character '{declaration.name}': {picture.file} is missing from {folder}; bake it again or "
                 f"correct {DECLARATION_FILE}"
             )
     return Atlas(folder, declaration)
+
+
+def _pictures(declaration: Declaration) -> list[Picture]:
+    """Base, levels, poses and mattes, in the order of the declaration."""
+    lower = declaration.lower_lid
+    pictures: list[Picture] = [declaration.base, *declaration.levels]
+    return pictures if lower is None else [*pictures, *lower.poses, *lower.mattes]

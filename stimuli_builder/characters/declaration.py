@@ -84,7 +84,9 @@ class LowerLid(_Declared):
         if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
             raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
         if any(matte.frame is not None for matte in self.mattes):
-            raise ValueError("lower_lid.mattes must be pictures; only levels and poses may be frames of a video")
+            raise ValueError(
+                "lower_lid.mattes must be pictures; only levels and poses may be frames of a video"
+            )
         _require_ascending([matte.closure for matte in self.mattes], "lower_lid.mattes")
         return self
 

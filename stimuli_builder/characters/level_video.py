@@ -19,7 +19,7 @@ from stimuli_builder.characters.writing import write_bytes_declared
 QUANTISER = 7
 """x264's constant quantiser: 54 dB or more against the pictures given (decision 0636)."""
 STILL_CODES = 2
-"""Code values that the encoder may put on a pixel which stands still: skin away from the lids must not flicker."""
+"""Code values that the encoder may change of a pixel which stands still: skin must not flicker."""
 
 
 def write_level_video(folder: Path, file: str, pictures: Sequence[NDArray[np.uint8]]) -> Picture:

@@ -1,6 +1,5 @@
 """A baked character as clips need it: its atlas at its own size, or resampled in linear light."""
 
-import hashlib
 from functools import cached_property
 from pathlib import Path
 
@@ -8,10 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import InputError
 from stimuli_builder.characters.atlas import Atlas, load_atlas
 from stimuli_builder.characters.colour import srgb_to_linear
-from stimuli_builder.characters.declaration import DECLARATION_FILE
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.clips.characters import Geometry
 from stimuli_builder.clips.levels import LevelSet, Window, quantised, window_inside
@@ -42,19 +39,7 @@ class BakedCharacter:
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the declaration and every picture."""
-        declaration = load_atlas(self.folder).declaration
-        pictures = [declaration.base, *declaration.levels]
-        if declaration.lower_lid is not None:
-            pictures += [*declaration.lower_lid.poses, *declaration.lower_lid.mattes]
-        digest = hashlib.sha256((self.folder / DECLARATION_FILE).read_bytes())
-        for file in dict.fromkeys(picture.file for picture in pictures):
-            try:
-                digest.update((self.folder / file).read_bytes())
-            except OSError as error:
-                raise InputError(
-                    f"character '{declaration.name}': {file} is missing from {self.folder}; bake it again"
-                ) from error
-        return digest.hexdigest()
+        return load_atlas(self.folder).fingerprint()
 
     def levels(self, size_px: tuple[int, int]) -> LevelSet:
         """The atlas at a size: the width scales it, a lower height cuts skin above and below."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from experiments.errors import InputError, did_you_mean
+from stimuli_builder.characters.retired import load_retired
 
 if TYPE_CHECKING:
     from stimuli_builder.clips.levels import LevelSet
@@ -83,6 +84,11 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
     folder = (beside or Path()) / name
     if (folder / "character.toml").is_file():
         return folder.resolve()
+    if name in load_retired():
+        raise InputError(
+            f"character '{name}' does not ship any more: `stimuli character fetch {name}` brings it back for "
+            "studies that were made with it; a new study names another, say character = 'alder'"
+        )
     if folder.is_dir():
         raise InputError(f"{folder} is no character: it holds no character.toml (docs/own-character.md)")
     raise InputError(

@@ -18,7 +18,7 @@ CSV file of closure samples at 300 fps (0 open, 1 closed; docs/clips.md).
 
 Examples:
 
-  stimuli clip --profile real --character photorealistic --out blink.mp4
+  stimuli clip --profile real --character alder --out blink.mp4
 
   stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
 
@@ -33,7 +33,7 @@ def clip_command(
     out: Annotated[Path, typer.Option(help="MP4 file to write.")],
     profile: Annotated[str, typer.Option(help="Blink to show, see above.")] = "model",
     character: Annotated[
-        str, typer.Option(help="photorealistic, cartoon or a character folder.")
+        str, typer.Option(help="A shipped character (`stimuli character list`) or a character folder.")
     ] = "cartoon",
     duration: Annotated[float | None, typer.Option(help="Blink length in frames at 30 fps.")] = None,
     duration_ms: Annotated[float | None, typer.Option(help="Blink length in ms, instead.")] = None,

@@ -22,7 +22,7 @@ levels = [
 name = "character"
 label = "Character"
 levels = [
-    { name = "photorealistic", label = "A", render = { character = "photorealistic" } },
+    { name = "photorealistic", label = "A", render = { character = "alder" } },
     { name = "cartoon", label = "B", render = { character = "cartoon" } },
 ]
 """

@@ -5126,7 +5126,8 @@ export interface components {
         RenderSettings: {
             /**
              * Character
-             * @description A shipped character (`photorealistic`, `cartoon`), or the path of a character folder of your own.
+             * @description A shipped character (`stimuli character list`: `alder`, `cartoon`), or the path of a folder of
+             *     your own. Left out, it is the retired `photorealistic`, so that old declarations keep their meaning.
              * @default photorealistic
              */
             character: string;

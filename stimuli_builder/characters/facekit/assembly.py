@@ -10,21 +10,15 @@ from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
-from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM, Box
-from stimuli_builder.characters.facekit.lid_pose import OPEN, LidPose
-from stimuli_builder.characters.facekit.matte import upper_lid_matte
+from stimuli_builder.characters.facekit.development import develop, to_8_bit
+from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM, Box, bounding_box
+from stimuli_builder.characters.facekit.inbetween import flow_mix
+from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, OPEN, VERTICAL_MM, LidPose
+from stimuli_builder.characters.facekit.matte import MATTE_CLOSURES, upper_lid_matte
 from stimuli_builder.characters.facekit.plan import closures_of
 from stimuli_builder.characters.facekit.renderer import Shot
 from stimuli_builder.characters.facekit.scene import FaceScene
 from stimuli_builder.characters.level_video import write_level_video
-from stimuli_builder.characters.photorealistic.development import develop, to_8_bit
-from stimuli_builder.characters.photorealistic.framing import bounding_box
-from stimuli_builder.characters.photorealistic.inbetween import flow_mix
-from stimuli_builder.characters.photorealistic.plan import (
-    HORIZONTAL_MM,
-    MATTE_CLOSURES,
-    VERTICAL_MM,
-)
 from stimuli_builder.characters.writing import write_bytes, write_declaration, write_picture
 
 STUDIO_EV = 0.15

@@ -14,6 +14,7 @@ from typing import Any
 
 from experiments.errors import InputError
 from stimuli_builder.characters.facekit.assembly import Assembly
+from stimuli_builder.characters.facekit.environment import BPY_VERSION, ensure_blender
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import FaceKit
 from stimuli_builder.characters.facekit.plan import (
@@ -27,7 +28,6 @@ from stimuli_builder.characters.facekit.plan import (
 )
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
-from stimuli_builder.characters.photorealistic.environment import BPY_VERSION, ensure_blender
 
 # Raise when geometry, textures, materials or lights change: work of another recipe is not resumed.
 RECIPE = 3

@@ -203,7 +203,9 @@ def seam(look: dict[str, Any]) -> Any:
     n = Nodes("seam")
     melanin, blood = 1.15 * look["melanin"], look["haemoglobin"] + 0.12
     shader = n.add("BsdfPrincipled", Roughness=0.45, Specular_IOR_Level=0.4)
-    colour = [base * math.exp(-melanin * m - blood * b) for base, m, b in zip(BASE, MELANIN, BLOOD, strict=True)]
+    colour = [
+        base * math.exp(-melanin * m - blood * b) for base, m, b in zip(BASE, MELANIN, BLOOD, strict=True)
+    ]
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Subsurface Weight"].default_value = 1.0
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.34, 0.17)

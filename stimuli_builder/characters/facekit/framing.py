@@ -84,6 +84,13 @@ class View:
         return np.outer(*sides)[..., None].astype(np.float32)
 
 
+def bounding_box(boxes: list[Box]) -> Box:
+    """Smallest box that holds all."""
+    left, top = min(b[0] for b in boxes), min(b[1] for b in boxes)
+    right, bottom = max(b[0] + b[2] for b in boxes), max(b[1] + b[3] for b in boxes)
+    return left, top, right - left, bottom - top
+
+
 def parse_size(text: str | None, framing: str) -> tuple[int, int]:
     """(width, height) of a size written as 960x360; the framing's own where none is given.
 

@@ -9,6 +9,7 @@ from stimuli_builder.characters.facekit.hair import Strands
 from stimuli_builder.characters.facekit.lid_pose import LidPose
 from stimuli_builder.characters.facekit.scene import FaceScene
 
+MATTE_CLOSURES = tuple(k / 32 for k in range(33))
 SUPERSAMPLED = 4
 _SHIFT = 4
 _LASH_COVERS = 0.75

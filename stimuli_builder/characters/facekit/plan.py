@@ -5,9 +5,8 @@ from pathlib import Path
 
 from experiments.errors import InputError
 from stimuli_builder.characters.facekit.framing import Box
-from stimuli_builder.characters.facekit.lid_pose import OPEN, LidPose
+from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, OPEN, VERTICAL_MM, LidPose
 from stimuli_builder.characters.facekit.renderer import Shot
-from stimuli_builder.characters.photorealistic.plan import HORIZONTAL_MM, VERTICAL_MM
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129)
 LOWER_LID_AFTER = 10

@@ -21,11 +21,10 @@ from stimuli_builder.characters.facekit.hair import Brow, Lashes, Strands
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import Array, FaceKit
 from stimuli_builder.characters.facekit.lid_loops import SIDES
-from stimuli_builder.characters.facekit.lid_pose import OPEN, SHUT, LidPose
+from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, OPEN, SHUT, VERTICAL_MM, LidPose
 from stimuli_builder.characters.facekit.lid_skin import FaceSkin, face_part, lid_skin
 from stimuli_builder.characters.facekit.pigments import Pigments
 from stimuli_builder.characters.facekit.subdivision import subdivide
-from stimuli_builder.characters.photorealistic.plan import HORIZONTAL_MM, VERTICAL_MM
 
 SIDE_NAMES = {1: "left", -1: "right"}
 MOVES_CM = 0.004

@@ -9,8 +9,8 @@ from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.declaration import Declaration, Level, read_declaration
 from stimuli_builder.characters.example import CLOSURES, CROP, draw_crop
+from stimuli_builder.characters.facekit.development import psnr_db
 from stimuli_builder.characters.level_video import decode_level_video, write_level_video
-from stimuli_builder.characters.photorealistic.development import psnr_db
 from stimuli_builder.characters.writing import write_declaration
 from stimuli_builder.clips.characters import find_character
 

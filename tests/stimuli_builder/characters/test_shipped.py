@@ -1,34 +1,53 @@
-"""The shipped photorealistic atlas: whole, still outside what a blink moves, and within its size limit."""
+"""The shipped faces: whole, as they were pinned, still outside what a blink moves, and within their size."""
+
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
-from stimuli_builder.characters.photorealistic.parameters import load_presets
+
+FACES = sorted(file.parent.name for file in SHIPPED.glob("*/ICT-FaceKit-LICENSE.txt"))
+PINNED = json.loads((Path(__file__).parent / "shipped.json").read_text())
 
 
-@pytest.fixture(scope="module")
-def character() -> Atlas:
-    return load_atlas(SHIPPED / "photorealistic")
+@pytest.fixture(scope="module", params=FACES)
+def face(request: pytest.FixtureRequest) -> Atlas:
+    return load_atlas(SHIPPED / request.param)
 
 
-def test_every_picture_is_whole_and_what_was_declared(character: Atlas) -> None:
-    character.check_files()
-    assert character.has_lower_lid
-    assert character.declaration.opening_mm == 11.0
-    assert {"command", "versions", "date", "rendered_closures"} <= set(character.declaration.provenance)
+def test_experiments_1_to_3_have_their_face() -> None:
+    assert "alder" in FACES
+    assert load_atlas(SHIPPED / "alder").has_lower_lid
 
 
-def test_blink_begins_at_the_still_frame_and_leaves_its_rim_alone(character: Atlas) -> None:
-    levels = character.levels_linear()
-    np.testing.assert_array_equal(character.base_linear()[character.crop], levels[0])
-    for rim in (levels[:, 0], levels[:, -1], levels[:, :, 0], levels[:, :, -1]):
-        np.testing.assert_array_equal(rim, np.broadcast_to(rim[0], rim.shape))
+def test_a_face_that_was_given_to_others_never_changes(face: Atlas) -> None:
+    """Pictures that changed need another version, and a folder of their own: studies name the old one."""
+    assert PINNED[face.name] == {"version": face.declaration.version, "sha256": face.fingerprint()}
 
 
-def test_atlas_stays_below_25_megabytes() -> None:
-    assert sum(file.stat().st_size for file in (SHIPPED / "photorealistic").iterdir()) < 25e6
+def test_every_picture_is_whole_and_says_how_it_was_made(face: Atlas) -> None:
+    face.check_files()
+    declared = face.declaration
+    assert face.folder.name == declared.name
+    assert declared.inter_ocular_mm == 60.0
+    assert 8.5 < declared.opening_mm < 11.5
+    assert {"command", "versions", "date", "rendered_closures", "geometry"} <= set(declared.provenance)
+    assert "Permission is hereby granted" in (face.folder / "ICT-FaceKit-LICENSE.txt").read_text()
 
 
-def test_both_presets_have_a_preview() -> None:
-    assert {file.stem for file in (SHIPPED / "previews").glob("*.webp")} == set(load_presets())
+def test_a_blink_changes_nothing_but_the_lids(face: Atlas) -> None:
+    """Code values, so that 0 is 0: rim of the crop, and the bridge of the nose between the eyes."""
+    levels = np.stack([face.level_srgb(number) for number in range(0, len(face.closures), 8)])
+    middle = levels.shape[2] // 2
+    for still in (levels[:, 0], levels[:, -1], levels[:, :, 0], levels[:, :, -1], levels[:, :, middle]):
+        np.testing.assert_array_equal(still, np.broadcast_to(still[0], still.shape))
+    base = (face.base_linear()[face.crop], face.levels_linear()[0])
+    assert np.abs(base[0] - base[1]).max() < 0.05
+
+
+def test_atlases_stay_small() -> None:
+    sizes = {name: sum(file.stat().st_size for file in (SHIPPED / name).iterdir()) for name in FACES}
+    assert max(sizes.values()) <= 8e6
+    assert sum(sizes.values()) < 60e6

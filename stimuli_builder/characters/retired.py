@@ -1,0 +1,100 @@
+"""Characters that left the tree: a study made with one renders the same bytes once it is fetched."""
+
+import shutil
+import subprocess
+import tarfile
+import tempfile
+import tomllib
+from io import BytesIO
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.declaration import DECLARATION_FILE
+
+RETIRED_FILE = Path(__file__).with_name("retired.toml")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Retired(BaseModel):
+    """Where a character lies in the repository's history, and the fingerprint of its pictures."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    label: str
+    commit: str = Field(pattern="^[0-9a-f]{40}$")
+    folder: str
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+
+
+def load_retired() -> dict[str, Retired]:
+    """Every retired character by name."""
+    content = tomllib.loads(RETIRED_FILE.read_text(encoding="utf-8"))
+    return {name: Retired.model_validate(table) for name, table in content.items()}
+
+
+def restore(name: str, source: Path | None, target: Path) -> Path:
+    """Put a retired character into the folder `target`, whole or not at all; returns that folder.
+
+    Raises
+    ------
+    InputError
+        There is no such character, the source does not hold it, its pictures are others than they were,
+        or the folder cannot be written.
+    """
+    known = load_retired()
+    if name not in known:
+        raise InputError(f"no retired character '{name}'{did_you_mean(name, known)}")
+    retired = known[name]
+    if (target / DECLARATION_FILE).is_file():
+        _check(name, retired, target)
+        return target
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=target.parent) as folder:
+            draft = Path(folder) / "character"
+            _take(name, retired, source or ROOT, draft)
+            _check(name, retired, draft)
+            draft.replace(target)
+    except OSError as error:
+        raise InputError(
+            f"cannot write {target}: {error.strerror}; give another folder with --out and name "
+            "it as the character"
+        ) from error
+    return target
+
+
+def _take(name: str, retired: Retired, source: Path, draft: Path) -> None:
+    for folder in (source / retired.folder, source):
+        if (folder / DECLARATION_FILE).is_file():
+            shutil.copytree(folder, draft)
+            return
+    with tarfile.open(fileobj=BytesIO(_archive(name, retired, source))) as tar:
+        tar.extractall(draft.parent, filter="data")
+    (draft.parent / retired.folder).replace(draft)
+
+
+def _archive(name: str, retired: Retired, source: Path) -> bytes:
+    """The character's folder as the commit that made it had it, in a tar file."""
+    command = ["git", "-C", str(source), "archive", "--format=tar", retired.commit, retired.folder]
+    try:
+        done = subprocess.run(command, capture_output=True, check=False)  # noqa: S603 - fixed arguments
+    except OSError as error:
+        raise InputError(f"fetching '{name}' needs git, which is not here: {error.strerror}") from error
+    if done.returncode:
+        said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+        raise InputError(
+            f"{source} does not hold '{name}' ({said}): expected a whole clone of Palpebra (`git fetch "
+            "--unshallow` completes one) or an earlier release, given with --from"
+        )
+    return done.stdout
+
+
+def _check(name: str, retired: Retired, folder: Path) -> None:
+    if load_atlas(folder).fingerprint() != retired.sha256:
+        raise InputError(
+            f"{folder} holds another '{name}' than earlier releases had: its pictures have another SHA-256; "
+            "take it from a clone or a release that nobody changed"
+        )

@@ -1,0 +1,109 @@
+"""How true a shipped face is, against renders that it was not made from.
+
+Run: python tests/bench/face_quality.py NAME FACEKIT [WORK]. Renders what it needs into WORK
+(build/bake/truth-NAME), a minute or so a picture; needs Blender's environment, .venv-bake. Prints the PSNR
+halfway between rendered levels and halfway between the atlas's levels, and of lower lids on their way.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
+from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
+from stimuli_builder.characters.facekit.assembly import STUDIO_EV
+from stimuli_builder.characters.facekit.development import develop, psnr_db, to_8_bit
+from stimuli_builder.characters.facekit.identity import Identity
+from stimuli_builder.characters.facekit.kit import load_facekit
+from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, VERTICAL_MM, LidPose
+from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot
+from stimuli_builder.characters.facekit.scene import FaceScene
+from stimuli_builder.characters.interpolation import level_weights
+from tests.helpers.lower_lid_change import lower_lid_change
+
+# The last one is where the lids almost meet.
+PLACES = (0.1, 0.4, 0.7, 0.93)
+# The widest blink on its way down, and both extremes at its end and, earlier than any blink, at half.
+MOVED = tuple(
+    LidPose(closure, VERTICAL_MM[-1] * share, HORIZONTAL_MM[-1] * share)
+    for closure, share in ((0.5, 0.5), (0.75, 0.75), (0.875, 0.875), (1.0, 1.0), (0.5, 1.0))
+)
+
+
+def midpoints(closures: list[float]) -> list[float]:
+    """The middles of the steps at PLACES of the closing, where a picture between levels errs most."""
+    steps = [int((len(closures) - 1) * place) for place in PLACES]
+    return [(closures[step] + closures[step + 1]) / 2 for step in steps]
+
+
+def picture(character: Atlas, closure: float) -> np.ndarray:
+    """(h, w, 3) linear light of the crop as clips mix it from the neighbouring levels."""
+    weights = level_weights(character.closures, [closure])[0].astype(np.float32)
+    return sum(weights[i] * srgb_to_linear(character.level_srgb(int(i))) for i in np.flatnonzero(weights))
+
+
+def laid(character: Atlas, scene: FaceScene, shot: Shot) -> np.ndarray:
+    """(h, w, 3) code values of the crop with a shot's boxes over the open level, as an atlas is made."""
+    x0, y0 = character.declaration.crop[:2]
+    out = character.level_srgb(0).astype(np.float32) / 255
+    for name, light in shot.read().items():
+        x, y, width, height = box = shot.boxes[name]
+        where = out[y - y0 : y - y0 + height, x - x0 : x - x0 + width]
+        where += scene.view.feather(box) * (
+            develop(light.astype(np.float32), scene.identity.exposure_ev + STUDIO_EV) - where
+        )
+    return to_8_bit(out)
+
+
+def say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    name, facekit = sys.argv[1], Path(sys.argv[2])
+    work = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("build/bake") / f"truth-{name}"
+    work.mkdir(parents=True, exist_ok=True)
+    character = load_atlas(SHIPPED / name)
+    made = character.declaration.provenance
+    identity = Identity.model_validate(made["face"])
+    scene = FaceScene(load_facekit(facekit), identity, "eyes", character.size_px)
+    rendered = midpoints(made["rendered_closures"])
+    between = midpoints([level.closure for level in character.declaration.levels])
+    poses = [LidPose(closure) for closure in (*rendered, *between)]
+    moved = list(MOVED) if character.has_lower_lid else []
+    shots = {
+        pose: Shot(
+            work / f"true_{pose.closure:.6f}_{pose.vertical_mm}_{pose.horizontal_mm}.npz",
+            pose,
+            scene.boxes,
+            made["samples"],
+        )
+        for pose in (*poses, *moved)
+    }
+    missing = [shot for shot in shots.values() if not shot.file.exists()]
+    if missing:
+        setup = Setup(Path(".venv-bake/bin/python"), "studio", "auto", 2, work / "blender.log")
+        with Renderer(scene, setup) as renderer:
+            for shot in missing:
+                renderer.render(shot)
+    for what, closures in (("rendered levels", rendered), ("the atlas's levels", between)):
+        say(f"closure  PSNR in dB (crop), halfway between {what}")
+        for closure in closures:
+            truth = laid(character, scene, shots[LidPose(closure)])
+            say(f"{closure:.5f} {psnr_db(linear_to_srgb(picture(character, closure)), truth):8.1f}")
+    if moved:
+        say("lower lid: closure, mm up, mm nasal, PSNR in dB (left as it was)")
+    for pose in moved:
+        window = character.lower_lid_layer.window
+        still = picture(character, pose.closure)
+        change = lower_lid_change(character, pose.closure, pose.vertical_mm, pose.horizontal_mm)
+        truth = laid(character, scene, shots[pose])[window]
+        figures = [psnr_db(linear_to_srgb(image)[window], truth) for image in (still + change, still)]
+        place = f"{pose.closure:7.3f} {pose.vertical_mm:5.2f} {pose.horizontal_mm:5.2f}"
+        say(f"{place} {figures[0]:6.1f} ({figures[1]:.1f})")
+
+
+if __name__ == "__main__":
+    main()

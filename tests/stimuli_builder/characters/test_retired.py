@@ -1,0 +1,96 @@
+"""A character that left the tree comes back byte for byte, or one line says why not."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.characters import retired
+from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.retired import ROOT, Retired, load_retired, restore
+from stimuli_builder.clips.characters import find_character
+
+FOLDER = "pictures/old"
+
+
+@pytest.fixture
+def repository(tiny_character: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A clone whose last commit deleted a character that the one before had."""
+    clone = tmp_path / "clone"
+    shutil.copytree(tiny_character, clone / FOLDER)
+
+    def git(*words: str) -> str:
+        command = ["git", "-C", str(clone), "-c", "user.name=a", "-c", "user.email=a@b.c", *words]
+        return subprocess.run(command, capture_output=True, check=True, text=True).stdout.strip()
+
+    git("init", "-q")
+    git("add", "-A")
+    git("commit", "-qm", "with")
+    commit = git("rev-parse", "HEAD")
+    git("rm", "-rq", "pictures")
+    git("commit", "-qm", "without")
+    old = Retired(label="old", commit=commit, folder=FOLDER, sha256=load_atlas(tiny_character).fingerprint())
+    monkeypatch.setattr(retired, "load_retired", lambda: {"old": old})
+    return clone
+
+
+def test_it_comes_out_of_the_history_byte_for_byte(
+    repository: Path, tiny_character: Path, tmp_path: Path
+) -> None:
+    folder = restore("old", repository, tmp_path / "data" / "old")
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == {
+        file.name: file.read_bytes() for file in tiny_character.iterdir()
+    }
+    assert [file.name for file in folder.parent.iterdir()] == ["old"]
+    assert restore("old", tmp_path / "nowhere", folder) == folder  # there already
+
+
+def test_it_comes_out_of_an_earlier_release(repository: Path, tiny_character: Path, tmp_path: Path) -> None:
+    release = tmp_path / "release"
+    shutil.copytree(tiny_character, release / FOLDER)
+    assert restore("old", release, tmp_path / "a" / "old").is_dir()
+    assert restore("old", tiny_character, tmp_path / "b" / "old").is_dir()
+
+
+def test_other_pictures_than_it_had_are_refused_and_nothing_stays(
+    repository: Path, tiny_character: Path, tmp_path: Path
+) -> None:
+    file = tiny_character / "character.toml"
+    file.write_text(file.read_text() + "\n# changed\n")
+    with pytest.raises(InputError, match="holds another 'old' than earlier releases had"):
+        restore("old", tiny_character, tmp_path / "data" / "old")
+    assert not list((tmp_path / "data").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("odl", "no retired character 'odl'; did you mean 'old'"), ("old", "does not hold 'old'")],
+)
+def test_what_cannot_be_had_is_one_line(repository: Path, tmp_path: Path, name: str, said: str) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(InputError, match=said) as raised:
+        restore(name, empty, tmp_path / "data" / "old")
+    assert "\n" not in str(raised.value)
+
+
+def test_a_study_that_asks_for_one_is_told_the_command() -> None:
+    for name in load_retired():
+        if not (ROOT / "stimuli_builder" / "characters" / "data" / name).exists():
+            with pytest.raises(InputError, match=f"`stimuli character fetch {name}`"):
+                find_character(name)
+
+
+@pytest.mark.parametrize("name", sorted(load_retired()))
+def test_every_retired_character_is_in_this_clones_history(tmp_path: Path, name: str) -> None:
+    known = load_retired()[name]
+    held = subprocess.run(
+        ["git", "-C", str(ROOT), "cat-file", "-e", known.commit], capture_output=True, check=False
+    )
+    if held.returncode:
+        pytest.skip(f"this checkout is no whole clone: its history lacks commit {known.commit[:7]}")
+    atlas = load_atlas(restore(name, None, tmp_path / name))
+    assert atlas.fingerprint() == known.sha256
+    assert atlas.declaration.opening_mm == 11.0
