@@ -30,6 +30,7 @@ from server.results import endpoints as results
 from server.runs import endpoints as runs
 from server.settings import Settings
 from server.studies import endpoints as studies
+from server.studies import life_endpoints as life_cycle
 from server.studies import link_endpoints as links
 
 
@@ -45,6 +46,7 @@ def _routers() -> tuple[APIRouter, ...]:
         accounts.router,
         people.router,
         studies.router,
+        life_cycle.router,
         links.router,
         monitor.router,
         results.router,

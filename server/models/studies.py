@@ -17,6 +17,7 @@ class Study(Base):
     status: draft (only previews), pilot, live, closed. paused: no new runs for the moment.
     quota: complete runs after which the study closes itself. revision: counts edits, so that of two people
     editing at once the second is told. recruiter: see `server.participants.recruiter`.
+    archived_at: since when it is out of the list of studies; it can be read, and not changed.
     pseudonym_key: what the names of its participants are made with; it never leaves the database.
     """
 
@@ -36,6 +37,7 @@ class Study(Base):
     created_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     opened_at: Mapped[datetime | None]
     closed_at: Mapped[datetime | None]
+    archived_at: Mapped[datetime | None]
     pseudonym_key: Mapped[str] = mapped_column(String(64), default=new_pseudonym_key)
 
     versions: Mapped[list["StudyVersion"]] = relationship(

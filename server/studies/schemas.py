@@ -238,6 +238,7 @@ class StudySummary(BaseModel):
     complete: int
     active: int
     created_at: datetime
+    archived_at: datetime | None
 
 
 class StudyDetail(BaseModel):

@@ -185,13 +185,18 @@ def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
     return levels_from_names(levels.pattern, files)
 
 
-def _for_edit(session: Session, name: str, revision: int) -> Study:
+def for_edit(session: Session, name: str, revision: int, *, archived: bool = False) -> Study:
+    """The study to change; Conflict where somebody changed it since, or where it is in the archive."""
     study = find_study(session, name)
     if study.revision != revision:
         raise EditedMeanwhile(
             f"Somebody else changed this study meanwhile (revision {study.revision}, yours was {revision}); "
             "load it again and repeat your edit.",
             revision=study.revision,
+        )
+    if study.archived_at is not None and not archived:
+        raise Conflict(
+            f"The study '{name}' is in the archive; take it out again (Settings) before it is changed."
         )
     return study
 
@@ -201,7 +206,7 @@ def add_definition(services: Services, name: str, wanted: NewVersion, who: Ident
     experiment = planned_experiment(wanted.toml)
     added = _added_clips(services, wanted, experiment)
     with services.database.write() as session:
-        study = _for_edit(session, name, wanted.revision)
+        study = for_edit(session, name, wanted.revision)
         manifest = Manifest.model_validate(active_version(session, study).manifest)
         if added is not None:
             own_clips.check_declared(added, experiment)
@@ -225,7 +230,7 @@ def _added_clips(services: Services, wanted: NewVersion, experiment: Experiment)
 
 def change_status(session: Session, name: str, revision: int, status: str, who: Identity) -> None:
     """draft -> pilot -> live -> closed, and the ways back that lose nothing."""
-    study = _for_edit(session, name, revision)
+    study = for_edit(session, name, revision)
     if status == study.status:
         return
     if status not in ALLOWED[study.status]:
@@ -242,7 +247,7 @@ def change_status(session: Session, name: str, revision: int, status: str, who: 
 
 def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Identity) -> None:
     """Pause or go on, set the quota, name the recruiter."""
-    study = _for_edit(session, name, wanted.revision)
+    study = for_edit(session, name, wanted.revision)
     study.paused, study.quota = wanted.paused, wanted.quota
     study.recruiter = wanted.recruiter.model_dump() if wanted.recruiter else None
     study.revision += 1
@@ -281,6 +286,7 @@ def summary(study: Study, counts: repository.StatusCounts) -> StudySummary:
             "complete": counts[study.id, "complete"],
             "active": counts[study.id, "active"],
             "created_at": study.created_at,
+            "archived_at": study.archived_at,
         }
     )
 

@@ -932,6 +932,66 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/copies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Clone Study
+         * @description Copy a version's declaration and clips into a new draft; links, quota and recruiter are not copied.
+         */
+        post: operations["clone_study"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/archive": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Archive Study
+         * @description Put a draft or closed study into the archive, where it can be read but not changed, or take it out.
+         */
+        put: operations["archive_study"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/comparison": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Versions
+         * @description What differs between two versions: keys of the declaration, word by word, and clips.
+         */
+        get: operations["compare_versions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/links": {
         parameters: {
             query?: never;
@@ -1607,6 +1667,19 @@ export interface components {
             kind: string;
         };
         /**
+         * ArchiveStudy
+         * @description Put a study into the archive, or take it out.
+         */
+        ArchiveStudy: {
+            /**
+             * Revision
+             * @description The revision this edit started from.
+             */
+            revision: number;
+            /** Archived */
+            archived: boolean;
+        };
+        /**
          * Assignment
          * @description Which clips of their cells participants see; without a key everybody sees every clip.
          *
@@ -2068,6 +2141,25 @@ export interface components {
             options: components["schemas"]["Option"][];
         };
         /**
+         * ClipDifference
+         * @description A clip that one of the versions lacks, or that has other bytes in each.
+         */
+        ClipDifference: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "gone" | "new" | "replaced";
+            /** Cell */
+            cell: string;
+            /** Exemplar */
+            exemplar: number;
+            /** Old File */
+            old_file: string | null;
+            /** New File */
+            new_file: string | null;
+        };
+        /**
          * ClipOut
          * @description A clip of a study, with the curve it shows.
          */
@@ -2197,6 +2289,65 @@ export interface components {
              * @description Answers a bin, from the lowest.
              */
             counts: number[];
+        };
+        /**
+         * CloneStudy
+         * @description A copy of a study under a name of its own.
+         */
+        CloneStudy: {
+            /** Name */
+            name: string;
+            /**
+             * Version
+             * @description The version to copy; the active one where none is given.
+             */
+            version?: number | null;
+        };
+        /**
+         * ComparedVersion
+         * @description One side of a comparison.
+         */
+        ComparedVersion: {
+            /** Study */
+            study: string;
+            /** Version */
+            version: number;
+            /** Series */
+            series: number;
+            /**
+             * Created At
+             * Format: date-time
+             */
+            created_at: string;
+            /** Note */
+            note: string;
+        };
+        /**
+         * Comparison
+         * @description What differs between two versions, of one study or of two.
+         */
+        Comparison: {
+            old: components["schemas"]["ComparedVersion"];
+            new: components["schemas"]["ComparedVersion"];
+            /**
+             * Pooled
+             * @description Whether both measure the same, by the same clips.
+             */
+            pooled: boolean;
+            /**
+             * Keys
+             * @description Of the declaration, what is measured first.
+             */
+            keys: components["schemas"]["KeyDifference"][];
+            /**
+             * Clips
+             * @description At most 200 of them.
+             */
+            clips: components["schemas"]["ClipDifference"][];
+            /** Clips Differing */
+            clips_differing: number;
+            /** Clips Same */
+            clips_same: number;
         };
         /**
          * ComparisonAnswer
@@ -3481,6 +3632,24 @@ export interface components {
             begins_series: boolean;
         };
         /**
+         * KeyDifference
+         * @description One key of the declaration that differs.
+         */
+        KeyDifference: {
+            /** Path */
+            path: string;
+            /**
+             * Effect
+             * @enum {string}
+             */
+            effect: "wording" | "measured";
+            /**
+             * Pieces
+             * @description The old value with what went from it and came to it.
+             */
+            pieces: components["schemas"]["Piece"][];
+        };
+        /**
          * LanguageChange
          * @description The language the participant reads from now on.
          */
@@ -4499,6 +4668,19 @@ export interface components {
              * @description Comparisons of one participant in a block, dealt in turn from all pairs; where not given, all.
              */
             pairs_per_person: number | null;
+        };
+        /**
+         * Piece
+         * @description Words of a text that stayed, went or came.
+         */
+        Piece: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "same" | "gone" | "new";
+            /** Text */
+            text: string;
         };
         /**
          * Playback
@@ -6396,6 +6578,8 @@ export interface components {
              * Format: date-time
              */
             created_at: string;
+            /** Archived At */
+            archived_at: string | null;
         };
         /**
          * TextField
@@ -7492,6 +7676,7 @@ export type Active = components['schemas']['Active'];
 export type AllPairs = components['schemas']['AllPairs'];
 export type AnalysisPlan = components['schemas']['AnalysisPlan'];
 export type Answer = components['schemas']['Answer'];
+export type ArchiveStudy = components['schemas']['ArchiveStudy'];
 export type Assignment = components['schemas']['Assignment'];
 export type AttentionChecks = components['schemas']['AttentionChecks'];
 export type AuditOut = components['schemas']['AuditOut'];
@@ -7513,9 +7698,13 @@ export type CheckAnswer = components['schemas']['CheckAnswer'];
 export type CheckWording = components['schemas']['CheckWording'];
 export type Checked = components['schemas']['Checked'];
 export type ChoiceField = components['schemas']['ChoiceField'];
+export type ClipDifference = components['schemas']['ClipDifference'];
 export type ClipOut = components['schemas']['ClipOut'];
 export type ClipRating = components['schemas']['ClipRating'];
 export type ClipResult = components['schemas']['ClipResult'];
+export type CloneStudy = components['schemas']['CloneStudy'];
+export type ComparedVersion = components['schemas']['ComparedVersion'];
+export type Comparison = components['schemas']['Comparison'];
 export type ComparisonAnswer = components['schemas']['ComparisonAnswer'];
 export type Completion = components['schemas']['Completion'];
 export type ConfirmCode = components['schemas']['ConfirmCode'];
@@ -7567,6 +7756,7 @@ export type Interaction = components['schemas']['Interaction'];
 export type InvitationOut = components['schemas']['InvitationOut'];
 export type InvitationState = components['schemas']['InvitationState'];
 export type JudgedEdit = components['schemas']['JudgedEdit'];
+export type KeyDifference = components['schemas']['KeyDifference'];
 export type LanguageChange = components['schemas']['LanguageChange'];
 export type Level = components['schemas']['Level'];
 export type LevelChoices = components['schemas']['LevelChoices'];
@@ -7606,6 +7796,7 @@ export type OwnClips = components['schemas']['OwnClips'];
 export type PairChoices = components['schemas']['PairChoices'];
 export type PairResults = components['schemas']['PairResults'];
 export type PairedComparison = components['schemas']['PairedComparison'];
+export type Piece = components['schemas']['Piece'];
 export type Playback = components['schemas']['Playback'];
 export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
@@ -9895,6 +10086,139 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ClipOut"][];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    clone_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CloneStudy"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyDetail"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    archive_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ArchiveStudy"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StudyDetail"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    compare_versions: {
+        parameters: {
+            query: {
+                old: number;
+                new: number;
+                /** @description The study that `old` is a version of. */
+                other?: string | null;
+            };
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Comparison"];
                 };
             };
             /** @description The request's content is not acceptable */

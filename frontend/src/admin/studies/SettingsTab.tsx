@@ -1,13 +1,13 @@
 import { Anchor, Card, Stack, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useNavigate, useParams } from "@tanstack/react-router";
-import { api, type Schemas, unwrap } from "../api";
+import { useParams } from "@tanstack/react-router";
+import type { Schemas } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
-import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
-import { useChange } from "../ui/useChange";
+import { CompareVersions } from "./CompareVersions";
+import { LifeCycle } from "./LifeCycle";
 import { PageLanguages } from "./PageLanguages";
 import { Running } from "./Running";
 
@@ -19,8 +19,9 @@ export function SettingsTab() {
         <Stack key={detail.summary.revision} maw={900}>
           <Running detail={detail} />
           <Versions detail={detail} />
+          <CompareVersions detail={detail} />
           <PageLanguages />
-          {detail.summary.status === "draft" && <Delete name={detail.summary.name} />}
+          <LifeCycle detail={detail} />
         </Stack>
       )}
     </Answer>
@@ -57,23 +58,5 @@ function Versions({ detail }: { detail: Schemas["StudyDetail"] }) {
         ]}
       />
     </Card>
-  );
-}
-
-function Delete({ name }: { name: string }) {
-  const navigate = useNavigate();
-  const remove = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}", { params: { path: { study: name } } })), {
-    touches: [["studies"]],
-    done: "The draft is deleted.",
-    then: () => void navigate({ to: "/" }),
-  });
-  return (
-    <ConfirmButton
-      style={{ alignSelf: "flex-start" }}
-      label="Delete this draft"
-      question="The draft and its versions are deleted for good."
-      confirm="Delete"
-      onConfirm={() => remove.mutate(undefined)}
-    />
   );
 }

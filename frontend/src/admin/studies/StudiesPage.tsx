@@ -1,6 +1,7 @@
-import { Anchor, Badge, Button, Group, Paper, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Badge, Button, Group, Paper, Stack, Switch, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
+import { useState } from "react";
 import type { Schemas } from "../api";
 import { studiesQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
@@ -20,12 +21,23 @@ export function StudiesPage() {
           </Button>
         )}
       </Group>
-      <Answer of={studies}>
-        {(rows) =>
-          rows.length === 0 ? <Nothing /> : <DataTable rows={rows} rowKey={(row) => row.name} columns={COLUMNS} empty="No studies." />
-        }
-      </Answer>
+      <Answer of={studies}>{(rows) => (rows.length === 0 ? <Nothing /> : <Listed rows={rows} />)}</Answer>
     </Stack>
+  );
+}
+
+/** The studies, those in the archive where asked for. */
+function Listed({ rows }: { rows: Schemas["StudySummary"][] }) {
+  const [all, setAll] = useState(false);
+  const archived = rows.filter((row) => row.archived_at !== null).length;
+  const shown = all ? rows : rows.filter((row) => row.archived_at === null);
+  return (
+    <>
+      {archived > 0 && (
+        <Switch checked={all} onChange={(event) => setAll(event.currentTarget.checked)} label={`Also those in the archive (${archived})`} />
+      )}
+      <DataTable rows={shown} rowKey={(row) => row.name} columns={COLUMNS} empty="No studies but those in the archive." />
+    </>
   );
 }
 
@@ -60,6 +72,11 @@ const COLUMNS: Column<Schemas["StudySummary"]>[] = [
         {row.paused && (
           <Badge ml={6} color="yellow" autoContrast>
             paused
+          </Badge>
+        )}
+        {row.archived_at !== null && (
+          <Badge ml={6} variant="default">
+            archived
           </Badge>
         )}
       </>

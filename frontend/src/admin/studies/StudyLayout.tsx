@@ -46,9 +46,10 @@ export function StudyLayout() {
               <Text c="dimmed" size="sm">
                 {summary.name}, version {summary.version}
                 {summary.paused && ", paused: nobody can begin"}
+                {summary.archived_at !== null && ", in the archive: it can be read, and not changed"}
               </Text>
             </div>
-            {mayChange && <StatusButtons summary={summary} />}
+            {mayChange && summary.archived_at === null && <StatusButtons summary={summary} />}
           </Group>
           <Tabs
             value={current}

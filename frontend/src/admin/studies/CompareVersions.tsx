@@ -1,0 +1,100 @@
+/** What differs between two versions, word by word. */
+
+import { Badge, Card, Group, List, Select, Stack, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { Answer } from "../ui/Answer";
+
+export function CompareVersions({ detail }: { detail: Schemas["StudyDetail"] }) {
+  const study = detail.summary.name;
+  const numbers = detail.versions.map((version) => String(version.number));
+  const [old, setOld] = useState(numbers[1] ?? null);
+  const [latest, setLatest] = useState(numbers[0] ?? null);
+  if (numbers.length < 2) return null;
+  const choose = (label: string, value: string | null, set: (value: string | null) => void) => (
+    <Select label={label} data={numbers} value={value} allowDeselect={false} onChange={set} w={120} />
+  );
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4" mb="sm">
+        Compare versions
+      </Title>
+      <Group mb="sm">
+        {choose("From version", old, setOld)}
+        {choose("To version", latest, setLatest)}
+      </Group>
+      {old !== null && latest !== null && <Compared study={study} old={Number(old)} latest={Number(latest)} />}
+    </Card>
+  );
+}
+
+function Compared({ study, old, latest }: { study: string; old: number; latest: number }) {
+  const query = { old, new: latest };
+  const comparison = useQuery({
+    queryKey: ["study", study, "comparison", old, latest],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/comparison", { params: { path: { study }, query } })),
+  });
+  return (
+    <Answer of={comparison}>
+      {(found) => (
+        <Stack gap="sm">
+          <Text size="sm">{verdict(found)}</Text>
+          {found.keys.map((key) => (
+            <div key={key.path}>
+              <Group gap="xs">
+                <code>{key.path}</code>
+                <Badge variant="default" size="sm">
+                  {key.effect === "measured" ? "changes what is measured" : "wording"}
+                </Badge>
+              </Group>
+              <Text size="sm" className="difference">
+                {key.pieces.map((piece, place) => (
+                  <Words key={place} piece={piece} />
+                ))}
+              </Text>
+            </div>
+          ))}
+          {found.clips.length > 0 && <Clips found={found} />}
+        </Stack>
+      )}
+    </Answer>
+  );
+}
+
+function verdict({ keys, clips_differing, pooled }: Schemas["Comparison"]): string {
+  if (keys.length === 0 && clips_differing === 0) return "Nothing differs.";
+  return pooled
+    ? "Both measure the same, by the same clips: their answers may be pooled."
+    : "They do not measure the same, or not by the same clips: their answers are kept apart.";
+}
+
+function Words({ piece: { kind, text } }: { piece: Schemas["Piece"] }) {
+  if (kind === "gone") return <del>{text}</del>;
+  if (kind === "new") return <ins>{text}</ins>;
+  return <span>{text}</span>;
+}
+
+const CLIP_WORDS: Record<Schemas["ClipDifference"]["kind"], string> = { gone: "gone", new: "new", replaced: "has other bytes" };
+
+function Clips({ found }: { found: Schemas["Comparison"] }) {
+  return (
+    <div>
+      <Text size="sm" fw={600}>
+        {found.clips_differing} clips differ, {found.clips_same} are the same
+      </Text>
+      <List size="sm">
+        {found.clips.map((clip) => (
+          <List.Item key={`${clip.cell} ${String(clip.exemplar)}`} className="wrap-anywhere">
+            {clip.cell}, no. {clip.exemplar}: {CLIP_WORDS[clip.kind]} ({files(clip)})
+          </List.Item>
+        ))}
+      </List>
+      {found.clips.length < found.clips_differing && <Text size="sm">… and {found.clips_differing - found.clips.length} more.</Text>}
+    </div>
+  );
+}
+
+function files({ old_file, new_file }: Schemas["ClipDifference"]): string {
+  return [...new Set([old_file, new_file])].filter((file) => file != null).join(" → ");
+}

@@ -1,0 +1,113 @@
+/** A study copied, put into the archive, taken out, or (a draft that nobody took part in) deleted. */
+
+import { Button, Card, Group, Select, Stack, Text, TextInput, Title } from "@mantine/core";
+import { useNavigate } from "@tanstack/react-router";
+import { useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { ConfirmButton } from "../ui/ConfirmButton";
+import { useChange } from "../ui/useChange";
+
+export function LifeCycle({ detail }: { detail: Schemas["StudyDetail"] }) {
+  const { summary } = detail;
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4" mb="sm">
+        Copy, archive
+      </Title>
+      <Stack>
+        <Copy detail={detail} />
+        <Group>
+          {summary.archived_at !== null || summary.status === "draft" || summary.status === "closed" ? (
+            <Archive summary={summary} />
+          ) : (
+            <Text size="sm">Close the study before it goes into the archive.</Text>
+          )}
+          {summary.status === "draft" && <Delete name={summary.name} />}
+        </Group>
+      </Stack>
+    </Card>
+  );
+}
+
+function Copy({ detail: { summary, versions } }: { detail: Schemas["StudyDetail"] }) {
+  const navigate = useNavigate();
+  const [name, setName] = useState(`${summary.name.slice(0, 54)}-copy`);
+  const [version, setVersion] = useState(String(summary.version));
+  const copy = useChange(
+    () =>
+      unwrap(
+        api.POST("/api/admin/studies/{study}/copies", {
+          params: { path: { study: summary.name } },
+          body: { name, version: Number(version) },
+        }),
+      ),
+    {
+      touches: [["studies"]],
+      done: "The study is copied, as a draft.",
+      then: (made) => void navigate({ to: `/studies/${made.summary.name}` }),
+    },
+  );
+  return (
+    <>
+      <Text size="sm">A copy has the declaration and the clips. Answers, links, quota and recruiter stay here.</Text>
+      <Group align="end">
+        <TextInput label="Short name of the copy" value={name} onChange={(event) => setName(event.currentTarget.value)} />
+        <Select
+          label="Version to copy"
+          data={versions.map((one) => String(one.number))}
+          value={version}
+          allowDeselect={false}
+          onChange={(chosen) => setVersion(chosen ?? version)}
+          w={140}
+        />
+        <Button
+          variant="default"
+          disabled={!/^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$/.test(name)}
+          loading={copy.isPending}
+          onClick={() => copy.mutate(undefined)}
+        >
+          Copy
+        </Button>
+      </Group>
+    </>
+  );
+}
+
+function Archive({ summary }: { summary: Schemas["StudySummary"] }) {
+  const archived = summary.archived_at === null;
+  const change = useChange(
+    () =>
+      unwrap(
+        api.PUT("/api/admin/studies/{study}/archive", {
+          params: { path: { study: summary.name } },
+          body: { revision: summary.revision, archived },
+        }),
+      ),
+    {
+      touches: [["study", summary.name], ["studies"]],
+      done: archived ? "The study is in the archive." : "The study is out of the archive.",
+    },
+  );
+  return (
+    <Button variant="default" loading={change.isPending} onClick={() => change.mutate(undefined)}>
+      {archived ? "Put into the archive" : "Take out of the archive"}
+    </Button>
+  );
+}
+
+function Delete({ name }: { name: string }) {
+  const navigate = useNavigate();
+  const remove = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}", { params: { path: { study: name } } })), {
+    touches: [["studies"]],
+    done: "The draft is deleted.",
+    then: () => void navigate({ to: "/" }),
+  });
+  return (
+    <ConfirmButton
+      label="Delete this draft"
+      question="The draft and its versions are deleted for good."
+      confirm="Delete"
+      onConfirm={() => remove.mutate(undefined)}
+    />
+  );
+}

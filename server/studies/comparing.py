@@ -1,0 +1,76 @@
+"""Two versions compared: keys of the declaration with their words, and clips."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.schema.difference import Change, changes_what_is_measured, difference
+from server.models import StudyVersion
+from server.studies.life_repository import clips_of, version_numbered
+from server.studies.life_schemas import ClipDifference, ComparedVersion, Comparison, KeyDifference, Piece
+from server.studies.lookup import definition_of, find_study
+from server.studies.word_difference import word_difference
+
+MAX_CLIPS_LISTED = 200
+
+Clips = dict[tuple[str, int], tuple[str, str]]
+"""(cell, exemplar) -> (SHA-256, file name)."""
+
+
+def compare(session: Session, old: tuple[str, int], new: tuple[str, int]) -> Comparison:
+    """What differs between two versions, each given by its study's name and its number."""
+    before, after = (version_numbered(session, find_study(session, name), n) for name, n in (old, new))
+    changes = difference(definition_of(before), definition_of(after))
+    old_clips, new_clips = clips_of(session, before), clips_of(session, after)
+    clips = list(_clips(old_clips, new_clips))
+    return Comparison(
+        old=_side(before),
+        new=_side(after),
+        pooled=not clips and not changes_what_is_measured(changes),
+        keys=[_key(change) for change in changes],
+        clips=clips[:MAX_CLIPS_LISTED],
+        clips_differing=len(clips),
+        clips_same=len(
+            [place for place, clip in new_clips.items() if old_clips.get(place, ("",))[0] == clip[0]]
+        ),
+    )
+
+
+def _side(version: StudyVersion) -> ComparedVersion:
+    return ComparedVersion(
+        study=version.study.name,
+        version=version.number,
+        series=version.series,
+        created_at=version.created_at,
+        note=version.note,
+    )
+
+
+def _key(change: Change) -> KeyDifference:
+    pieces = word_difference(_said(change.before), _said(change.after))
+    return KeyDifference(
+        path=change.path, effect=change.effect, pieces=[Piece(kind=kind, text=text) for kind, text in pieces]
+    )
+
+
+def _said(value: Any) -> str:
+    """A value as it is read: texts as they are, nothing for what is not there."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, indent=1)
+
+
+def _clips(old: Clips, new: Clips) -> Iterator[ClipDifference]:
+    for place in dict.fromkeys((*old, *new)):
+        before, after = old.get(place), new.get(place)
+        if before is not None and after is not None and before[0] == after[0]:
+            continue
+        yield ClipDifference(
+            kind="new" if before is None else "gone" if after is None else "replaced",
+            cell=place[0],
+            exemplar=place[1],
+            old_file=before[1] if before else None,
+            new_file=after[1] if after else None,
+        )

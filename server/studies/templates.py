@@ -1,0 +1,92 @@
+"""What participants do with one's own clips: trials to begin from, each as an experimenter edits it further."""
+
+from typing import Any, get_args
+
+from experiments.errors import InputError
+from server.studies.schemas import OwnClips, Template
+
+Levels = dict[str, list[str]]
+"""Factor -> the names of its levels."""
+QUALITY = ("Bad", "Poor", "Fair", "Good", "Excellent")
+"""The five categories of absolute category rating, worst first (ITU-T P.910, 7.1)."""
+ACR_VOTE_S = 10.0
+"""Longest time for a vote that ITU-T P.910 asks for, in s."""
+MIN_STIMULI = 3
+TEMPLATES: tuple[Template, ...] = get_args(Template)
+
+
+def trial_of(asked: OwnClips, levels: Levels) -> dict[str, Any]:
+    """The [trial] of a template; InputError where these clips cannot be asked about so."""
+    match asked.template:
+        case "rating":
+            return {"kind": "clip_rating", "scale": _points(asked)}
+        case "sliders":
+            return {"kind": "clip_rating", "arrangement": "one_screen", "scales": _sliders(asked)}
+        case "acr":
+            return {"kind": "clip_rating", "scale": _quality(asked)}
+        case "pairs":
+            return _pairs(asked)
+        case "just_noticeable":
+            return _just_noticeable(asked, levels)
+
+
+def _points(asked: OwnClips) -> dict[str, Any]:
+    return {"question": {"en": asked.question}, "low": {"en": asked.low}, "high": {"en": asked.high}}
+
+
+def _sliders(asked: OwnClips) -> list[dict[str, Any]]:
+    pleasant = {"question": {"en": "How pleasant was this clip?"}}
+    return [
+        {"name": "asked", "type": "slider", **_points(asked)},
+        {
+            "name": "pleasant", "type": "slider", **pleasant,
+            "low": {"en": "very unpleasant"}, "high": {"en": "very pleasant"},
+        },
+    ]  # fmt: skip
+
+
+def _quality(asked: OwnClips) -> dict[str, Any]:
+    return {
+        "question": {"en": asked.question},
+        "minimum": 1,
+        "maximum": len(QUALITY),
+        "labels": [{"en": label} for label in QUALITY],
+    }
+
+
+def _pairs(asked: OwnClips) -> dict[str, Any]:
+    return {
+        "kind": "paired_comparison",
+        "question": {"en": asked.question},
+        "pairs": {"among": "all", "exemplars": "matched"},
+        "presentation": {"arrangement": "side_by_side", "gap_mm": 8.0, "if_too_narrow": "stack"},
+        "ties": {"label": {"en": "No difference"}},
+    }
+
+
+def _just_noticeable(asked: OwnClips, levels: Levels) -> dict[str, Any]:
+    """Which of two clips, the standard or a stimulus? The standard is the lowest level of a factor of numbers."""
+    factor = next((name for name in levels if _numbers(levels[name])), None)
+    if factor is None:
+        raise InputError(
+            f"a just-noticeable difference needs a factor with {MIN_STIMULI + 1} levels or more that are all "
+            f"numbers, such as {{duration}} in blink_100_1.mp4; the factors are: {', '.join(levels)}"
+        )
+    standard = min(levels[factor], key=float)
+    return {
+        "kind": "threshold",
+        "question": {"en": asked.question},
+        "stimulus": {"factor": factor},
+        "task": {
+            "asks": "two_interval", "standard": standard,
+            "first": {"en": "The first"}, "second": {"en": "The second"}, "gap_ms": 500,
+        },
+        "stop": {"trials": 40, "at_least": 20},
+    }  # fmt: skip
+
+
+def _numbers(levels: list[str]) -> bool:
+    try:
+        return len({float(level) for level in levels}) > MIN_STIMULI
+    except ValueError:
+        return False
