@@ -13,10 +13,11 @@ from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
 from server.studies.probe import NotAFilm, probe
 from server.studies.schemas import OwnClips
+from server.studies.templates import trial_of
 
 
 def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
-    """A definition as TOML, to be edited further: one factor a column, random order, a 7-point scale."""
+    """A definition as TOML, to be edited further: one factor a column, random order, the template's trial."""
     check_factorial(placed)
     cells = {tuple(levels.values()) for levels, _ in placed.values()}
     document = tomlkit.document()
@@ -25,7 +26,8 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
     )
     document.add("title", tomlkit.item(asked.title))
     factors = tomlkit.aot()
-    for factor, levels in levels_of(placed).items():
+    factor_levels = levels_of(placed)
+    for factor, levels in factor_levels.items():
         table = tomlkit.table()
         table.add("name", factor)
         table.add("label", factor.replace("_", " ").capitalize())
@@ -34,12 +36,21 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
     document.add("factors", factors)
     document.add("exemplars", tomlkit.item({"per_cell": len(placed) // len(cells)}))
     document.add("practice", tomlkit.item({"trials": min(4, len(placed))}))
-    scale = {"question": {"en": asked.question}, "low": {"en": asked.low}, "high": {"en": asked.high}}
-    document.add("trial", tomlkit.item({"kind": "clip_rating", "scale": scale}))
+    document.add("trial", tomlkit.item(trial_of(asked, factor_levels)))
     document.add("display", tomlkit.item({"calibrate": "off"}))
     document.add("exclusions", tomlkit.item([{"rule": "incomplete"}, {"rule": "failed_plays"}]))
     document.add("texts", tomlkit.item({"en": _texts(asked)}))
     return tomlkit.dumps(document)
+
+
+_START = "Press **Space** or **Enter** to start"
+_WATCHING = {
+    "rating": f"{_START} a clip. You see it **once**. Then answer: ",
+    "sliders": f"{_START} a clip. You see it **once**. Then move the sliders. The first asks: ",
+    "acr": f"{_START} a clip. You see it **once**. Then choose from *Bad* to *Excellent*: ",
+    "pairs": f"{_START} two clips beside one another. You see them **once**. Then answer: ",
+    "just_noticeable": f"{_START} two clips, one after the other. You see them **once**. Then answer: ",
+}
 
 
 def _texts(asked: OwnClips) -> dict[str, str]:
@@ -47,9 +58,7 @@ def _texts(asked: OwnClips) -> dict[str, str]:
         "consent": f"# {asked.title}\n\nYou will watch short clips and rate each of them. "
         "Taking part is voluntary: you may choose *I do not agree*, and stop at any time with *Stop*. "
         "Your name and internet address are not stored.\n",
-        "instructions": "# What you will do\n\nPress **Space** or **Enter** to start a clip. "
-        "You see it **once**. "
-        f"Then answer: *{asked.question}*\n",
+        "instructions": f"# What you will do\n\n{_WATCHING[asked.template]}*{asked.question}*\n",
         "debrief": "# Thank you\n\nYour answers are stored.\n",
     }
 

@@ -118,9 +118,16 @@ class LevelsPattern(_In):
     pattern: Annotated[str, StringConstraints(min_length=3, max_length=300)]
 
 
-class OwnClips(_In):
-    """What to ask about one's own clips, where no definition is given."""
+Template = Literal["rating", "sliders", "acr", "pairs", "just_noticeable"]
 
+
+class OwnClips(_In):
+    """What to ask about one's own clips, where no definition is given.
+
+    The template says what participants do; `low` and `high` are for rating and sliders alone.
+    """
+
+    template: Template = "rating"
     title: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=300)]
     question: Label = "How natural was this clip?"
     low: Label = "very unnatural"

@@ -9,7 +9,7 @@ from experiments import design
 from experiments.assignment.groups import names
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
+from experiments.load import DEMOS, SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.own_clips import Placed, check_factorial, levels_from_names, levels_from_table
 from experiments.schema.stored import load_stored
@@ -121,11 +121,13 @@ def judge_edit(session: Session, name: str, text: str) -> JudgedEdit:
 
 
 def shipped(services: Services) -> list[ShippedExperiment]:
-    """The experiments that come with the program."""
+    """The experiments that come with the program; demonstrations where their clips are built."""
     found = []
-    for name in SHIPPED:
+    for name in (*SHIPPED, *DEMOS):
         text = locate(name).read_text(encoding="utf-8")
         ready = (services.settings.stimuli_folder / name / MANIFEST_NAME).is_file()
+        if not ready and name in DEMOS:
+            continue
         title = parse_experiment(text).title
         found.append(ShippedExperiment(name=name, title=title, toml=text, clips_ready=ready))
     return found
@@ -145,10 +147,9 @@ def create(services: Services, wanted: NewStudy, who: Identity) -> str:
 
 def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, Manifest, Path]:
     if wanted.shipped is not None:
-        if wanted.shipped not in SHIPPED:
-            raise Invalid(
-                f"There is no shipped experiment '{wanted.shipped}'{did_you_mean(wanted.shipped, SHIPPED)}"
-            )
+        if wanted.shipped not in (known := (*SHIPPED, *DEMOS)):
+            near = did_you_mean(wanted.shipped, known)
+            raise Invalid(f"There is no shipped experiment '{wanted.shipped}'{near}")
         text = wanted.toml or locate(wanted.shipped).read_text(encoding="utf-8")
         folder = services.settings.stimuli_folder / wanted.shipped
         return text, planned_experiment(text), read_manifest(folder), folder

@@ -1,18 +1,15 @@
-"""What participants do with one's own clips: trials to begin from, each as an experimenter edits it further."""
+"""What participants do with one's own clips: trials to begin from, for an experimenter to edit further."""
 
-from typing import Any, get_args
+from typing import Any
 
 from experiments.errors import InputError
-from server.studies.schemas import OwnClips, Template
+from server.studies.schemas import OwnClips
 
 Levels = dict[str, list[str]]
 """Factor -> the names of its levels."""
 QUALITY = ("Bad", "Poor", "Fair", "Good", "Excellent")
 """The five categories of absolute category rating, worst first (ITU-T P.910, 7.1)."""
-ACR_VOTE_S = 10.0
-"""Longest time for a vote that ITU-T P.910 asks for, in s."""
 MIN_STIMULI = 3
-TEMPLATES: tuple[Template, ...] = get_args(Template)
 
 
 def trial_of(asked: OwnClips, levels: Levels) -> dict[str, Any]:
@@ -65,7 +62,7 @@ def _pairs(asked: OwnClips) -> dict[str, Any]:
 
 
 def _just_noticeable(asked: OwnClips, levels: Levels) -> dict[str, Any]:
-    """Which of two clips, the standard or a stimulus? The standard is the lowest level of a factor of numbers."""
+    """Which of two clips, the standard or a stimulus? The standard is the lowest of a factor of numbers."""
     factor = next((name for name in levels if _numbers(levels[name])), None)
     if factor is None:
         raise InputError(

@@ -4527,8 +4527,16 @@ export interface components {
         /**
          * OwnClips
          * @description What to ask about one's own clips, where no definition is given.
+         *
+         *     The template says what participants do; `low` and `high` are for rating and sliders alone.
          */
         OwnClips: {
+            /**
+             * Template
+             * @default rating
+             * @enum {string}
+             */
+            template?: "rating" | "sliders" | "acr" | "pairs" | "just_noticeable";
             /** Title */
             title: string;
             /**

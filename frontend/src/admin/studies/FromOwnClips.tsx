@@ -1,9 +1,10 @@
 /** A study from somebody's own clips: upload, say which levels each has, ask a question. */
 
-import { Alert, Button, FileInput, Progress, SegmentedControl, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
+import { Alert, Button, FileInput, Progress, SegmentedControl, Select, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import type { Schemas } from "../api";
 import { useChange } from "../ui/useChange";
+import { TEMPLATES } from "./templates";
 import { uploadFiles, useCreate } from "./useCreate";
 
 export function FromOwnClips({ name }: { name: string }) {
@@ -52,7 +53,8 @@ function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }
   const [by, setBy] = useState("pattern");
   const [pattern, setPattern] = useState(upload.suggested_pattern ?? "");
   const [csv, setCsv] = useState(`file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`);
-  const [asked, setAsked] = useState({ title: "", question: "How natural was this clip?", low: "very unnatural", high: "very natural" });
+  const [template, setTemplate] = useState(TEMPLATES[0]);
+  const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
   const create = useCreate();
   const field = (key: keyof typeof asked, label: string) => (
     <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
@@ -91,16 +93,36 @@ function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }
           onChange={(event) => setCsv(event.currentTarget.value)}
         />
       )}
+      <Select
+        label="What participants do"
+        description={template.about}
+        data={TEMPLATES.map(({ value, label }) => ({ value, label }))}
+        value={template.value}
+        allowDeselect={false}
+        onChange={(value) => {
+          const chosen = TEMPLATES.find((one) => one.value === value) ?? template;
+          // A question of the experimenter's own stays.
+          if (asked.question === template.question) setAsked({ ...asked, question: chosen.question });
+          setTemplate(chosen);
+        }}
+      />
       {field("title", "Title of the study")}
       {field("question", "Question")}
-      {field("low", "Lowest answer means")}
-      {field("high", "Highest answer means")}
+      {template.ends && field("low", "Lowest answer means")}
+      {template.ends && field("high", "Highest answer means")}
       {name === "" && <Text size="sm">Give the study a short name above.</Text>}
       <Button
         style={{ alignSelf: "flex-start" }}
         disabled={name === "" || asked.title === ""}
         loading={create.isPending}
-        onClick={() => create.mutate({ name, upload: upload.id, levels: by === "pattern" ? { pattern } : { csv }, own_clips: asked })}
+        onClick={() =>
+          create.mutate({
+            name,
+            upload: upload.id,
+            levels: by === "pattern" ? { pattern } : { csv },
+            own_clips: { ...asked, template: template.value },
+          })
+        }
       >
         Create
       </Button>

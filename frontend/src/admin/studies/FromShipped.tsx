@@ -11,7 +11,10 @@ export function FromShipped({ name }: { name: string }) {
     <Answer of={shipped}>
       {(experiments) => (
         <Stack>
-          <Text size="sm">The three experiments of the paper, ready to run; you can change texts and settings afterwards.</Text>
+          <Text size="sm">
+            The three experiments of the paper, and demonstrations whose clips are built here, ready to run; you can change texts and
+            settings afterwards.
+          </Text>
           <SimpleGrid cols={{ base: 1, sm: 3 }}>
             {experiments.map((experiment) => (
               <Card withBorder key={experiment.name}>

@@ -1,0 +1,60 @@
+"""Each template of one's own clips becomes a study that a participant can take part in."""
+
+import tomllib
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.helpers.admins import Admin
+from tests.helpers.studies import Participant
+from tests.helpers.tiny_clips import encoded_video
+
+FILES = [f"blink_{duration}_{number}.mp4" for duration in (100, 167, 233, 300, 367) for number in (1, 2)]
+
+
+def own_study(experimenter: Admin, template: str, files: list[str]) -> Any:
+    video = encoded_video(4, 30) + bytes([0, 0, 0, 9]) + b"free"
+    sent = [("files", (name, video + bytes([place]))) for place, name in enumerate(files)]
+    upload = experimenter.client.post("/api/admin/uploads", files=sent).json()
+    body = {
+        "name": "own", "upload": upload["id"], "levels": {"pattern": "blink_{duration}_{exemplar}.mp4"},
+        "own_clips": {"title": "Own", "question": "Which?", "template": template},
+    }  # fmt: skip
+    return experimenter.send("POST", "/studies", body)
+
+
+@pytest.mark.parametrize(
+    ("template", "trials"),
+    [("rating", 10), ("sliders", 10), ("acr", 10), ("pairs", 20), ("just_noticeable", 40)],
+)
+def test_a_template_is_a_study_that_can_be_taken_part_in(
+    client: TestClient, experimenter: Admin, template: str, trials: int
+) -> None:
+    made = own_study(experimenter, template, FILES)
+    assert made.status_code == 201, made.text
+    assert made.json()["design"]["trials_per_participant"] == trials
+    link = experimenter.send(
+        "POST", "/studies/own/links", {"kind": "preview", "labels": [], "count": 1}
+    ).json()
+    token = link[0]["url"].rsplit("/", 1)[1]
+    person = Participant(client, token).agree()
+    assert person.state()["trials"]
+
+
+def test_categories_are_those_of_p910_worst_first(experimenter: Admin) -> None:
+    scale = tomllib.loads(own_study(experimenter, "acr", FILES).json()["toml"])["trial"]["scale"]
+    assert [label["en"] for label in scale["labels"]] == ["Bad", "Poor", "Fair", "Good", "Excellent"]
+    assert (scale["minimum"], scale["maximum"]) == (1, 5)
+
+
+def test_the_standard_is_the_lowest_number(experimenter: Admin) -> None:
+    trial = tomllib.loads(own_study(experimenter, "just_noticeable", FILES).json()["toml"])["trial"]
+    assert (trial["stimulus"]["factor"], trial["task"]["standard"]) == ("duration", "100")
+
+
+@pytest.mark.parametrize("words", [("slow", "middle", "fast", "faster"), ("1", "2")])
+def test_a_just_noticeable_difference_needs_numbers(experimenter: Admin, words: tuple[str, ...]) -> None:
+    files = [f"blink_{word}_{number}.mp4" for word in words for number in (1, 2)]
+    refused = own_study(experimenter, "just_noticeable", files)
+    assert (refused.status_code, "all numbers" in refused.json()["error"]["message"]) == (422, True)
