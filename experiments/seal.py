@@ -6,6 +6,7 @@ what was done otherwise.
 
 import hashlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -81,18 +82,55 @@ def read_seal(path: Path) -> Seal:
     return seal
 
 
-def deviations(seal: Seal, experiment: Experiment, participants: int) -> list[str]:
-    """What was declared or done otherwise than sealed, a line each; `participants` are those analysed."""
+ClipPlace = tuple[str, int, str]
+"""Cell, exemplar and SHA-256 of a clip."""
+
+
+def clips_sha256(clips: Iterable[ClipPlace]) -> str:
+    """Hash over the clips' own hashes, in order of cells and exemplars."""
+    return hashlib.sha256("\n".join(map(str, sorted(clips))).encode()).hexdigest()
+
+
+def read_clips_sha256(path: Path) -> str:
+    """`clips_sha256` of the clips that a manifest lists; InputError where the file is none.
+
+    No more of it is read than that: the manifest in a capsule lacks the answers to motion checks.
+    """
+    try:
+        clips = json.loads(path.read_text(encoding="utf-8"))["clips"]
+        return clips_sha256((str(one["cell"]), int(one["exemplar"]), str(one["sha256"])) for one in clips)
+    except OSError as error:
+        raise InputError(f"{path}: expected a manifest of clips, found none ({error.strerror})") from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(f"{path.name}: expected a manifest of clips as `stimuli build` writes it") from error
+
+
+def deviations(seal: Seal, experiment: Experiment, participants: int, clips: str | None = None) -> list[str]:
+    """What was declared or done otherwise than sealed, a line each.
+
+    Parameters
+    ----------
+    participants: those analysed.
+    clips: hash of the clips that were shown (`clips_sha256`); None where it is not known.
+    """
     changes = difference(seal.experiment, experiment)
     lines = [str(change) for change in changes if change.path.split(".")[0] not in OF_PAGES]
     planned = seal.experiment.participants
     if participants != planned:
         lines.append(f"{planned} participants were planned, {participants} are analysed")
+    if clips is not None and clips != seal.clips_sha256:
+        lines.append(
+            f"other clips were shown than sealed (sha256 {clips[:12]}..., sealed {seal.clips_sha256[:12]}...)"
+        )
     return lines
 
 
-def deviations_said(seal: Seal, experiment: Experiment, participants: int) -> tuple[str, ...]:
+def deviations_said(
+    seal: Seal, experiment: Experiment, participants: int, clips: str | None = None
+) -> tuple[str, ...]:
     """The lines of a report on the plan it is held against."""
     plan = f"the plan sealed {seal.sealed_at} (sha256 {seal.sha256[:12]}...)"
-    found = deviations(seal, experiment, participants)
-    return tuple(f"deviation from {plan}: {line}" for line in found) or (f"no deviation from {plan}",)
+    found = deviations(seal, experiment, participants, clips)
+    return tuple(f"deviation from {plan}: {line}" for line in found) or (
+        f"no deviation from {plan}" + ("" if clips else "; its clips were not compared"),
+    )

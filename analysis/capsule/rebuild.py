@@ -9,10 +9,10 @@ from analysis.read.runs_file import read_runs
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Progress, held_against
 from analysis.report.write import write_report
-from experiments.capsule.declaration import ReportSource
+from experiments.capsule.declaration import MANIFEST, ReportSource
 from experiments.capsule.packing import report_input
 from experiments.load import load_experiment
-from experiments.seal import read_seal
+from experiments.seal import read_clips_sha256, read_seal
 
 ANSWERS = "answers.csv"
 """Name of the table while it is analysed, which stands in the report."""
@@ -33,6 +33,7 @@ def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress =
     answers = load_csv(table, experiment, plan_of(experiment.trial.kind).reading)
     contents = study_contents(experiment, answers, Pool(Origin(source.origin), source.series), runs)
     if source.seal is not None:
-        contents = held_against(contents, read_seal(folder / source.seal), experiment)
+        clips = read_clips_sha256(folder / MANIFEST)
+        contents = held_against(contents, read_seal(folder / source.seal), experiment, clips)
     write_report(contents, report, more=source.sensitivity, progress=progress)
     return report

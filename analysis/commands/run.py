@@ -82,6 +82,9 @@ def run(
         Path | None,
         typer.Option(help="Sealed plan (`server seal`): the report lists each deviation from it."),
     ] = None,
+    manifest: Annotated[
+        Path | None, typer.Option(help="manifest.json of the clips shown, to be held against the sealed plan.")
+    ] = None,
 ) -> None:
     """Analyse a study as its experiment declares: exclusions, the paper's table, every test, one report.
 
@@ -109,7 +112,7 @@ def run(
     from analysis.read.study_answers import load_csv, load_database
     from analysis.report.contents import held_against
     from experiments.load import load_experiment
-    from experiments.seal import read_seal
+    from experiments.seal import read_clips_sha256, read_seal
 
     if database is not None and csv is not None:
         raise InputError("--database and --csv exclude each other; give one")
@@ -135,7 +138,8 @@ def run(
         typer.echo(f"nothing to analyse: {error}", err=True)
         raise typer.Exit(1) from None
     if seal is not None:
-        contents = held_against(contents, read_seal(seal), declared)
+        clips = read_clips_sha256(manifest) if manifest else None
+        contents = held_against(contents, read_seal(seal), declared, clips)
     show(contents)
     save_json(json, contents.numbers)
     if report:

@@ -109,8 +109,13 @@ class Contents:
     evidence: Section | None = None
 
 
-def held_against(contents: Contents, seal: Seal, experiment: "Experiment") -> Contents:
-    """The contents with a line for each deviation from the sealed plan, or one that there is none."""
-    said = deviations_said(seal, experiment, contents.n_participants)
+def held_against(
+    contents: Contents, seal: Seal, experiment: "Experiment", clips: str | None = None
+) -> Contents:
+    """The contents with a line for each deviation from the sealed plan, or one that there is none.
+
+    `clips` is the hash of the clips that were shown, None where it is not known.
+    """
+    said = deviations_said(seal, experiment, contents.n_participants, clips)
     numbers = {**contents.numbers, "sealed_plan": {"sha256": seal.sha256, "said": list(said)}}
     return replace(contents, decisions=(*said, *contents.decisions), numbers=numbers)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from experiments.capsule.declaration import CAPSULE_FILE, REPORT_FOLDER, Capsule, ReportSource
+from experiments.capsule.declaration import CAPSULE_FILE, MANIFEST, REPORT_FOLDER, Capsule, ReportSource
 from experiments.capsule.packing import listed_files, pack, report_input
 from experiments.definition import Experiment
 from experiments.errors import InputError
@@ -102,7 +102,7 @@ def _write_study(
                 stream.write(piece)
     experiment, seal = definition_of(version), seal_of(session, study)
     texts = {
-        "materials/manifest.json": json_text(_without_answers(version.manifest)),
+        MANIFEST: json_text(_without_answers(version.manifest)),
         "analysis/plan.json": json_text(_plan(experiment)),
         "documentation/software.json": json_text(present_software().model_dump(mode="json")),
     }
@@ -155,6 +155,7 @@ def _report(session: Session, study: Study, source: ReportSource, folder: Path, 
         sensitivity=source.sensitivity,
         runs=folder / source.runs,
         seal=folder / source.seal if source.seal else None,
+        manifest=folder / MANIFEST,
     )
     if message:
         raise InputError(f"a capsule holds the report, which could not be made: {message}")

@@ -18,6 +18,7 @@ def run_analysis(
     sensitivity: bool,
     runs: Path,
     seal: Path | None = None,
+    manifest: Path | None = None,
 ) -> str:
     """Write the report into `folder`; return the analysis' own error line where it failed, else ''."""
     program = Path(sys.executable).with_name("analysis")
@@ -26,6 +27,7 @@ def run_analysis(
     command += ["--origin", origin, "--series", str(series), "--out", str(folder)]
     command += [] if sensitivity else ["--no-sensitivity"]
     command += ["--seal", str(seal)] if seal else []
+    command += ["--manifest", str(manifest)] if manifest else []
     done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603
     if done.returncode == 0:
         return ""

@@ -137,6 +137,7 @@ def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> i
             stream.writelines(runs_csv(session, study, wanted.origin))
         if (seal := seal_of(session, study)) and version.number == study.active_version:
             (inputs / SEAL).write_text(seal.text(), encoding="utf-8")
+            (inputs / MANIFEST_NAME).write_text(json_text(version.manifest), encoding="utf-8")
         return version.series
 
 
@@ -151,6 +152,7 @@ def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
         sensitivity=wanted.sensitivity,
         runs=inputs / "runs.csv",
         seal=seal if (seal := inputs / SEAL).is_file() else None,
+        manifest=manifest if (manifest := inputs / MANIFEST_NAME).is_file() else None,
     )
 
 

@@ -1,13 +1,12 @@
 """Seal the plan of a study, once, before the first participant; the audit log keeps it."""
 
-import hashlib
 from typing import Any
 
 from sqlalchemy.orm import Session
 
 from experiments.manifest import Manifest
 from experiments.schema.canonical import definition_sha256
-from experiments.seal import Seal
+from experiments.seal import Seal, clips_sha256
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import iso, now
@@ -36,7 +35,6 @@ def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[
             "A report without a seal says nothing of deviations."
         )
     experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
-    clips = sorted((clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips)
     seal = Seal(
         study=study.name,
         version=version.number,
@@ -44,7 +42,7 @@ def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[
         definition=version.definition,
         definition_format=version.format,
         definition_sha256=definition_sha256(experiment),
-        clips_sha256=hashlib.sha256("\n".join(map(str, clips)).encode()).hexdigest(),
+        clips_sha256=clips_sha256((clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips),
         power=power,
     )
     record(

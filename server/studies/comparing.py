@@ -59,7 +59,15 @@ def _said(value: Any) -> str:
     """A value as it is read: texts as they are, nothing for what is not there."""
     if value is None:
         return ""
-    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, indent=1)
+    return value if isinstance(value, str) else json.dumps(_given(value), ensure_ascii=False, indent=1)
+
+
+def _given(value: Any) -> Any:
+    """A value without the keys of its tables that were left out."""
+    if isinstance(value, dict):
+        given = {key: _given(item) for key, item in value.items()}
+        return {key: item for key, item in given.items() if item not in (None, {}, [])}
+    return [_given(item) for item in value] if isinstance(value, list) else value
 
 
 def _clips(old: Clips, new: Clips) -> Iterator[ClipDifference]:
