@@ -8,6 +8,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
+from experiments.capsule.declaration import WRITTEN_BY_SERVER
+
 Kind = Literal["same", "figure", "rounding", "table"]
 RELATIVE = 1e-9
 """Numbers that differ by less than this share of themselves differ by rounding: other processors add up in
@@ -25,9 +27,18 @@ class Compared:
 
 
 def compare_reports(names: tuple[str, ...], before: Path, after: Path) -> list[Compared]:
-    """Every file of either report; `names` are those that the capsule promises."""
+    """Every file of either report; `names` are those that the capsule promises.
+
+    A file of the capsule's report that it does not promise, and that no server writes, is one that nobody can
+    make again: it counts as a table that differs.
+    """
     again = {path.name for path in after.iterdir()}
-    return [_of_name(name, names, again, before, after) for name in sorted({*names, *again})]
+    held = {path.relative_to(before).as_posix() for path in before.rglob("*") if path.is_file()}
+    more = sorted(held - {*names, *again, *WRITTEN_BY_SERVER})
+    foreign = [
+        Compared(name, "table", "in the capsule's report, and not made by the analysis") for name in more
+    ]
+    return [_of_name(name, names, again, before, after) for name in sorted({*names, *again})] + foreign
 
 
 def _of_name(name: str, names: tuple[str, ...], again: set[str], before: Path, after: Path) -> Compared:

@@ -83,7 +83,8 @@ def run(
         typer.Option(help="Sealed plan (`server seal`): the report lists each deviation from it."),
     ] = None,
     manifest: Annotated[
-        Path | None, typer.Option(help="manifest.json of the clips shown, to be held against the sealed plan.")
+        Path | None,
+        typer.Option(help="manifest.json of the clips shown, to be held against the sealed plan."),
     ] = None,
 ) -> None:
     """Analyse a study as its experiment declares: exclusions, the paper's table, every test, one report.

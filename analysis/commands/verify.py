@@ -10,6 +10,7 @@ from analysis.commands.output import saying
 
 if TYPE_CHECKING:
     from analysis.capsule.compare import Compared
+    from experiments.capsule.declaration import Capsule
 
 
 def register(app: typer.Typer) -> None:
@@ -56,8 +57,26 @@ def verify(
 
         again = rebuild(listed.report, folder, work, say)
         compared = compare_reports(listed.report.rebuilt, folder / REPORT_FOLDER, again)
+        _check_software(listed, folder)
     versions = differences(listed.software, present_software())
     _tell(compared, versions)
+
+
+def _check_software(listed: "Capsule", folder: Path) -> None:
+    """The versions of the list are those of the capsule's other file of them; else one was changed alone."""
+    import json
+
+    from experiments.capsule.declaration import SOFTWARE_FILE
+    from experiments.errors import InputError
+
+    path = folder / SOFTWARE_FILE
+    if not path.is_file() or json.loads(path.read_text(encoding="utf-8")) != listed.software.model_dump(
+        mode="json"
+    ):
+        raise InputError(
+            f"{SOFTWARE_FILE}: expected the versions that the list names, got others; nothing says by which "
+            "versions the report was made"
+        )
 
 
 def _tell(compared: "list[Compared]", versions: list[str]) -> None:
@@ -71,7 +90,7 @@ def _tell(compared: "list[Compared]", versions: list[str]) -> None:
         typer.echo("verified: every table as printed, every figure byte for byte")
         return
     said = "; ".join(versions) or "none: the software is the same"
-    typer.echo(f"versions that differ: {said}")
+    typer.echo(f"versions that differ, by what the capsule says of itself: {said}")
     if any(one.kind == "table" for one in compared):
         typer.echo("NOT verified: tables differ", err=True)
         raise typer.Exit(1)

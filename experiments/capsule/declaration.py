@@ -19,6 +19,7 @@ CAPSULE_FILE = "capsule.json"
 REPORT_FOLDER = "results"
 MANIFEST = "materials/manifest.json"
 """Every clip with its hash."""
+SOFTWARE_FILE = "documentation/software.json"
 WRITTEN_BY_SERVER = ("methods.json", "methods.tex", "methods.txt")
 """Of the report's folder: made of the server's database, so that they are held by their hashes alone."""
 

@@ -8,7 +8,14 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from experiments.capsule.declaration import CAPSULE_FILE, MANIFEST, REPORT_FOLDER, Capsule, ReportSource
+from experiments.capsule.declaration import (
+    CAPSULE_FILE,
+    MANIFEST,
+    REPORT_FOLDER,
+    SOFTWARE_FILE,
+    Capsule,
+    ReportSource,
+)
 from experiments.capsule.packing import listed_files, pack, report_input
 from experiments.definition import Experiment
 from experiments.errors import InputError
@@ -104,7 +111,7 @@ def _write_study(
     texts = {
         MANIFEST: json_text(_without_answers(version.manifest)),
         "analysis/plan.json": json_text(_plan(experiment)),
-        "documentation/software.json": json_text(present_software().model_dump(mode="json")),
+        SOFTWARE_FILE: json_text(present_software().model_dump(mode="json")),
     }
     if seal is not None:
         texts |= {SEAL: seal.text(), SEAL.replace(".json", ".html"): seal_page(seal)}

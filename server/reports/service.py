@@ -9,6 +9,8 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.json import json_text
+from experiments.manifest import MANIFEST_NAME
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
