@@ -27,7 +27,7 @@ from server.capsules.crate import CRATE_FILE, crate_metadata
 from server.clock import now
 from server.context import Services
 from server.export.psych_ds import Folder, dataset_folder
-from server.methods.service import methods_of, read_results, write_beside
+from server.methods.service import Counted, counted, paragraph_of, read_results, write_beside
 from server.models import Study, StudyVersion
 from server.reports.process import run_analysis
 from server.seals.page import page as seal_page
@@ -76,14 +76,16 @@ def build_capsule(
             study = find_study(session, name)
             version = active_version(session, study)
             source = _write_study(session, study, version, folder, made, wanted)
-            experiment = definition_of(version)
-            if wanted.clips:
-                progress(0.15, "copying clips")
-                _copy_clips(services.clips, Manifest.model_validate(version.manifest), folder)
-            progress(0.3, "analysing")
-            source = _report(session, study, source, folder, work)
+            experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
+            known = counted(session, study, source.origin, source.series)
+        # The snapshot has ended: what follows may take an hour, and the database must not wait for it.
+        if wanted.clips:
+            progress(0.15, "copying clips")
+            _copy_clips(services.clips, manifest, folder)
+        progress(0.3, "analysing")
+        source = _report(known, source, folder, work)
         progress(0.9, "packing")
-        capsule = _list(study.name, experiment, source, folder, made)
+        capsule = _list(known.study, experiment, source, folder, made)
         with whole_file(target) as unfinished:
             pack(folder, unfinished)
     return capsule
@@ -149,7 +151,7 @@ def _copy_clips(store: ClipStore, manifest: Manifest, folder: Path) -> None:
                 stream.write(piece)
 
 
-def _report(session: Session, study: Study, source: ReportSource, folder: Path, work: Path) -> ReportSource:
+def _report(known: Counted, source: ReportSource, folder: Path, work: Path) -> ReportSource:
     """Make the report from the capsule's own table, so that it can be made from it again."""
     answers, results = work / ANSWERS, folder / REPORT_FOLDER
     report_input(folder / source.answers, answers, source.renamed)
@@ -167,7 +169,7 @@ def _report(session: Session, study: Study, source: ReportSource, folder: Path, 
     if message:
         raise InputError(f"a capsule holds the report, which could not be made: {message}")
     rebuilt = tuple(sorted(path.name for path in results.iterdir()))
-    write_beside(results, methods_of(session, study, source.origin, source.series, read_results(results)))
+    write_beside(results, paragraph_of(known, read_results(results)))
     return source.model_copy(update={"rebuilt": rebuilt})
 
 

@@ -16,6 +16,7 @@ from server.export.tables import ExportTable
 
 LONGEST_S = 1800
 AT_ONCE = 2**20
+Ending = Literal["sav", "parquet"]
 _COLUMNS = TypeAdapter(list[Column])
 
 
@@ -24,22 +25,27 @@ def columns_json(columns: list[Column]) -> bytes:
     return _COLUMNS.dump_json(columns, indent=1)
 
 
-def converted(table: ExportTable, ending: Literal["sav", "parquet"]) -> Iterator[bytes]:
+def converted(table: ExportTable, ending: Ending) -> Iterator[bytes]:
     """The pieces of the file; InputError, with the program's own line, where it cannot be made."""
     with TemporaryDirectory(prefix="export-") as temporary:
         folder = Path(temporary)
-        (folder / "columns.json").write_bytes(columns_json(table.columns))
-        with (folder / "table.csv").open("wb") as stream:
-            for piece in csv_pieces(table.with_header()):
-                stream.write(piece)
-        target = folder / f"table.{ending}"
-        _convert(folder, target)
-        with target.open("rb") as stream:
+        write_table(table, folder)
+        with convert(folder, ending).open("rb") as stream:
             while piece := stream.read(AT_ONCE):
                 yield piece
 
 
-def _convert(folder: Path, target: Path) -> None:
+def write_table(table: ExportTable, folder: Path) -> None:
+    """Write the table and the declarations of its columns: all that a conversion needs of the database."""
+    (folder / "columns.json").write_bytes(columns_json(table.columns))
+    with (folder / "table.csv").open("wb") as stream:
+        for piece in csv_pieces(table.with_header()):
+            stream.write(piece)
+
+
+def convert(folder: Path, ending: Ending) -> Path:
+    """Convert what `write_table` wrote; InputError, with the program's own line, where it cannot be."""
+    target = folder / f"table.{ending}"
     program = Path(sys.executable).with_name("analysis")
     command = [str(program), "convert", str(folder / "table.csv"), "--columns", str(folder / "columns.json")]
     done = subprocess.run(  # noqa: S603 - our own program
@@ -48,3 +54,4 @@ def _convert(folder: Path, target: Path) -> None:
     if done.returncode:
         lines = (done.stderr or done.stdout).strip().splitlines()
         raise InputError(lines[-1][:500] if lines else f"analysis convert ended with code {done.returncode}")
+    return target

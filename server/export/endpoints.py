@@ -1,23 +1,32 @@
 """Downloads of a study's data, of one origin unless all are asked for; streamed in constant memory."""
 
+import shutil
+import tempfile
+import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from fastapi.responses import StreamingResponse
+from fastapi.responses import FileResponse, StreamingResponse
+from starlette.background import BackgroundTask
 
 from server.accounts.audit import record
 from server.accounts.identity import Exporter, Identity, Owner, Viewer
 from server.context import Services, ServicesDep
-from server.errors import ERROR_RESPONSES
+from server.errors import ERROR_RESPONSES, Conflict
+from server.export.converted import convert, write_table
 from server.export.formats import FORMATS, Format, proofed, row_count
 from server.export.origins import ExportOrigin
 from server.export.scripts import ScriptLanguage, script
+from server.export.tables import answers_table, wide_table
 from server.studies.lookup import active_definition, find_study
 from server.text import encoded
 
 router = APIRouter(prefix="/api/admin/studies/{study}/data", tags=["data"], responses=ERROR_RESPONSES)
 CSV_TYPE = "text/csv; charset=utf-8"
+_converting = threading.Lock()
+"""One conversion at a time: each is a process of its own that holds a whole table."""
 ROWS_HEADER = "palpebra-rows"
 """How many rows (CSV: below the header; zip: of ratings; JSON lines: runs) a whole download holds."""
 
@@ -140,7 +149,23 @@ def download_codebook(services: ServicesDep, _who: Viewer, study: str) -> Respon
     return Response(text, media_type="text/markdown; charset=utf-8", headers=headers)
 
 
-@router.get("/{table}.{ending}", response_class=StreamingResponse)
+def _write_whole(
+    services: Services, who: Identity, name: str, form: Format, origin: ExportOrigin, folder: Path
+) -> int:
+    """Write the table of `form` from one snapshot, which ends before the conversion; return its rows."""
+    with services.database.write() as session:
+        record(
+            session, who, "data downloaded", "study", find_study(session, name).name, what=form, origin=origin
+        )
+    with services.database.snapshot() as session:
+        study = find_study(session, name)
+        rows = row_count(form, session, study, origin)
+        table_of = wide_table if form.endswith("-wide") else answers_table
+        write_table(table_of(session, study, origin), folder)
+    return rows
+
+
+@router.get("/{table}.{ending}", response_class=FileResponse)
 def download_converted(
     services: ServicesDep,
     who: Exporter,
@@ -148,10 +173,28 @@ def download_converted(
     table: Literal["ratings", "wide"],
     ending: Literal["sav", "parquet"],
     origin: ExportOrigin = "participant",
-) -> StreamingResponse:
+) -> FileResponse:
     """One row a play, or the wide table, for SPSS or as Parquet: with labels of variables and levels."""
     # The last route of this file: its path would stand in for those of the other downloads.
     long: dict[str, Format] = {"sav": "spss", "parquet": "parquet"}
     wide: dict[str, Format] = {"sav": "spss-wide", "parquet": "parquet-wide"}
     form = (long if table == "ratings" else wide)[ending]
-    return _stream(services, who, study, form, origin, "application/octet-stream", f"{table}.{ending}")
+    if not _converting.acquire(blocking=False):
+        raise Conflict("Another file for SPSS or as Parquet is being made; try again in a moment.")
+    folder = Path(tempfile.mkdtemp(prefix="export-"))
+    try:
+        rows = _write_whole(services, who, study, form, origin, folder)
+        file = convert(folder, ending)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    finally:
+        _converting.release()
+    whose = "" if origin == "participant" else f"{origin}-"
+    return FileResponse(
+        file,
+        media_type="application/octet-stream",
+        filename=f"{study}-{whose}{table}.{ending}",
+        headers={ROWS_HEADER: str(rows)},
+        background=BackgroundTask(shutil.rmtree, folder, ignore_errors=True),
+    )

@@ -70,7 +70,7 @@ def cells_of(experiment: Experiment) -> list[Cell]:
 
 def _mean_of(scale: RatedScale, cell: str) -> str:
     of = f" of {cell}" if cell else ""
-    return f"Mean answer on the scale {scale.name}{of}: main trials, the last play of each."
+    return f"Mean answer on the scale {scale.name}{of}: main trials, the last play with an answer of each."
 
 
 def wide_columns(experiment: Experiment, forms: Sequence[FormColumn]) -> list[Column]:
@@ -137,8 +137,8 @@ def _by_run(
         if row[kind] != "main":
             continue
         answers = last[row[run]]
-        # Plays come in order: a later one takes the place of an earlier one of its trial.
-        answers.pop((row[trial], row[scale]), None)
+        # Plays come in order: a later one with an answer takes the place of an earlier one of its trial, as it
+        # does in the scripts; a later one without an answer leaves the earlier standing.
         if row[response] is not None:
             levels = tuple(str(row[place]) for place in within)
             answers[row[trial], row[scale]] = (levels, float(row[response]))

@@ -1,11 +1,13 @@
 """The Methods of a study, from its declaration, its stored runs and, where there is one, its report."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.definition import Experiment
 from experiments.files import whole_file
 from server.methods.paragraph import Methods, sentences
 from server.methods.repository import Number, numbers
@@ -23,16 +25,36 @@ def methods_of(
     session: Session, study: Study, origin: str, series: int | None, results: dict[str, Any] | None = None
 ) -> Methods:
     """The paragraph; `results` are those of a report, which says how many each declared rule left out."""
+    return paragraph_of(counted(session, study, origin, series), results)
+
+
+@dataclass(frozen=True)
+class Counted:
+    """What a paragraph needs of the database, taken at one moment."""
+
+    study: str
+    origin: str
+    series: int
+    experiment: Experiment
+    recruiter: str
+    numbers: dict[str, Number]
+
+
+def counted(session: Session, study: Study, origin: str, series: int | None) -> Counted:
+    """What the database has to say of a series: its declaration and every number."""
     version = version_of_series(session, study, series)
-    experiment = definition_of(version)
+    recruiter = Recruiter.model_validate(study.recruiter).kind if study.recruiter else "generic"
     found = numbers(session, study.id, origin, version.series)
+    return Counted(study.name, origin, version.series, definition_of(version), recruiter, found)
+
+
+def paragraph_of(known: Counted, results: dict[str, Any] | None) -> Methods:
+    """The paragraph of what was counted, and of the results of a report."""
     excluded = _excluded(results)
-    declared = study.recruiter
-    recruiter = Recruiter.model_validate(declared).kind if declared else "generic"
     rules = [(name, words) for name, (words, _) in excluded.items()]
-    found |= {name: number for name, (_, number) in excluded.items()}
-    lines = sentences(experiment, recruiter, found, rules)
-    return Methods(study.name, origin, version.series, lines, found)
+    found = known.numbers | {name: number for name, (_, number) in excluded.items()}
+    lines = sentences(known.experiment, known.recruiter, found, rules)
+    return Methods(known.study, known.origin, known.series, lines, found)
 
 
 def read_results(folder: Path) -> dict[str, Any] | None:

@@ -14,10 +14,11 @@ from hypothesis import HealthCheck, given, settings, strategies
 from typer.testing import CliRunner
 
 from analysis.cli import app as analysis
-from experiments.capsule.declaration import CAPSULE_FILE
+from experiments.capsule.declaration import CAPSULE_FILE, MANIFEST, SOFTWARE_FILE
 from experiments.capsule.opening import CapsuleError, open_capsule
 from experiments.errors import InputError
 from experiments.load import FOLDER
+from experiments.seal import deviations, read_clips_sha256, read_seal
 from server.app import create_app
 from server.capsules.build import Wanted, _without_answers, build_capsule
 from server.context import Services, open_services
@@ -236,6 +237,7 @@ def test_other_versions_are_named_where_a_figure_differs(unpacked: Path) -> None
     data = json.loads((unpacked / CAPSULE_FILE).read_text(encoding="utf-8"))
     data["software"]["packages"]["matplotlib"] = "3.0.0"
     (unpacked / CAPSULE_FILE).write_text(json.dumps(data), encoding="utf-8")
+    (unpacked / SOFTWARE_FILE).write_text(json.dumps(data["software"]), encoding="utf-8")
     figure = next((unpacked / "results").glob("*.svg"))
     figure.write_bytes(figure.read_bytes() + b"\n")
     relist(unpacked)
@@ -244,6 +246,41 @@ def test_other_versions_are_named_where_a_figure_differs(unpacked: Path) -> None
     assert f"{figure.name}: " in said
     assert "matplotlib 3.0.0 became " in said
     assert "verified: every table as printed" in said
+
+
+def test_versions_changed_in_the_list_alone_are_refused(unpacked: Path) -> None:
+    data = json.loads((unpacked / CAPSULE_FILE).read_text(encoding="utf-8"))
+    data["software"]["packages"]["matplotlib"] = "3.0.0"
+    (unpacked / CAPSULE_FILE).write_text(json.dumps(data), encoding="utf-8")
+    relist(unpacked)
+    code, said = verify(unpacked)
+    assert (code, said.split(":")[0]) == (2, SOFTWARE_FILE)
+
+
+def test_a_file_of_the_report_that_nobody_can_make_again_is_named(unpacked: Path) -> None:
+    (unpacked / "results/table9.md").write_text("| p | 0.001 |", encoding="utf-8")
+    relist(unpacked)
+    code, said = verify(unpacked)
+    assert code == 1
+    assert "table9.md: in the capsule's report, and not made by the analysis" in said
+
+
+def test_other_clips_than_sealed_are_a_deviation(unpacked: Path) -> None:
+    seal = read_seal(unpacked / "materials/sealed-plan.json")
+    shown = read_clips_sha256(unpacked / MANIFEST)
+    assert shown == seal.clips_sha256
+    assert deviations(seal, seal.experiment, seal.experiment.participants, shown) == []
+    manifest = json.loads((unpacked / MANIFEST).read_text(encoding="utf-8"))
+    manifest["clips"][0]["sha256"] = "0" * 64
+    (unpacked / MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
+    relist(unpacked)
+    code, said = verify(unpacked)
+    assert code == 1
+    assert "NOT verified: tables differ" in said
+    found = deviations(
+        seal, seal.experiment, seal.experiment.participants, read_clips_sha256(unpacked / MANIFEST)
+    )
+    assert [line.split(" (")[0] for line in found] == ["other clips were shown than sealed"]
 
 
 def test_the_psych_ds_validator_agrees(unpacked: Path) -> None:

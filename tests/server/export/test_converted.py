@@ -4,6 +4,7 @@ import pyreadstat
 import pytest
 from fastparquet import ParquetFile
 
+from server.export.endpoints import _converting
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
 
@@ -34,3 +35,28 @@ def test_spss_and_parquet_hold_the_tables(viewer: Admin, participant: Participan
 @pytest.mark.parametrize("file", ["wide.xls", "runs.sav"])
 def test_there_is_no_other_table(viewer: Admin, participant: Participant, file: str) -> None:
     assert viewer.get(f"/studies/short/data/{file}").status_code in (404, 422)
+
+
+def test_what_cannot_be_converted_is_refused_before_the_file_begins(
+    viewer: Admin, participant: Participant, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    participant.agree()
+    participant.rate_all()
+    # The real program, which finds no place for the file.
+    monkeypatch.setattr("server.export.endpoints.tempfile.mkdtemp", lambda prefix: str(tmp_path / "gone"))
+    monkeypatch.setattr("server.export.endpoints.write_table", lambda table, folder: None)
+    answer = viewer.get("/studies/short/data/ratings.sav")
+    assert answer.status_code == 422
+    assert answer.json()["error"]["message"]
+    assert "content-disposition" not in answer.headers
+    monkeypatch.undo()
+    whole = viewer.get("/studies/short/data/ratings.sav")
+    assert (whole.status_code, int(whole.headers["content-length"])) == (200, len(whole.content))
+    assert whole.headers["palpebra-rows"] == "12"
+
+
+def test_one_file_is_converted_at_a_time(viewer: Admin, participant: Participant) -> None:
+    participant.agree()
+    with _converting:
+        busy = viewer.get("/studies/short/data/wide.parquet")
+    assert (busy.status_code, "try again in a moment" in busy.json()["error"]["message"]) == (409, True)

@@ -104,3 +104,18 @@ def test_options_of_all_versions_are_in_the_codebook(viewer: Admin, study: Study
     assert "What do you wear? Whether chosen: Lenses." in text
     assert "| character | text |  | Level of the factor Character. | a = A, b = B |" in text
     assert "| rating_a_slow | number |" in text
+
+
+def test_a_last_play_without_an_answer_leaves_the_earlier_one_standing(
+    viewer: Admin, participant: Participant
+) -> None:
+    participant.agree()
+    trial = next(one for one in participant.state()["trials"] if one["kind"] == "main")
+    not_shown = {"method": "none", "clip_sha256": None, "drawn": [], "frames_missing": None}
+    assert participant.rate(trial, 6, playback={"focus_lost": 1}).status_code == 201
+    assert participant.rate(trial, None, play=2, playback=not_shown).status_code == 201
+    plays = [row for row in rows_of(viewer, "ratings.csv") if row["trial_index"] == str(trial["trial_index"])]
+    assert [row["response"] for row in plays] == ["6", ""]
+    [row] = rows_of(viewer, "wide.csv")
+    assert row["answers"] == "1"
+    assert [value for name, value in row.items() if name.startswith("rating_") and value] == ["6.0"]
