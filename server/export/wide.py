@@ -137,8 +137,8 @@ def _by_run(
         if row[kind] != "main":
             continue
         answers = last[row[run]]
-        # Plays come in order: a later one with an answer takes the place of an earlier one of its trial, as it
-        # does in the scripts; a later one without an answer leaves the earlier standing.
+        # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier one
+        # of its trial; a later one without an answer leaves the earlier standing.
         if row[response] is not None:
             levels = tuple(str(row[place]) for place in within)
             answers[row[trial], row[scale]] = (levels, float(row[response]))
