@@ -9,6 +9,7 @@ to the profiles that ship with Palpebra.
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from scipy import optimize, stats
 
 from blink_engine.profile import BlinkShape
 from stimuli_builder.blinks.library import load_library
+from stimuli_builder.blinks.profile import BlinkProfile
 
 ROOT = Path(__file__).resolve().parent.parent
 DEFAULTS = ROOT / "blink_engine" / "defaults.json"
@@ -75,10 +77,13 @@ def delay_between_eyes(data: Path) -> float:
     return float(high - low) / 2
 
 
-def fitted_shapes() -> tuple[Array, Array]:
-    """(21, 5) closing, closed, opening time and both powers of each shipped profile; residuals (21,)."""
+def fitted_shapes(profiles: Sequence[BlinkProfile] | None = None) -> tuple[Array, Array]:
+    """(n, 5) closing, closed, opening time and both powers of each profile; residuals (n,).
+
+    Without `profiles` the 21 shipped ones.
+    """
     rows, residuals = [], []
-    for profile in load_library():
+    for profile in load_library() if profiles is None else profiles:
         course = np.clip(profile.closure, 0.0, None) / profile.amplitude
         fit = _fit_course(course, float(np.argmax(course)) / PROFILE_FPS)
         rows.append(fit.x[1:])
@@ -101,12 +106,6 @@ def _fit_course(course: Array, peak_s: float) -> Any:
 
 def profile_defaults(data: Path) -> dict[str, Any]:
     """Return the profile model's defaults."""
-    shapes, _ = fitted_shapes()
-    closing, closed, opening, closing_power, opening_power = shapes.T
-    peaks = np.array([profile.amplitude for profile in load_library()])
-    partial = peaks[peaks < COMPLETE_FROM]
-    logits = np.log(partial / (1 - partial))
-    held = closed[(peaks >= COMPLETE_FROM) & (closed > 0.002)]
     pairs = [p.closure_other for p in load_library(paired=True)]
     asymmetry = np.std(
         [
@@ -115,18 +114,14 @@ def profile_defaults(data: Path) -> dict[str, Any]:
             if o is not None
         ]
     )
+    courses = course_defaults(load_library())
     return {
-        "closing_s": _lognormal(closing),
-        "opening_s": _lognormal(opening),
-        "closed_s": _lognormal(held),
+        **{name: courses[name] for name in ("closing_s", "opening_s", "closed_s")},
         "long_closed_s": {"kind": "lognormal", "median": 0.29, "spread": 0.2},
-        "closing_power": round(float(np.median(closing_power)), 3),
-        "opening_power": round(float(np.median(opening_power)), 3),
-        "complete_share": round(float(np.mean(peaks >= COMPLETE_FROM)), 3),
+        **{name: courses[name] for name in ("closing_power", "opening_power", "complete_share")},
         "long_share": 0.0,
         "double_share": 0.0,
-        "partial_logit_median": round(float(np.median(logits)), 3),
-        "partial_logit_spread": round(float(np.std(logits, ddof=1)), 3),
+        **{name: courses[name] for name in ("partial_logit_median", "partial_logit_spread")},
         "asymmetry": round(float(asymmetry), 3),
         "delay_s": round(delay_between_eyes(data), 4),
         "lower_up": 1.0,
@@ -134,12 +129,38 @@ def profile_defaults(data: Path) -> dict[str, Any]:
     }
 
 
+def course_defaults(profiles: Sequence[BlinkProfile]) -> dict[str, Any]:
+    """What the profile model takes from single blinks: durations, powers and peak closures."""
+    shapes, _ = fitted_shapes(profiles)
+    closing, closed, opening, closing_power, opening_power = shapes.T
+    peaks = np.array([profile.amplitude for profile in profiles])
+    partial = peaks[peaks < COMPLETE_FROM]
+    logits = np.log(partial / (1 - partial))
+    held = closed[(peaks >= COMPLETE_FROM) & (closed > 0.002)]
+    return {
+        "closing_s": _lognormal(closing),
+        "opening_s": _lognormal(opening),
+        "closed_s": _lognormal(held),
+        "closing_power": round(float(np.median(closing_power)), 3),
+        "opening_power": round(float(np.median(opening_power)), 3),
+        "complete_share": round(float(np.mean(peaks >= COMPLETE_FROM)), 3),
+        "partial_logit_median": round(float(np.median(logits)), 3),
+        "partial_logit_spread": round(float(np.std(logits, ddof=1)), 3),
+    }
+
+
+def half_widths_s(data: Path, eye: str = "left") -> Array:
+    """Return how long each blink of the recording is at half its depth or deeper, in s."""
+    table = pd.read_excel(data / "blink_series/blinking_full_blinking.xlsx", sheet_name=f"blinking {eye} eye")
+    return table["peak_internal_width"].to_numpy(dtype=np.float64) / RECORDING_FPS
+
+
 def _lognormal(values: Array) -> dict[str, Any]:
     logs = np.log(values)
     return {
         "kind": "lognormal",
         "median": round(float(np.exp(np.median(logs))), 4),
-        "spread": round(float(np.std(logs, ddof=1)), 3),
+        "spread": round(float(np.std(logs, ddof=1)), 3) if logs.size > 1 else 0.0,
     }
 
 
