@@ -61,6 +61,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
 	@$(BIN)/python tools/screenshots.py
 	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
+	@PYTHONPATH=. $(BIN)/python tools/screenshots_performance.py
 	@$(BIN)/python tools/screenshots_admin.py
 
 scope: setup-test ## what reaches a virtual screen against what is recorded (hours; SCOPE=short, SCOPE="rows --plays 20")
