@@ -35,6 +35,7 @@ def main(zip_path, folder):
     locked(face)
     speech(face, scene, folder)
     bones(scene)
+    other_rigs(face)
     RESULTS["removed"] = removing(face)
     palpebra_blinks.unregister()
     sys.stdout.write(f"RESULT {json.dumps(RESULTS)}\n")
@@ -164,6 +165,18 @@ def bones(scene):
     RESULTS["bone_values"] = values
     rig.palpebra.bone_motion = "ROTATION"
     RESULTS["quaternion"] = called(bpy.ops.palpebra.fill)
+
+
+def other_rigs(face):
+    bpy.ops.mesh.primitive_cube_add()
+    bare = bpy.context.object
+    RESULTS["no_lids"] = called(bpy.ops.palpebra.guess)
+    RESULTS["no_shapes"] = called(bpy.ops.palpebra.fill)
+    RESULTS["nothing_written"] = bare.animation_data is None and bare.data.shape_keys is None
+    for name in ("Basis", "MyEyesClose_L", "MyEyesClose_R", "winkR", "winkL"):
+        bare.shape_key_add(name=name)
+    RESULTS["unknown_scheme"] = called(bpy.ops.palpebra.guess)
+    RESULTS["table"] = [[row.title, row.left, row.right] for row in bare.palpebra.guesses]
 
 
 def removing(face):

@@ -46,6 +46,18 @@ def test_names_are_guessed(used: dict[str, Any]) -> None:
     assert used["bone_names"] == ["lid.T.L.002", "lid.T.R.002"]
 
 
+def test_a_rig_without_lids_is_left_alone(used: dict[str, Any]) -> None:
+    assert used["nothing_written"]
+
+
+def test_names_of_no_known_scheme_are_guessed_and_shown(used: dict[str, Any]) -> None:
+    assert used["unknown_scheme"] == ["FINISHED"]
+    assert used["table"] == [
+        ["by its name", "MyEyesClose_L", "MyEyesClose_R"],
+        ["by its name", "winkL", "winkR"],
+    ]
+
+
 def test_keys_of_the_animator_are_touched_only_when_asked(used: dict[str, Any]) -> None:
     assert "has 1 keys of your own in frames 1 to 41000" in used["own"]
     assert used["untouched"]
@@ -76,6 +88,8 @@ def test_few_keys_are_fewer(used: dict[str, Any]) -> None:
         ("no_sound", "expected a sound file that Blender reads"),
         ("bone_no_way", "set how far bone 'lid.T.L.002' goes"),
         ("quaternion", "set its rotation mode to XYZ Euler"),
+        ("no_lids", "no shape key or bone here speaks of lids or blinks"),
+        ("no_shapes", "choose what closes the left and the right eye"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(used: dict[str, Any], case: str, line: str) -> None:
