@@ -50,6 +50,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_tracking.py
 	@for size in 960x360 1920x720; do PYTHONPATH=. $(BIN)/python tests/bench/clip_memory.py $$size; done
 	@PYTHONPATH=. $(BIN)/python tests/bench/performance_memory.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/models_against_r.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_server.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_evidence.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_workers.py

@@ -30,6 +30,23 @@ ItemOption = Annotated[
 ]
 
 
+BetweenOption = Annotated[
+    str,
+    typer.Option(help="Columns of factors with one level for each participant, separated by commas."),
+]
+CovariateOption = Annotated[
+    str,
+    typer.Option(help="Columns with numbers (age, trial), centred, separated by commas; no interactions."),
+]
+RandomOption = Annotated[
+    str,
+    typer.Option(
+        help="Further columns with a random intercept each, separated by commas: face, or face/clip for "
+        "clips nested in faces."
+    ),
+]
+
+
 class SlopesChoice(StrEnum):
     """By-participant slopes of the linear mixed model."""
 
@@ -62,6 +79,9 @@ def mixed(
     rating: RatingOption = "response",
     within: WithinOption = "",
     item: ItemOption = "",
+    between: BetweenOption = "",
+    covariate: CovariateOption = "",
+    random: RandomOption = "",
     slopes: Annotated[
         SlopesChoice,
         typer.Option(
@@ -78,13 +98,18 @@ def mixed(
       analysis mixed ratings.csv
 
       analysis mixed table.csv --participant id --rating score --within face,blur --item clip --slopes main
+
+      analysis mixed table.csv --within blur --between group --covariate age --item clip --random face,lab
     """
     from analysis.models.mixed import fit_mixed
     from analysis.report.model_tables import mixed_components_table, mixed_effects_table, mixed_text
 
-    data = _read(file, participant, rating, within, item)
+    groups, numbers, further = names_in(between), names_in(covariate), names_in(random)
+    data = _read(file, participant, rating, within, item, groups, numbers, further)
     with saying("fitting"):
-        result = fit_mixed(data.rows, participant, rating, data.within, data.item, slopes.value)
+        result = fit_mixed(
+            data.rows, participant, rating, data.within, data.item, slopes.value, groups, numbers, further
+        )
     _show(file, data, mixed_text(result))
     named = (result, file.stem, data.synthetic)
     show_tables(mixed_effects_table(*named), mixed_components_table(*named))
@@ -97,6 +122,8 @@ def ordinal(
     rating: RatingOption = "response",
     within: WithinOption = "",
     item: ItemOption = "",
+    between: BetweenOption = "",
+    covariate: CovariateOption = "",
     slopes: Annotated[
         OrdinalSlopesChoice,
         typer.Option(
@@ -122,9 +149,12 @@ def ordinal(
         ordinal_text,
     )
 
-    data = _read(file, participant, rating, within, item)
+    groups, numbers = names_in(between), names_in(covariate)
+    data = _read(file, participant, rating, within, item, groups, numbers)
     with saying("fitting"):
-        result = fit_ordinal(data.rows, participant, rating, data.within, data.item, slopes.value)
+        result = fit_ordinal(
+            data.rows, participant, rating, data.within, data.item, slopes.value, groups, numbers
+        )
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
     show_tables(
@@ -133,11 +163,14 @@ def ordinal(
     save_json(json, asdict(result), data.synthetic)
 
 
-def _read(file: Path, participant: str, rating: str, within: str, item: str) -> "ModelInput":
+def _read(
+    file: Path, participant: str, rating: str, within: str, item: str, *further: list[str]
+) -> "ModelInput":
+    """`further`: factors between participants, covariates, and more groupings."""
     from analysis.read.model_csv import read_model_input
 
     with saying("reading ratings"):
-        return read_model_input(file, participant, rating, names_in(within), names_in(item))
+        return read_model_input(file, participant, rating, names_in(within), names_in(item), *further)
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:

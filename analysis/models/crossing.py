@@ -1,4 +1,7 @@
-"""Cross-products of participants with items, dense where most pairs met, sparse where few did."""
+"""Cross-products of the grouping taken out first with all others, dense where most met, sparse where few did.
+
+N levels with p columns each are taken out; J is the number of columns of the rest.
+"""
 
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -8,52 +11,44 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 SPARSE_BELOW = 0.15
-"""Share of participant x item pairs with a trial below which the cross-products are kept sparse."""
+"""Share of cross-products other than zero below which they are kept sparse."""
 
 
 class Eliminated(Protocol):
-    """Cross-products with the participants taken out, at one Lp; m is any number of columns."""
+    """Cross-products with the first grouping taken out, at one Lp; m is any number of columns."""
 
     def schur(self) -> Floats:
         """V'W (J, J) with V = Lp'P, W = M^-1 V, P the cross-products, M = I + Lp'Z'Z Lp."""
 
-    def to_items(self, values: Floats) -> Floats:
+    def to_rest(self, values: Floats) -> Floats:
         """V' values (J, m) of values (N, p, m)."""
 
-    def from_items(self, values: Floats) -> Floats:
+    def from_rest(self, values: Floats) -> Floats:
         """W values (N, p, m) of values (J, m)."""
 
     def plain(self, values: Floats) -> Floats:
         """P values (N, p, m) of values (J, m)."""
 
     def quadratic(self, inner: Floats) -> Floats:
-        """Sum over participants of Q inner Q' (p, p), Q = P - Z'Z Lp W, inner (J, J) symmetric."""
+        """Sum over levels of Q inner Q' (p, p), Q = P - Z'Z Lp W, inner (J, J) symmetric."""
 
 
 class Crossing(Protocol):
-    """Sums of random-effect columns over the trials of every participant and item, (N, p, J)."""
-
-    @property
-    def n_items(self) -> int:
-        """J."""
+    """Cross-products of random-effect columns, (N, p, J)."""
 
     def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> Eliminated:
-        """Take the participants out: Lp (p, p), M (N, p, p), Z'Z Lp (N, p, p)."""
+        """Take the first grouping out: Lp (p, p), M (N, p, p), Z'Z Lp (N, p, p)."""
 
 
-def crossing(z: Floats, participant: Integers, item: Integers, people: int, items: int) -> Crossing:
-    """Cross-products of z (n, p) by participant and item codes (n,)."""
-    p = z.shape[1]
-    rows = participant[:, None] * p + np.arange(p)
-    columns = np.repeat(item, p)
-    sums = sparse.csr_matrix((z.ravel(), (rows.ravel(), columns)), shape=(people * p, items))
-    pairs = len(np.unique(participant * items + item))
-    if pairs < SPARSE_BELOW * people * items:
+def crossing(first: sparse.csr_matrix, rest: sparse.csr_matrix, p: int) -> Crossing:
+    """Cross-products of `first` (n, N p), the p columns of a level side by side, with `rest` (n, J)."""
+    sums = sparse.csr_matrix(first.T @ rest)
+    rows, columns = sums.shape
+    if sums.nnz < SPARSE_BELOW * rows * columns:  # without a rest it is dense
         return SparseCrossing(sums, p)
-    return DenseCrossing(np.asarray(sums.toarray(), dtype=np.float64).reshape(people, p, items))
+    return DenseCrossing(np.asarray(sums.toarray(), dtype=np.float64).reshape(rows // p, p, columns))
 
 
 @dataclass(frozen=True)
@@ -61,11 +56,6 @@ class DenseCrossing:
     """`sums` (N, p, J)."""
 
     sums: Floats = field(repr=False)
-
-    @property
-    def n_items(self) -> int:
-        """J."""
-        return int(self.sums.shape[2])
 
     def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> "DenseEliminated":
         """See `Crossing`."""
@@ -84,14 +74,13 @@ class DenseEliminated:
 
     def schur(self) -> Floats:
         """See `Eliminated`."""
-        items = self.v.shape[2]
-        return np.asarray(self.v.reshape(-1, items).T @ self.w.reshape(-1, items))
+        return np.asarray(_flat(self.v).T @ _flat(self.w))
 
-    def to_items(self, values: Floats) -> Floats:
+    def to_rest(self, values: Floats) -> Floats:
         """See `Eliminated`."""
-        return np.asarray(self.v.reshape(-1, self.v.shape[2]).T @ values.reshape(-1, values.shape[2]))
+        return np.asarray(_flat(self.v).T @ _flat(values))
 
-    def from_items(self, values: Floats) -> Floats:
+    def from_rest(self, values: Floats) -> Floats:
         """See `Eliminated`."""
         return np.asarray(self.w @ values)
 
@@ -105,23 +94,25 @@ class DenseEliminated:
         return summed_product(q @ inner, q)
 
 
+def _flat(values: Floats) -> Floats:
+    """(N p, m) of (N, p, m), also where m is 0."""
+    n, p, width = values.shape
+    return values.reshape(n * p, width)
+
+
 def summed_product(a: Floats, b: Floats) -> Floats:
-    """Sum over participants of a_i b_i', both (N, p, m)."""
-    p = a.shape[1]
-    return np.asarray(a.transpose(1, 0, 2).reshape(p, -1) @ b.transpose(1, 0, 2).reshape(p, -1).T)
+    """Sum over levels of a_i b_i', both (N, p, m)."""
+    n, p, width = a.shape
+    turned = (values.transpose(1, 0, 2).reshape(p, n * width) for values in (a, b))
+    return np.asarray(next(turned) @ next(turned).T)
 
 
 @dataclass(frozen=True)
 class SparseCrossing:
-    """`sums` (N p, J): the p rows of a participant stand together."""
+    """`sums` (N p, J): the p rows of a level stand together."""
 
     sums: sparse.csr_matrix = field(repr=False)
     p: int
-
-    @property
-    def n_items(self) -> int:
-        """J."""
-        return int(self.sums.shape[1])
 
     def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> "SparseEliminated":
         """See `Crossing`."""
@@ -153,11 +144,11 @@ class SparseEliminated:
         """See `Eliminated`."""
         return np.asarray((self.v.T @ self.w).toarray(), dtype=np.float64)
 
-    def to_items(self, values: Floats) -> Floats:
+    def to_rest(self, values: Floats) -> Floats:
         """See `Eliminated`."""
         return np.asarray(self.v.T @ values.reshape(-1, values.shape[2]))
 
-    def from_items(self, values: Floats) -> Floats:
+    def from_rest(self, values: Floats) -> Floats:
         """See `Eliminated`."""
         return np.asarray(self.w @ values).reshape(-1, self.p, values.shape[1])
 
@@ -167,10 +158,10 @@ class SparseEliminated:
 
     def quadratic(self, inner: Floats) -> Floats:
         """See `Eliminated`."""
-        turned = np.asarray(self.q @ inner)
+        columns = [self.q[a :: self.p] for a in range(self.p)]
         total = np.empty((self.p, self.p))
-        for b in range(self.p):
-            rows = self.q[b :: self.p].tocoo()
-            for a in range(self.p):
-                total[a, b] = rows.data @ turned[a :: self.p][rows.row, rows.col]
+        for a in range(self.p):
+            for b in range(a + 1):
+                both = sparse.coo_matrix(columns[a].T @ columns[b])
+                total[a, b] = total[b, a] = both.data @ inner[both.row, both.col]
         return total

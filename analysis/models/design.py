@@ -1,4 +1,4 @@
-"""Long rows as what the mixed and ordinal models need: codes, sum-coded cells, crossed groups."""
+"""Long rows as what the mixed and ordinal models need: codes, sum-coded cells, covariates, groupings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,9 +9,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.models.columns import Grouping, covariate_columns, groupings, ratings, refuse_unknown_columns
+from analysis.models.terms import Term
 from analysis.within.cell_means import natural_order
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -19,41 +21,93 @@ Slopes = Literal["none", "main", "all", "correlated"]
 
 
 @dataclass(frozen=True)
-class ModelData:
-    """Trials of participants crossed with items, in coded form.
+class ModelTerms:
+    """What a model is of: columns by their role.
 
-    `cell`, `participant`, `item` are codes (n,), `rating` the responses (n,). `fixed` (cells, cells) is the
-    sum-coded full factorial, `spread` (cells, cells) the same effects as orthonormal contrasts scaled to unit
-    variance; `effect_of` names the effect of each column, `intercept` first.
+    `within` vary within participants, `between` do not; `item` (several columns together) names what was
+    rated; `covariates` are numbers, centred; `random` are further groupings with an intercept each, `a/b` for
+    b nested in a.
     """
 
+    participant: str
+    rating: str
+    within: tuple[str, ...]
+    item: tuple[str, ...] = ()
+    between: tuple[str, ...] = ()
+    covariates: tuple[str, ...] = ()
+    random: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ModelData:
+    """Trials in coded form.
+
+    `cell` are codes (n,), `rating` the responses (n,). `fixed` (cells, cells) is the sum-coded full factorial
+    of `factors`, those between participants first; `spread` (cells, cells) the same effects as orthonormal
+    contrasts scaled to unit variance; `effect_of` names the effect of each column, `intercept` first.
+    `numbers` (n, k) are centred covariates. `groups`: participants, items (if any), further groupings.
+    """
+
+    terms: ModelTerms
     factors: tuple[str, ...]
     levels: tuple[tuple[str, ...], ...]
-    participants: tuple[str, ...]
-    items: tuple[str, ...]
+    groups: tuple[Grouping, ...]
     cell: Integers = field(repr=False)
-    participant: Integers = field(repr=False)
-    item: Integers = field(repr=False)
     rating: Floats = field(repr=False)
     fixed: Floats = field(repr=False)
     spread: Floats = field(repr=False)
+    numbers: Floats = field(repr=False)
     effect_of: tuple[str, ...]
     column_names: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def effects(self) -> list[str]:
-        """Effects in order, main effects first, without the intercept."""
-        return list(dict.fromkeys(name for name in self.effect_of if name != "intercept"))
+        """Effects in order, main effects first, covariates last, without the intercept."""
+        factorial = dict.fromkeys(name for name in self.effect_of if name != "intercept")
+        return [*factorial, *self.terms.covariates]
+
+    @property
+    def slope_effects(self) -> list[str]:
+        """Effects in which participants can differ: of factors within participants alone."""
+        inside = set(self.terms.within)
+        return [effect for effect in self.effects if inside.issuperset(effect.split(":"))]
+
+    @property
+    def participants(self) -> Grouping:
+        """Who rated."""
+        return self.groups[0]
+
+    @property
+    def items(self) -> Grouping | None:
+        """What was rated."""
+        return self.groups[1] if self.terms.item else None
+
+    @property
+    def fixed_part(self) -> str:
+        """The right-hand side of the formula, without random terms."""
+        factorial = [" * ".join(self.factors)] if self.factors else []
+        return " + ".join([*factorial, *self.terms.covariates]) or "1"
+
+    @property
+    def x(self) -> Floats:
+        """Fixed effects (n, cells + covariates)."""
+        return np.hstack([self.fixed[self.cell], self.numbers])
 
     def columns(self, effect: str) -> Integers:
-        """Positions of an effect's columns."""
+        """Positions of an effect's columns in `x`."""
+        if effect in self.terms.covariates:
+            return np.array([len(self.effect_of) + self.terms.covariates.index(effect)])
         return np.flatnonzero(np.array(self.effect_of) == effect)
 
     def differences(self, effect: str) -> Floats:
-        """Contrasts (q, fixed columns) of an effect as differences from the first level of each factor.
+        """Contrasts (q, columns of x) of an effect as differences from the first level of each factor.
 
         The df of a test of several contrasts depend a little on how these are written; lmerTest's are these.
         """
+        width = len(self.effect_of) + len(self.terms.covariates)
+        if effect in self.terms.covariates:
+            return np.eye(width)[self.columns(effect)]
         members = effect.split(":")
         rows: Floats = np.ones((1, 1))
         for factor, names in zip(self.factors, self.levels, strict=True):
@@ -62,46 +116,68 @@ class ModelData:
             rows = np.asarray(
                 np.kron(rows, from_first if factor in members else np.full((1, size), 1 / size))
             )
-        return np.asarray(rows @ self.fixed, dtype=np.float64)
+        contrasts = rows @ self.fixed
+        return np.hstack([contrasts, np.zeros((len(contrasts), width - contrasts.shape[1]))])
+
+    def random_terms(self, slopes: Slopes, effects: Sequence[str]) -> list[Term]:
+        """Participants with slopes of `effects` (`intercept` first), then intercepts of every other group."""
+        of_column = [effect for effect in effects for _ in self.columns(effect)]
+        columns = np.concatenate([self.columns(effect) for effect in effects])
+        p = len(columns)
+        if slopes == "correlated":
+            rows, others = np.tril_indices(p)
+            patterns = np.zeros((len(rows), p, p))
+            patterns[np.arange(len(rows)), rows, others] = 1.0
+        else:
+            patterns = np.stack([np.diag([float(e == name) for name in of_column]) for e in effects])
+        people = self.participants
+        terms = [Term(people.codes, len(people.names), self.spread[:, columns][self.cell], patterns)]
+        ones = np.ones((len(self.rating), 1))
+        return terms + [Term(g.codes, len(g.names), ones, np.ones((1, 1, 1))) for g in self.groups[1:]]
 
 
-def model_data(
-    rows: pd.DataFrame,
-    participant: str,
-    item: str | Sequence[str] | None,
-    rating: str,
-    within: Sequence[str],
-) -> ModelData:
+def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     """Code long rows, one a trial.
 
-    `item` is the column that names what was rated (a clip, a blink); several columns together name it
-    where one is not unique (exemplars numbered afresh within a profile); without it there is one code and
-    no item. Raises InputError for unknown
-    columns, missing values, fewer than two participants, items or levels, and for cells that nobody rated.
+    A factor of `within` with one level for each participant is taken as one between them, and said.
+
+    Raises
+    ------
+    InputError
+        Unknown columns, missing values, fewer than two participants, items or levels, a factor of `between`
+        that varies within a participant, cells that nobody rated, covariates that the factors determine,
+        groupings that are one and the same.
     """
-    item_columns = [item] if isinstance(item, str) else list(item or ())
-    for name in (participant, rating, *within, *item_columns):
-        if name not in rows.columns:
-            raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
-    if rows.empty:
-        raise InputError("there are no ratings to analyse; the table has a header but no rows")
-    values = pd.to_numeric(rows[rating], errors="coerce").to_numpy(dtype=np.float64)
-    if not np.isfinite(values).all():
-        bad = rows[rating].iloc[int(np.flatnonzero(~np.isfinite(values))[0])]
-        raise InputError(f"expected numbers in '{rating}', got {bad!r}; correct or remove the row")
-    if np.ptp(values) == 0:
-        raise InputError(f"every rating is {values[0]:g}; a model needs ratings that vary")
-    who, people = _coded(rows[participant], "participants")
-    what, items = _coded_items(rows, item_columns)
-    coded = [_coded(rows[name], f"levels of '{name}'") for name in within]
+    refuse_unknown_columns(rows, terms)
+    values = ratings(rows, terms.rating)
+    groups = groupings(rows, terms)
+    terms, said = _by_participant(rows, terms, groups[0].codes)
+    factors = (*terms.between, *terms.within)
+    coded = [_coded(rows[name], f"levels of '{name}'") for name in factors]
     levels = tuple(names for _, names in coded)
     shape = tuple(len(names) for names in levels)
-    cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape).astype(np.int64)
-    _refuse_empty_cells(cell, within, levels)
-    fixed, spread, effect_of, names = _design(list(within), levels)
-    return ModelData(
-        tuple(within), levels, people, items, cell, who, what, values, fixed, spread, effect_of, names
+    cell = np.zeros(len(values), np.int64)
+    if factors:
+        cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape).astype(np.int64)
+    _refuse_empty_cells(cell, factors, levels)
+    fixed, spread, effect_of, names = _design(list(factors), levels)
+    numbers, centred = covariate_columns(rows, terms, groups[0].codes)
+    data = ModelData(
+        terms,
+        factors,
+        levels,
+        groups,
+        cell,
+        values,
+        fixed,
+        spread,
+        numbers,
+        effect_of,
+        (*names, *terms.covariates),
+        (*said, *centred),
     )
+    _refuse_collinear(data)
+    return data
 
 
 def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
@@ -109,14 +185,46 @@ def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]
     if slopes == "none":
         return ["intercept"], []
     if slopes != "all":
-        return ["intercept", *data.factors], []
-    cells = len(data.fixed)
-    counts = np.bincount(data.participant * cells + data.cell, minlength=len(data.participants) * cells)
-    if counts.max() > 1:
-        return ["intercept", *data.effects], []
-    left_out = data.effects[-1]
-    kept = [effect for effect in data.effects if effect != left_out]
-    return ["intercept", *kept], [f"no slope of {left_out}: with one rating a cell it is the residual"]
+        return ["intercept", *data.terms.within], []
+    inside = data.slope_effects
+    cells, people = len(data.fixed), data.participants
+    counts = np.bincount(people.codes * cells + data.cell, minlength=len(people.names) * cells)
+    if counts.max() > 1 or not inside:
+        return ["intercept", *inside], []
+    kept = ["intercept", *inside[:-1]]
+    return kept, [f"no slope of {inside[-1]}: with one rating a cell it is the residual"]
+
+
+def _by_participant(
+    rows: pd.DataFrame, terms: ModelTerms, codes: Integers
+) -> tuple[ModelTerms, tuple[str, ...]]:
+    """Factors where they belong: with one level for each participant they are between participants."""
+    constant = []
+    for name in (*terms.within, *terms.between):
+        per_person = rows[name].astype(str).groupby(codes).nunique().to_numpy()
+        if name in terms.between and (per_person > 1).any():
+            at = np.flatnonzero(codes == int(np.argmax(per_person > 1)))
+            two = pd.unique(rows[name].astype(str).iloc[at])[:2]
+            raise InputError(
+                f"'{name}' differs within participant {rows[terms.participant].iloc[at[0]]} ({two[0]} and "
+                f"{two[1]}); what changes within a participant belongs in --within"
+            )
+        if name in terms.within and (per_person == 1).all() and rows[name].nunique() > 1:
+            constant.append(name)
+    if not constant:
+        return terms, ()
+    within = tuple(name for name in terms.within if name not in constant)
+    moved = ModelTerms(
+        terms.participant,
+        terms.rating,
+        within,
+        terms.item,
+        (*terms.between, *constant),
+        terms.covariates,
+        terms.random,
+    )
+    said = f"{', '.join(constant)}: one level for each participant, taken as between participants"
+    return moved, (said,)
 
 
 def _coded(column: "pd.Series[str]", what: str) -> tuple[Integers, tuple[str, ...]]:
@@ -128,21 +236,24 @@ def _coded(column: "pd.Series[str]", what: str) -> tuple[Integers, tuple[str, ..
     return np.asarray(texts.map(position), dtype=np.int64), tuple(names)
 
 
-def _coded_items(rows: pd.DataFrame, columns: list[str]) -> tuple[Integers, tuple[str, ...]]:
-    if not columns:
-        return np.zeros(len(rows), np.int64), ()
-    label = rows[columns[0]].astype(str)
-    for extra in columns[1:]:
-        label = label + "/" + rows[extra].astype(str)
-    return _coded(label, "items")
-
-
-def _refuse_empty_cells(cell: Integers, within: Sequence[str], levels: Sequence[Sequence[str]]) -> None:
+def _refuse_empty_cells(cell: Integers, factors: Sequence[str], levels: Sequence[Sequence[str]]) -> None:
     counts = np.bincount(cell, minlength=int(np.prod([len(names) for names in levels])))
     if (counts == 0).any():
         names = list(product(*levels))[int(np.flatnonzero(counts == 0)[0])]
-        where = ", ".join(f"{factor}={level}" for factor, level in zip(within, names, strict=True))
+        where = ", ".join(f"{factor}={level}" for factor, level in zip(factors, names, strict=True))
         raise InputError(f"nobody rated the cell {where}; leave out a factor or level")
+
+
+def _refuse_collinear(data: ModelData) -> None:
+    if not data.terms.covariates:
+        return
+    x = data.x
+    scaled = x / np.linalg.norm(x, axis=0)
+    if np.linalg.matrix_rank(scaled.T @ scaled, tol=1e-10) < x.shape[1]:
+        raise InputError(
+            f"the covariates {', '.join(data.terms.covariates)} are determined by the factors or by one "
+            "another; leave one out"
+        )
 
 
 def _sum_coding(levels: int) -> Floats:

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, stats
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.models.design import ModelData, Slopes, model_data, slope_groups
+from analysis.models.design import ModelData, ModelTerms, Slopes, model_data, slope_groups
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from experiments.errors import InputError
 
@@ -85,8 +86,10 @@ def fit_ordinal(
     within: Sequence[str],
     item: str | Sequence[str] | None = None,
     slopes: Slopes = "none",
+    between: Sequence[str] = (),
+    covariates: Sequence[str] = (),
 ) -> OrdinalResult:
-    """Fit ordered ratings ~ full factorial of `within` with crossed random effects (Laplace).
+    """Fit ordered ratings ~ full factorial of the factors + covariates with crossed random effects (Laplace).
 
     Parameters are those of `analysis.models.mixed.fit_mixed`; slopes of one effect share one variance over
     its orthonormal contrasts and do not correlate. Categories are the distinct ratings met, in order; a
@@ -99,7 +102,9 @@ def fit_ordinal(
     """
     if slopes == "correlated":
         raise InputError("slopes of the ordinal model do not correlate; expected all, main or none")
-    data = model_data(rows, participant, item, rating, within)
+    items = (item,) if isinstance(item, str) else tuple(item or ())
+    columns = ModelTerms(participant, rating, tuple(within), items, tuple(between), tuple(covariates))
+    data = model_data(rows, columns)
     categories, codes = np.unique(data.rating, return_inverse=True)
     if len(categories) > MAXIMUM_CATEGORIES:
         raise InputError(
@@ -109,42 +114,37 @@ def fit_ordinal(
     groups, left_out = slope_groups(data, slopes)
     ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups)
     likelihood = LaplaceLikelihood(ordinal)
-    packed, notes = _maximise(likelihood, _start(ordinal), bool(data.items))
-    value, _ = likelihood.evaluate(_unpack(packed, ordinal))
-    terms = _Terms(participant, item, rating, slopes, tuple(groups))
-    said = (*left_out, *notes, *_zero_notes(packed, groups, bool(data.items)))
-    covariance = _covariance(likelihood, packed)
-    return _result(data, ordinal, packed, value, covariance, categories, said, terms)
+    # matrices this small only wait for a second thread
+    with threadpool_limits(1, "blas"):
+        packed, notes = _maximise(likelihood, _start(ordinal), bool(items))
+        value, _ = likelihood.evaluate(_unpack(packed, ordinal))
+        covariance = _covariance(likelihood, packed)
+    said = (*data.notes, *left_out, *notes, *_zero_notes(packed, groups, bool(items)))
+    return _result(data, ordinal, packed, value, covariance, categories, said, _Terms(slopes, tuple(groups)))
 
 
 @dataclass(frozen=True)
 class _Terms:
-    """What the model is about: columns, and the effects that differ between participants."""
+    """The effects that differ between participants."""
 
-    participant: str
-    item: str | Sequence[str] | None
-    rating: str
     slopes: Slopes
     groups: tuple[str, ...]
-
-    @property
-    def item_name(self) -> str:
-        return self.item if isinstance(self.item, str) else "/".join(self.item or ())
 
 
 def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: Sequence[str]) -> OrdinalData:
     columns = np.concatenate([data.columns(group) for group in groups])
     term = np.concatenate([np.full(len(data.columns(group)), k) for k, group in enumerate(groups)])
+    people, items = data.participants, data.items
     return OrdinalData(
-        data.fixed[data.cell][:, 1:],
+        data.x[:, 1:],
         data.spread[:, columns][data.cell],
         term.astype(np.int64),
         codes,
-        data.participant,
-        data.item,
+        people.codes,
+        np.zeros(len(codes), np.int64) if items is None else items.codes,
         n_categories,
-        len(data.participants),
-        max(1, len(data.items)),
+        len(people.names),
+        1 if items is None else len(items.names),
     )
 
 
@@ -254,11 +254,11 @@ def _result(
         columns = data.columns(effect) - 1
         chi2 = float(p.beta[columns] @ np.linalg.solve(block[np.ix_(columns, columns)], p.beta[columns]))
         effects.append(OrdinalEffect(effect, chi2, len(columns), float(stats.chi2.sf(chi2, len(columns)))))
-    components = _components(p, terms, bool(data.items))
+    components = _components(p, terms, data)
     return OrdinalResult(
         formula=_formula(data, terms),
         log_likelihood=value,
-        aic=2 * (len(packed) - (not data.items)) - 2 * value,
+        aic=2 * (len(packed) - (data.items is None)) - 2 * value,
         categories=tuple(float(c) for c in categories),
         thresholds=tuple(float(t) for t in p.thresholds),
         coefficients=coefficients,
@@ -269,24 +269,26 @@ def _result(
         components=components,
         singular=any(component.sd < np.exp(ZERO_LOG_SD) for component in components),
         n_ratings=len(data.rating),
-        n_participants=len(data.participants),
-        n_items=len(data.items),
+        n_participants=len(data.participants.names),
+        n_items=len(data.items.names) if data.items else 0,
         notes=notes,
         factors=data.factors,
     )
 
 
-def _components(p: Parameters, terms: _Terms, with_items: bool) -> tuple[OrdinalComponent, ...]:
+def _components(p: Parameters, terms: _Terms, data: ModelData) -> tuple[OrdinalComponent, ...]:
     sds = np.exp(p.log_sd)
-    of_people = [
-        OrdinalComponent(terms.participant, group, float(sd))
+    found = [
+        OrdinalComponent(data.terms.participant, group, float(sd))
         for group, sd in zip(terms.groups, sds[:-1], strict=True)
     ]
-    of_items = [OrdinalComponent(terms.item_name, "intercept", float(sds[-1]))] * with_items
-    return (*of_people, *of_items)
+    if data.items is not None:
+        found.append(OrdinalComponent(data.items.name, "intercept", float(sds[-1])))
+    return tuple(found)
 
 
 def _formula(data: ModelData, terms: _Terms) -> str:
-    slopes = "".join(f" + (0 + {group} | {terms.participant})" for group in terms.groups[1:])
-    items = f" + (1 | {terms.item_name})" if data.items else ""
-    return f"{terms.rating} ~ {' * '.join(data.factors)} + (1 | {terms.participant}){slopes}{items}, logit"
+    who = data.terms.participant
+    slopes = "".join(f" + (0 + {group} | {who})" for group in terms.groups[1:])
+    items = f" + (1 | {data.items.name})" if data.items else ""
+    return f"{data.terms.rating} ~ {data.fixed_part} + (1 | {who}){slopes}{items}, logit"

@@ -62,6 +62,7 @@ def _model_arguments(analysis: Analysis) -> dict[str, Any]:
         "participant": "participant",
         "rating": "response",
         "within": list(analysis.anova.factors),
+        "between": list(analysis.anova.between.factors),
         "item": [*analysis.experiment.exemplars.own_per, "exemplar"],
     }
 
@@ -93,7 +94,6 @@ def mixed_model(analysis: Analysis) -> Section:
         f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
         f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
         f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
-        f"{_without_groups(analysis)}"
     )
     if not every:
         text += (
@@ -138,19 +138,8 @@ def ordinal_model(analysis: Analysis) -> Section:
         "Ratings as ordered categories: cumulative logit with free thresholds, participants crossed with "
         "blinks, by-participant slopes for the main effects, Laplace approximation, joint Wald tests. "
         "Without slopes of interactions their p are too small where people differ in them."
-        f"{_without_groups(analysis)}"
     )
     return Section("Ordinal mixed model", text, (table,))
-
-
-def _without_groups(analysis: Analysis) -> str:
-    """What to say where participants differ by factors that these models leave out."""
-    between = analysis.anova.between.factors
-    if not between:
-        return ""
-    return (
-        f" Groups ({', '.join(between)}) are left out of this model; `analysis mixed` takes them as factors."
-    )
 
 
 def bayes_factors(analysis: Analysis) -> Section:

@@ -25,13 +25,20 @@ class ModelInput:
 
 
 def read_model_input(
-    path: Path, participant: str, rating: str, within: Sequence[str], item: Sequence[str]
+    path: Path,
+    participant: str,
+    rating: str,
+    within: Sequence[str],
+    item: Sequence[str],
+    between: Sequence[str] = (),
+    covariates: Sequence[str] = (),
+    random: Sequence[str] = (),
 ) -> ModelInput:
     """Read one row a trial.
 
     Of an export (it has the column `kind`) only main trials count, without failed plays and runs excluded by
     hand; its factor columns are the default of `within`, its `profile_id` (the blink shown) that of `item`.
-    Other tables may have no item.
+    Other tables may have no item. Rows without a covariate are left out, and counted.
 
     Raises
     ------
@@ -41,20 +48,23 @@ def read_model_input(
     """
     header = read_text_table(path, [participant, rating]).header
     exported = "kind" in header and "profile_id" in header
-    if not within and exported:
+    if not within and exported and not between:
         within = RATINGS.factors_in_header(header)
     if not item and exported:
         item = ["profile_id"]
-    if not within:
+    if not within and not between and not covariates:
         raise InputError("--within names no column; expected e.g. --within face,blur")
-    _refuse_shared_roles(participant, rating, within, item)
-    table = read_text_table(path, [participant, rating, *within, *item], EXPORT_COLUMNS)
-    for name in (participant, *within, *item):
+    _refuse_shared_roles(participant, rating, [*within, *between, *covariates], item)
+    nested = list(dict.fromkeys(part for name in random for part in name.split("/")))
+    texts = list(dict.fromkeys((participant, *within, *between, *item, *nested)))
+    table = read_text_table(path, list(dict.fromkeys([*texts, rating, *covariates])), EXPORT_COLUMNS)
+    for name in texts:
         texts_required(table, name)
     values = numbers(table, rating)
     unusual_numbers(table, rating, values)
     _refuse_participants_as_items(table, participant, item)
-    rows = table.columns.assign(**{rating: values})
+    measured = {name: numbers(table, name) for name in covariates}
+    rows = table.columns.assign(**{rating: values}, **measured)
     keep = ~np.isnan(values)
     decisions = list(table.decisions)
     if exported:
@@ -62,6 +72,10 @@ def read_model_input(
         decisions += left_out
     if np.isnan(values).any():
         decisions.append(f"{np.isnan(values).sum()} rows without a rating left out")
+    for name, column in measured.items():
+        if (without := np.isnan(column) & keep).any():
+            decisions.append(f"{without.sum()} rows without {name} left out")
+            keep = keep & ~without
     if not keep.any():
         raise InputError(f"{path.name}: no row has a rating that counts")
     synthetic = "synthetic" in rows.columns and bool(rows["synthetic"].astype(str).isin(("1", "True")).any())

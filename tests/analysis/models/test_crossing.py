@@ -5,6 +5,7 @@ import pytest
 
 from analysis.models import crossing as module
 from analysis.models.reml import criterion, cross_products
+from analysis.models.terms import Term, intercept_term
 
 RNG = np.random.default_rng(3)
 N = 300
@@ -18,10 +19,12 @@ def test_both_forms_agree(monkeypatch) -> None:
     found = []
     for limit in (0.0, 1.0):
         monkeypatch.setattr(module, "SPARSE_BELOW", limit)
-        c = cross_products(X, X, Y, PARTICIPANT, ITEM, PATTERNS)
-        found.append((type(c.pc).__name__, criterion(c, np.array([0.7, 0.3, 0.5]))))
+        c = cross_products(X, Y, [Term(PARTICIPANT, 40, X, PATTERNS), intercept_term(ITEM, 25)])
+        found.append((type(c.crossed).__name__, criterion(c, np.array([0.7, 0.3, 0.5]))))
     (dense_name, dense), (sparse_name, sparse) = found
     assert (dense_name, sparse_name) == ("DenseCrossing", "SparseCrossing")
     assert sparse.value == pytest.approx(dense.value, rel=1e-12)
-    for name in ("gradient", "curve_at_zero", "unscaled", "participants_x", "items_x", "beta"):
+    for name in ("gradient", "curve_at_zero", "unscaled", "beta"):
         assert getattr(sparse, name) == pytest.approx(getattr(dense, name), rel=1e-8, abs=1e-10), name
+    for one, other in zip(sparse.terms_x, dense.terms_x, strict=True):
+        assert one == pytest.approx(other, rel=1e-8, abs=1e-10)

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.models.design import model_data
+from analysis.models.design import ModelTerms, model_data
 from analysis.models.mixed import fit_mixed
 from analysis.models.reml import criterion, cross_products
+from analysis.models.terms import Term, intercept_term
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "models"
@@ -71,15 +72,16 @@ def dense_criterion(x, z_person, z_item, y, lp, lam, people) -> float:
 @given(st.integers(0, 1000), st.lists(st.floats(0.0, 2.0), min_size=4, max_size=4))
 @settings(max_examples=15, deadline=None)
 def test_criterion_and_gradient_by_brute_force(seed, theta):
-    data = model_data(small_data(seed), "who", "clip", "y", ["A", "B"])
-    x, z = data.fixed[data.cell], data.spread[:, :2][data.cell]
+    data = model_data(small_data(seed), ModelTerms("who", "y", ("A", "B"), ("clip",)))
+    x, z = data.x, data.spread[:, :2][data.cell]
+    people, clips = data.groups
     patterns = np.array([[[1, 0], [0, 0]], [[0, 0], [1, 0]], [[0, 0], [0, 1]]], dtype=float)
-    c = cross_products(x, z, data.rating, data.participant, data.item, patterns)
+    c = cross_products(x, data.rating, [Term(people.codes, 6, z, patterns), intercept_term(clips.codes, 8)])
     theta = np.array(theta)
     at = criterion(c, theta)
     lp = np.tensordot(theta[:3], patterns, 1)
-    items = np.eye(data.item.max() + 1)[data.item]
-    slow = dense_criterion(x, z, items, data.rating, lp, theta[3], data.participant)
+    items = np.eye(8)[clips.codes]
+    slow = dense_criterion(x, z, items, data.rating, lp, theta[3], people.codes)
     assert at.value == pytest.approx(slow, rel=1e-10)
     for k in range(4):
         step = np.eye(4)[k] * 1e-5

@@ -1,0 +1,117 @@
+"""Columns of a long table as ratings, groupings and covariates of a mixed model."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from analysis.models.design import ModelTerms
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """What trials have in common: `codes` (n,) into the `names` of its levels; `name` is the column's."""
+
+    name: str
+    names: tuple[str, ...] = field(repr=False)
+    codes: Integers = field(repr=False)
+
+
+def refuse_unknown_columns(rows: pd.DataFrame, terms: "ModelTerms") -> None:
+    """Refuse a column that the table lacks, and a table without rows."""
+    nested = [part for name in terms.random for part in name.split("/")]
+    named = (terms.participant, terms.rating, *terms.within, *terms.between, *terms.item, *terms.covariates)
+    for name in (*named, *nested):
+        if name not in rows.columns:
+            raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
+    if rows.empty:
+        raise InputError("there are no ratings to analyse; the table has a header but no rows")
+
+
+def ratings(rows: pd.DataFrame, name: str) -> Floats:
+    """The ratings (n,); refused where they are no numbers, or all the same."""
+    values = numbers(rows, name)
+    if np.ptp(values) == 0:
+        raise InputError(f"every rating is {values[0]:g}; a model needs ratings that vary")
+    return values
+
+
+def numbers(rows: pd.DataFrame, name: str) -> Floats:
+    """A column as finite numbers (n,)."""
+    values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=np.float64)
+    if not np.isfinite(values).all():
+        bad = rows[name].iloc[int(np.flatnonzero(~np.isfinite(values))[0])]
+        raise InputError(f"expected numbers in '{name}', got {bad!r}; correct or remove the row")
+    return values
+
+
+def groupings(rows: pd.DataFrame, terms: "ModelTerms") -> tuple[Grouping, ...]:
+    """Participants, items (if any), and the further groupings.
+
+    Several columns of items together name them where one is not unique (exemplars numbered afresh within a
+    profile). `a/b` of `random` stands for a and for b within a.
+    """
+    groups = [_grouping(rows, [terms.participant], terms.participant, "participants")]
+    if terms.item:
+        groups.append(_grouping(rows, list(terms.item), "/".join(terms.item), "items"))
+    for name in terms.random:
+        parts = name.split("/")
+        for depth in range(1, len(parts) + 1):
+            label = ":".join(parts[:depth])
+            if all(group.name != label for group in groups):
+                groups.append(_grouping(rows, parts[:depth], label, f"levels of '{label}'"))
+    for k, group in enumerate(groups):
+        _refuse_same(group, groups[:k])
+    return tuple(groups)
+
+
+def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> Grouping:
+    label = rows[columns[0]].astype(str)
+    for extra in columns[1:]:
+        label = label + "/" + rows[extra].astype(str)
+    codes, names = pd.factorize(label, sort=True)
+    if len(names) < 2:
+        raise InputError(f"expected at least two {what}, got {len(names)}")
+    if len(names) == len(rows):
+        raise InputError(
+            f"every row has {what} of its own, which cannot be told from the residual; name a column whose "
+            "values come again"
+        )
+    return Grouping(name, tuple(str(text) for text in names), codes.astype(np.int64))
+
+
+def _refuse_same(group: Grouping, before: list[Grouping]) -> None:
+    for other in before:
+        pairs = len(np.unique(group.codes * len(other.names) + other.codes))
+        if pairs == len(group.names) == len(other.names):
+            raise InputError(
+                f"'{group.name}' groups the rows as '{other.name}' does; one of the two is enough"
+            )
+
+
+def covariate_columns(
+    rows: pd.DataFrame, terms: "ModelTerms", people: Integers
+) -> tuple[Floats, tuple[str, ...]]:
+    """Covariates (n, k) centred, and what was done.
+
+    Those with one value for each participant are centred at the mean over participants, others over rows.
+    """
+    columns, said = [np.empty((len(rows), 0))], []
+    for name in terms.covariates:
+        values = numbers(rows, name)
+        if np.ptp(values) == 0:
+            raise InputError(f"the covariate '{name}' is {values[0]:g} in every row; leave it out")
+        each = pd.DataFrame({"who": people, "value": values}).groupby("who")["value"]
+        of_people = bool((each.nunique() == 1).all())
+        mean = float(each.first().mean() if of_people else values.mean())
+        columns.append((values - mean)[:, None])
+        said.append(f"{name} centred at its mean over {'participants' if of_people else 'rows'}, {mean:.6g}")
+    return np.hstack(columns), tuple(said)

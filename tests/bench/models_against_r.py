@@ -1,0 +1,86 @@
+"""Mixed and ordinal models and the ANOVA against R's own calls, on data that R's packages ship, in one run.
+
+    PYTHONPATH=. python tests/bench/models_against_r.py
+
+Prints CPU seconds of both, their ratio (above 1: faster than R) and how much the likelihoods differ. lmer
+fits without tests; ours with Satterthwaite's. Needs Rscript with afex, lme4, lmerTest, ordinal and jsonlite.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.models.mixed import fit_mixed
+from analysis.models.ordinal import fit_ordinal
+from analysis.read.participant_columns import design_of
+from analysis.within.anova import linear_anova
+from analysis.within.cell_means import cell_table
+
+REPEATS = 3
+
+
+def fits(folder: Path) -> dict[str, Callable[[], float]]:
+    """Our calls, by the names of R's; each gives its REML criterion or log-likelihood."""
+    ks, fhch, insteval, obk, factorial = (
+        pd.read_csv(folder / f"{name}.csv") for name in ("ks", "fhch", "insteval", "obk", "factorial")
+    )
+    of_ks = ("id", "response", ["validity", "believability"], "content")
+    factors = ["stimulus", "density", "frequency"]
+    return {
+        "ks": lambda: fit_mixed(ks, *of_ks, "main").reml_criterion,
+        "fhch": lambda: fit_mixed(fhch, "id", "log_rt", factors, "item", "main").reml_criterion,
+        "insteval": lambda: fit_mixed(insteval, "s", "y", ["service"], "d", "none").reml_criterion,
+        "clmm": lambda: fit_ordinal(ks, *of_ks).log_likelihood,
+        "factorial": lambda: anova(factorial, "id", "rating", ["a", "b", "c", "d"]),
+        "anova": lambda: anova(obk, "id", "value", ["phase", "hour"], ["treatment", "gender"]),
+    }
+
+
+def anova(rows: pd.DataFrame, who: str, rating: str, within: list[str], between: Sequence[str] = ()) -> float:
+    """What afex's call does: from long rows to every effect's tests."""
+    cells = cell_table(rows, who, rating, within)
+    text = rows.assign(**{who: rows[who].astype(str)}) if between else rows
+    design = design_of(text, who, cells.participants, between, [])
+    linear_anova(cells.y, cells.factors, cells.levels, design, 3, 0.95)
+    return 0.0
+
+
+def cpu(call: Callable[[], float]) -> tuple[float, float]:
+    """The least CPU seconds of some calls, and what they gave."""
+    call()
+    least = np.inf
+    for _ in range(REPEATS):
+        start = time.process_time()
+        value = call()
+        least = min(least, time.process_time() - start)
+    return float(least), value
+
+
+def main() -> None:
+    """Time both, and print a table."""
+    r = shutil.which("Rscript")
+    if r is None:
+        sys.stdout.write("models against R: no Rscript on the PATH, nothing measured\n")
+        return
+    with tempfile.TemporaryDirectory() as name:
+        script = Path(__file__).with_suffix(".R")
+        subprocess.run([r, "--vanilla", str(script), name], check=True, capture_output=True)
+        times = json.loads((Path(name) / "times.json").read_text(encoding="utf-8"))
+        sys.stdout.write(f"{'model':10} {'R CPU s':>8} {'ours':>8} {'ratio':>7} {'likelihood - R':>15}\n")
+        for model, call in fits(Path(name)).items():
+            seconds, value = cpu(call)
+            theirs = times[model]
+            ratio, apart = theirs["cpu"] / seconds, value - theirs["value"]
+            sys.stdout.write(f"{model:10} {theirs['cpu']:8.3f} {seconds:8.4f} {ratio:7.1f} {apart:15.6f}\n")
+
+
+if __name__ == "__main__":
+    main()
