@@ -16,9 +16,10 @@ from pydantic_core import PydanticUndefined
 
 from experiments.base import Language, LevelName, Name
 from experiments.definition import Experiment
+from experiments.definition.forms import Form, Question
 from experiments.load import parse_experiment
 from experiments.rendering import ProfileName
-from experiments.schema.keys import Key, is_tag, keys
+from experiments.schema.keys import Key, is_tag, keys, models_inside
 from experiments.trials import KINDS
 from experiments.trials.kind import TrialDeclaration
 
@@ -29,7 +30,7 @@ LONGEST_EXAMPLE = 70
 INTRODUCTION = """\
 A study is declared in one TOML file. `stimuli plan FILE` says what it expands to, and names mistakes
 with their line. `experiments/exp1.toml` is a whole study to start from; [every-key.toml](every-key.toml)
-sets every key, and the examples below are taken from it. A key that may be left out has a default;
+sets most keys, and most examples below are taken from it. A key that may be left out has a default;
 times, sizes and counts carry their unit in the name or in the meaning. A text in several languages is a
 table: `{ en = "...", de = "..." }`.
 """
@@ -203,6 +204,9 @@ class Examples:
         for kind in KINDS.values():
             for text in (kind.example, *kind.further_examples):
                 self._collect(kind.declaration.model_validate(tomllib.loads(text)["trial"]), "trial.")
+        for field in models_inside(Form.model_fields["fields"].annotation):
+            if issubclass(field, Question) and field.example:
+                self._collect(field.model_validate(tomllib.loads(field.example)), "forms.fields.")
 
     def _collect(self, value: Any, path: str) -> None:
         if isinstance(value, BaseModel):

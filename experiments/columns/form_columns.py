@@ -5,19 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from experiments.columns.column import Column
-from experiments.columns.names import plain_name, unlike
+from experiments.columns.names import unlike
 from experiments.columns.runs import FORMS, RUN_COLUMNS
 from experiments.definition import Experiment
-from experiments.definition.forms import (
-    ChoiceField,
-    Form,
-    FormField,
-    LikertField,
-    MultipleChoiceField,
-    NumberField,
-    TextField,
-    is_empty,
-)
+from experiments.definition.forms import Form, FormField, is_empty
 
 PREFIX = "form_"
 """No column of runs or answers begins so, nor can a factor's name be taken for one."""
@@ -65,35 +56,8 @@ def run_columns(forms: Iterable[FormColumn]) -> list[Column]:
 
 def _of_field(form: Form, field: FormField, language: str) -> Iterator[FormColumn]:
     asked = field.label.get(language) or next(iter(field.label.values()))
-    name = f"{PREFIX}{form.name}_{field.name}"
-    if isinstance(field, MultipleChoiceField):
-        for option in field.options:
-            said = option.label.get(language, option.value)
-            column = Column(
-                f"{name}_{plain_name(option.value)}",
-                "boolean",
-                f"{asked} Whether chosen: {said}.",
-                labels=(("0", "not chosen"), ("1", "chosen")),
-            )
-            yield FormColumn(column, form.name, field.name, option.value)
-        return
-    yield FormColumn(_single(field, name, asked, language), form.name, field.name)
-
-
-def _single(field: FormField, name: str, asked: str, language: str) -> Column:
-    match field:
-        case TextField():
-            return Column(name, "text", asked, identifying=True)
-        case NumberField():
-            return Column(name, "integer", asked, minimum=field.minimum, maximum=field.maximum)
-        case ChoiceField():
-            labels = tuple((one.value, one.label.get(language, one.value)) for one in field.options)
-            return Column(name, "text", asked, values=field.values, labels=labels)
-        case LikertField():
-            ends = (("1", field.low.get(language, "")), (str(field.points), field.high.get(language, "")))
-            return Column(name, "integer", asked, minimum=1, maximum=field.points, labels=ends)
-        case MultipleChoiceField():  # has a column an option
-            raise AssertionError(name)
+    for option, column in field.columns(f"{PREFIX}{form.name}_{field.name}", asked, language).items():
+        yield FormColumn(column, form.name, field.name, option)
 
 
 def _united(before: FormColumn | None, after: FormColumn) -> FormColumn:

@@ -1,7 +1,8 @@
 """Questionnaires declared with the experiment: demographics before, comments after.
 
-A type of field is a module here, with its check of an answer and the answer that a simulated person gives,
-and its place in the union; the page draws it in `frontend/src/participant/screens`.
+A type of field is a module here, with its check of an answer, the answer that a simulated person gives, its
+columns and an example, and its place in the union; the page draws it by the module of its name in
+`frontend/src/participant/screens/fields`.
 """
 
 from typing import Annotated, Literal

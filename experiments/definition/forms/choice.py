@@ -1,10 +1,12 @@
 """One of several answers."""
 
 import random
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from experiments.columns.column import Column
 from experiments.definition.forms.option import Option, among
 from experiments.definition.forms.question import Question
 
@@ -30,3 +32,8 @@ class ChoiceField(Question):
     def simulated(self, rng: random.Random, /) -> str:
         """Any option."""
         return rng.choice(self.options).value
+
+    def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
+        """The option's value."""
+        labels = tuple((one.value, one.label.get(language, one.value)) for one in self.options)
+        return {None: Column(name, "text", asked, values=self.values, labels=labels)}

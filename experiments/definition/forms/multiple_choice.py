@@ -1,10 +1,13 @@
 """Any of several answers."""
 
 import random
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from experiments.columns.column import Column
+from experiments.columns.names import plain_name
 from experiments.definition.forms.option import Option, among
 from experiments.definition.forms.question import Question
 
@@ -18,6 +21,17 @@ class MultipleChoiceField(Question):
     """The answers, in the order in which they are listed; any number of them may be chosen."""
 
     screened_by: ClassVar = "options"
+    example: ClassVar = """\
+type = "multiple_choice"
+name = "noticed"
+label = { en = "What did you look at?", de = "Worauf haben Sie geachtet?" }
+help = { en = "Any number of answers", de = "Beliebig viele Antworten" }
+required = false
+options = [
+    { value = "speed", label = { en = "Speed", de = "Geschwindigkeit" } },
+    { value = "closure", label = { en = "How far the eye closed", de = "Wie weit sich das Auge schloss" } },
+]
+"""
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -32,3 +46,15 @@ class MultipleChoiceField(Question):
     def simulated(self, rng: random.Random, /) -> list[str]:
         """Any one option."""
         return [rng.choice(self.options).value]
+
+    def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
+        """Of each option, whether it was chosen."""
+        return {
+            one.value: Column(
+                f"{name}_{plain_name(one.value)}",
+                "boolean",
+                f"{asked} Whether chosen: {one.label.get(language, one.value)}.",
+                labels=(("0", "not chosen"), ("1", "chosen")),
+            )
+            for one in self.options
+        }

@@ -1,8 +1,10 @@
 """A whole number within limits."""
 
 import random
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
+from experiments.columns.column import Column
 from experiments.definition.forms.question import Question
 from experiments.definition.forms.whole_number import whole_number
 
@@ -25,3 +27,8 @@ class NumberField(Question):
     def simulated(self, rng: random.Random, /) -> int:
         """A number of the lower end of the range, where ages are likely."""
         return rng.randint(self.minimum, min(self.maximum, self.minimum + 60))
+
+    def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
+        """The number."""
+        del language
+        return {None: Column(name, "integer", asked, minimum=self.minimum, maximum=self.maximum)}

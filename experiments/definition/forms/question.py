@@ -2,9 +2,11 @@
 
 import random
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from experiments.base import Declaration, Name, Translated
+from experiments.columns.column import Column
 
 
 class Question(Declaration):
@@ -21,6 +23,8 @@ class Question(Declaration):
 
     screened_by: ClassVar[Literal["limits", "options"] | None] = None
     """By what a [[screening]] rule may refuse an answer: `below` and `above`, `refused`, or not at all."""
+    example: ClassVar[str] = ""
+    """A field of this type as TOML, for the reference; empty where docs/reference/every-key.toml has one."""
 
     def problem(self, value: object) -> str | None:
         """What is wrong with an answer, expected and got; None where nothing is."""
@@ -40,6 +44,13 @@ class Question(Declaration):
     @abstractmethod
     def simulated(self, rng: random.Random, /) -> Any:
         """An answer that a simulated person gives."""
+
+    @abstractmethod
+    def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
+        """The columns of its answers: one, for None, or one an option where several may be chosen.
+
+        name: of the column, and how those of options begin. asked: the question in `language`.
+        """
 
 
 def is_empty(value: object) -> bool:

@@ -1,10 +1,12 @@
 """Free text."""
 
 import random
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from experiments.columns.column import Column
 from experiments.definition.forms.question import Question
 
 
@@ -23,3 +25,8 @@ class TextField(Question):
     def simulated(self, _rng: random.Random, /) -> str:
         """A word that says where it comes from."""
         return "simulated"[: self.max_length]
+
+    def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
+        """The text, by which people may be known."""
+        del language
+        return {None: Column(name, "text", asked, identifying=True)}

@@ -1,13 +1,13 @@
 /** A declared questionnaire on one page. */
 import type { Form } from "../../api/schema";
-import type { FormAnswers } from "./fields";
 import { pick } from "../../i18n";
 import { h } from "../../ui/element";
 import { alertLine, button, showPage, statusLine } from "../../ui/page";
 import { placed } from "../flow/placed";
 import { plugin, OBJECT, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
-import { fieldView, type FieldView } from "./fields";
+import { typeOf } from "./fields/field";
+import { fieldView, type FieldView, type FormAnswers } from "./question";
 import { saveShown, stopButton } from "./support";
 
 interface Parameters {
@@ -28,14 +28,13 @@ export function formPage(session: Session): PluginClass<Parameters> {
     data: { answers: { type: OBJECT, description: "answers by field name, null where left open" } },
     show: (display, { form, eyebrow }) => new Promise((resolve) => showForm(session, display, form, eyebrow, resolve)),
     async simulate({ form }) {
-      const { simulatedAnswer } = await import("./simulated-form");
-      const answers = Object.fromEntries(form.fields.map((field) => [field.name, simulatedAnswer(field)]));
+      const answers = Object.fromEntries(form.fields.map((field) => [field.name, typeOf(field).simulated(field)]));
       const outcome = await session.api.form(form.name, answers);
       if (outcome.accepted) placed(session.run, outcome.body);
       return { answers };
     },
     async act(display) {
-      (await import("./simulated-form")).fillIn(display);
+      (await import("./fill-in")).fillIn(display);
       display.querySelector<HTMLButtonElement>(".primary")?.click();
     },
   });

@@ -39,34 +39,11 @@ from server.results.repository import Pool  # noqa: E402
 from server.settings import Settings  # noqa: E402
 from server.simulation.person import Person, Rater  # noqa: E402
 from server.studies.lookup import active_definition, active_version, find_study  # noqa: E402
+from tests.experiments.trials.toy.api import Api  # noqa: E402
 from tests.helpers.studies import SHORT, add_study  # noqa: E402
 
 TEXT = SHORT[: SHORT.index("[trial]")] + TOY.example + SHORT[SHORT.index("[[exclusions]]") :]
 PEOPLE = 3
-
-
-class Api:
-    """The client that a simulated person speaks through."""
-
-    token = ""
-
-    def __init__(self, client: TestClient) -> None:
-        self._client = client
-
-    def get(self, path: str) -> Any:
-        return self._send("GET", path)
-
-    def put(self, path: str, body: Any = None) -> Any:
-        return self._send("PUT", path, body)
-
-    def post(self, path: str, body: Any = None) -> Any:
-        return self._send("POST", path, body)
-
-    def _send(self, method: str, path: str, body: Any = None) -> Any:
-        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
-        answer = self._client.request(method, path, json=body, headers=headers)
-        assert answer.status_code < 300, answer.text
-        return answer.json()
 
 
 def main(folder: Path) -> dict[str, Any]:

@@ -1,0 +1,21 @@
+/** A rating with labelled ends. */
+import { pick } from "../../../i18n";
+import { h } from "../../../ui/element";
+import type { TypeOfField } from "./field";
+
+export const type: TypeOfField<"likert"> = {
+  control({ field: { points, low, high }, language, id: name }) {
+    const inputs = Array.from({ length: points }, (_, place) => h("input", { type: "radio", name, value: place + 1 }));
+    const steps = inputs.map((input, place) => h("label", { class: "step" }, input, h("span", {}, place + 1)));
+    const node = h(
+      "div",
+      { class: "likert" },
+      h("span", { class: "end" }, pick(low, language)),
+      h("div", { class: "steps" }, ...steps),
+      h("span", { class: "end" }, pick(high, language)),
+    );
+    const answer = (): number | null => Number(inputs.find((input) => input.checked)?.value ?? 0) || null;
+    return { node, grouped: true, answer, fault: () => null };
+  },
+  simulated: ({ points }) => Math.ceil(points / 2),
+};

@@ -1,0 +1,184 @@
+"""A type of scale, a type of field and a language as one would add them: new files, and edits of others."""
+
+from typing import NamedTuple
+
+
+class Edit(NamedTuple):
+    """A text of an existing file, and what stands there afterwards."""
+
+    before: str
+    after: str
+
+
+MAGNITUDE = '''\
+"""A number that is typed: magnitude estimation."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.base import Translated
+from experiments.trials.clip_rating.scales.scale import Scale
+
+
+class Magnitude(Scale):
+    """A number typed into a box, from 0 to `maximum`."""
+
+    type: Literal["magnitude"] = "magnitude"
+    """Names this type of scale."""
+    minimum: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    """The smallest number that is taken."""
+    maximum: Annotated[float, Field(gt=0, le=1e6)] = 1000.0
+    """The largest number that is taken."""
+    unit: Translated
+    """What stands behind the box."""
+
+    @property
+    def lowest(self) -> float:
+        """The smallest number."""
+        return self.minimum
+
+    @property
+    def highest(self) -> float:
+        """The largest number."""
+        return self.maximum
+
+    @property
+    def ends(self) -> tuple[Translated, Translated]:
+        """The unit, at both ends."""
+        return (self.unit, self.unit)
+
+    def texts(self) -> Iterator[tuple[str, Translated]]:
+        """The unit too."""
+        yield from super().texts()
+        yield "unit", self.unit
+'''
+
+MAGNITUDE_WIDGET = """\
+/** A number that is typed. */
+import { pick } from "../../../i18n";
+import { h } from "../../../ui/element";
+import type { Ask, Widget } from "../clip_rating/widget";
+
+export function widget({ scale, question, language, choose, enter }: Ask): Widget {
+  if (scale.type !== "magnitude") throw new Error(`expected a magnitude, got ${scale.type}`);
+  const input = h("input", { type: "text", inputmode: "numeric", "aria-labelledby": question });
+  input.addEventListener("input", (event) => choose(Number(input.value), event.timeStamp));
+  input.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") enter();
+  });
+  return {
+    parts: [input, h("span", {}, pick(scale.unit, language))],
+    settles: false,
+    show: (value) => void (input.value = value === null ? "" : String(value)),
+    pressed: () => null,
+    focus: () => input.focus(),
+  };
+}
+"""
+
+SCALE: dict[str, str | Edit] = {
+    "experiments/trials/clip_rating/scales/magnitude.py": MAGNITUDE,
+    "experiments/trials/clip_rating/scales/__init__.py": Edit(
+        "AnyScale = Annotated[Points |",
+        "from experiments.trials.clip_rating.scales.magnitude import Magnitude  # noqa: E402\n\n"
+        "AnyScale = Annotated[Magnitude | Points |",
+    ),
+    "frontend/src/participant/trials/scales/magnitude.ts": MAGNITUDE_WIDGET,
+    "experiments/trials/clip_rating/__init__.py": Edit(
+        'not_applicable = { en = "I cannot say" }\n',
+        'not_applicable = { en = "I cannot say" }\n\n[[trial.scales]]\nname = "speed"\ntype = "magnitude"\n'
+        'minimum = 0.0\nmaximum = 500.0\nunit = { en = "ms" }\nreverse = false\n'
+        'question = { en = "How long did it take?" }\nnot_applicable = { en = "I cannot say" }\n',
+    ),
+    "docs/trials/clip_rating.md": Edit(
+        "| `slider` | a line", "| `magnitude` | a number that is typed |\n| `slider` | a line"
+    ),
+}
+
+DECIMAL = '''\
+"""A number with a fraction."""
+
+import random
+from collections.abc import Mapping
+from typing import ClassVar, Literal
+
+from experiments.columns.column import Column
+from experiments.definition.forms.question import Question
+
+
+class DecimalField(Question):
+    """A number with a fraction, such as a dioptre."""
+
+    type: Literal["decimal"] = "decimal"
+    """Names this type of field."""
+    minimum: float
+    """Smallest answer taken."""
+    maximum: float
+    """Largest answer taken."""
+
+    screened_by: ClassVar = "limits"
+    example: ClassVar = """\\
+type = "decimal"
+name = "dioptres"
+label = { en = "How strong are your glasses?" }
+help = { en = "In dioptres" }
+required = false
+minimum = -20.0
+maximum = 20.0
+"""
+
+    def _problem(self, value: object) -> str | None:
+        fits = isinstance(value, int | float) and self.minimum <= value <= self.maximum
+        return None if fits else f"expected a number from {self.minimum} to {self.maximum}, got {value!r}"
+
+    def simulated(self, rng: random.Random, /) -> float:
+        """Any number of them."""
+        return round(rng.uniform(self.minimum, self.maximum), 2)
+
+    def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
+        """The number."""
+        return {None: Column(name, "number", asked, minimum=self.minimum, maximum=self.maximum)}
+'''
+
+DECIMAL_CONTROL = """\
+/** A number with a fraction. */
+import { h } from "../../../ui/element";
+import type { TypeOfField } from "./field";
+
+export const type: TypeOfField<"decimal"> = {
+  control({ field: { minimum, maximum }, t, id }) {
+    const node = h("input", { id, type: "text", inputmode: "decimal", class: "short" });
+    const answer = (): number | null => (node.value.trim() === "" ? null : Number(node.value));
+    const good = (value: number | null): boolean => value === null || (value >= minimum && value <= maximum);
+    const fault = (): string | null => (good(answer()) ? null : t("form_number", { minimum, maximum }));
+    return { node, grouped: false, answer, fault };
+  },
+  simulated: ({ minimum }) => minimum,
+};
+"""
+
+FIELD: dict[str, str | Edit] = {
+    "experiments/definition/forms/decimal.py": DECIMAL,
+    "experiments/definition/forms/__init__.py": Edit(
+        "FormField = Annotated[\n",
+        "from experiments.definition.forms.decimal import DecimalField  # noqa: E402\n\n"
+        "FormField = Annotated[\n    DecimalField |\n",
+    ),
+    "frontend/src/participant/screens/fields/decimal.ts": DECIMAL_CONTROL,
+}
+
+SWEDISH = """\
+/** Swedish, one sentence of it. */
+import { messages as english, type Messages } from "./en";
+
+export const messages: Messages = { ...english, continue: "Fortsätt" };
+"""
+
+LANGUAGE: dict[str, str | Edit] = {
+    "frontend/src/i18n/languages/sv.ts": SWEDISH,
+    "frontend/src/i18n/reviewed.ts": Edit(
+        'on: "2026-11-21" } };', 'on: "2026-11-21" }, sv: { by: "a reader", on: "2026-11-22" } };'
+    ),
+}

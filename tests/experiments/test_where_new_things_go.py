@@ -1,0 +1,117 @@
+"""What a new type of scale, type of field or language costs in files, shown on a copy of the tree.
+
+Generated files (`make docs`, `npm run api`) are not counted; docs/architecture.md has the numbers.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import REPOSITORY
+from tests.experiments.additions.added import FIELD, LANGUAGE, SCALE, Edit
+
+FRONTEND = REPOSITORY / "frontend"
+COPIED = ("experiments", "server", "analysis", "migrations", "tests", "tools", "docs", "blink_engine")
+NOT_COPIED = ("node_modules", "dist", "__pycache__", "backups", "databases", "browser", "decisions", "*.png")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (FRONTEND / "node_modules").is_dir(), reason="npm packages are not here: run `make test`"
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The tree with all three added."""
+    folder = tmp_path_factory.mktemp("tree")
+    left_out = shutil.ignore_patterns(*NOT_COPIED)
+    for name in (*COPIED, "frontend"):
+        shutil.copytree(REPOSITORY / name, folder / name, ignore=left_out)
+    for name in ("pyproject.toml", "alembic.ini"):
+        shutil.copy(REPOSITORY / name, folder)
+    (folder / "frontend" / "node_modules").symlink_to(FRONTEND / "node_modules")
+    (folder / ".venv").symlink_to(Path(sys.prefix))
+    for addition in (SCALE, FIELD, LANGUAGE):
+        add(folder, addition)
+    return folder
+
+
+def add(folder: Path, addition: dict[str, str | Edit]) -> None:
+    """Write the new files and make the edits."""
+    for name, content in addition.items():
+        path = folder / name
+        assert path.exists() == isinstance(content, Edit), name
+        if isinstance(content, Edit):
+            text = path.read_text(encoding="utf-8")
+            assert text.count(content.before) == 1, name
+            content = text.replace(*content)
+        path.write_text(content, encoding="utf-8")
+
+
+def ran(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    """A command in the copy, whose packages come before those that are installed."""
+    root = folder.parent if folder.name == "frontend" else folder
+    environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def test_the_numbers_of_files_are_those_promised() -> None:
+    page = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    for row, addition, most in (
+        ("type of scale", SCALE, 5),
+        ("field type", FIELD, 3),
+        ("language", LANGUAGE, 2),
+    ):
+        changed = sum(isinstance(content, Edit) for content in addition.values())
+        assert len(addition) <= most, row
+        [line] = [line for line in page.splitlines() if line.startswith(f"| {row}")]
+        assert line.split("|")[-2].strip().startswith(f"{changed} changed, {len(addition) - changed} new")
+
+
+def test_the_added_types_are_declared_answered_exported_and_analysed(copy: Path, tmp_path: Path) -> None:
+    done = ran(copy, sys.executable, "-m", "tests.experiments.additions.whole", str(tmp_path))
+    assert done.returncode == 0, done.stderr[-3000:]
+    seen = json.loads(done.stdout)
+    assert len(seen["responses"]) == 3 * 10
+    assert all(10 <= number <= 500 for number in seen["responses"])
+    assert len(seen["dioptres"]) == 3
+    assert all(-20 <= number <= 20 for number in seen["dioptres"])
+    assert "Scale: 10 (ms) to 500 (ms). Question: How long did it take?" in seen["codebook"]
+    assert "report.html" in seen["report"]
+
+
+def test_the_added_types_have_their_examples_and_effects(copy: Path) -> None:
+    tests = ("tests/experiments/test_reference.py", "tests/experiments/schema/test_difference.py")
+    done = ran(copy, sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests)
+    assert done.returncode == 0, done.stdout[-3000:]
+
+
+def test_the_pages_know_all_three_once_types_are_generated(copy: Path) -> None:
+    frontend = copy / "frontend"
+    made = ran(frontend, "npm", "run", "--silent", "api")
+    assert made.returncode == 0, made.stderr
+    checked = ran(frontend, "npm", "run", "--silent", "typecheck")
+    assert checked.returncode == 0, checked.stdout
+    tested = ran(frontend, "npx", "vitest", "run", "tests/unit/types.test.ts", "tests/unit/texts.test.ts")
+    assert tested.returncode == 0, tested.stdout[-3000:]
+    language = frontend / "src" / "i18n" / "languages" / "sv.ts"
+    language.write_text(language.read_text().replace("...english, ", ""), encoding="utf-8")
+    (frontend / "src/participant/trials/scales/magnitude.ts").unlink()
+    (frontend / "src/participant/screens/fields/decimal.ts").unlink()
+    checked = ran(frontend, "npm", "run", "--silent", "typecheck")
+    assert re.search(r"languages/sv\.ts\S*: error TS\d+: .*missing the following properties", checked.stdout)
+    tested = ran(frontend, "npx", "vitest", "run", "tests/unit/types.test.ts")
+    assert tested.returncode != 0
+    shown = tested.stdout + tested.stderr
+    assert "decimal" in shown
+    assert "magnitude" in shown
