@@ -3,11 +3,14 @@
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from analysis.commands.output import JsonOption, save_json, saying, show_tables
+
+if TYPE_CHECKING:
+    from analysis.thresholds.people import Answers
 
 
 class FunctionChoice(StrEnum):
@@ -42,6 +45,12 @@ def thresholds(
     by: Annotated[
         str | None, typer.Option(help="Column of a condition: each of its levels is fitted.")
     ] = None,
+    second: Annotated[
+        str | None,
+        typer.Option(
+            help="Column of a second stimulus variable, a number: the threshold is a straight line over it."
+        ),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Psychometric functions: thresholds with profile likelihood intervals.
@@ -53,6 +62,8 @@ def thresholds(
       analysis thresholds trials.csv --x duration --response correct --guess 0.5 --participant id
 
       analysis thresholds trials.csv --x contrast --function weibull --lapse fit --by eye
+
+      analysis thresholds trials.csv --x duration --second asymmetry --response correct --participant id
     """
     from analysis.report.threshold_tables import people_table, threshold_table, threshold_text
     from analysis.thresholds.people import fit_thresholds, read_answers
@@ -62,13 +73,42 @@ def thresholds(
         raise InputError(f"expected --guess from 0 to below 1, got {guess:g}")
     upper = _lapse(lapse, guess)
     with saying("reading trials"):
-        answers = read_answers(file, x, response, participant, by)
+        answers = read_answers(file, x, response, participant, by, second)
+    if second is not None:
+        _planes(answers, function, guess, upper, (x, second), file.stem, json)
+        return
     with saying("fitting"):
         result = fit_thresholds(answers, function.value, guess, upper)
     typer.echo(threshold_text(result, file.stem, answers.synthetic))
     show_tables(threshold_table(result, file.stem, answers.synthetic))
     if result.people:
         show_tables(people_table(result, file.stem, answers.synthetic))
+    save_json(json, asdict(result), answers.synthetic)
+
+
+def _planes(
+    answers: "Answers",
+    function: FunctionChoice,
+    guess: float,
+    lapse: float | None,
+    variables: tuple[str, str],
+    name: str,
+    json: Path | None,
+) -> None:
+    """Fit the threshold over a second variable, for each condition and person, and show it."""
+    from analysis.report.plane_tables import plane_tables, plane_text
+    from analysis.thresholds.plane_people import fit_planes
+    from experiments.errors import InputError
+
+    if function is FunctionChoice.WEIBULL:
+        raise InputError("--second: expected --function normal or logistic, whose thresholds may pass 0")
+    if lapse is None:
+        raise InputError("--second: expected --lapse as a number; it is not fitted beside a tilt")
+    with saying("fitting"):
+        result = fit_planes(answers, function.value, guess, lapse)
+    typer.echo(plane_text(result, variables, name, answers.synthetic))
+    for table in plane_tables(result, variables, name, answers.synthetic):
+        show_tables(table)
     save_json(json, asdict(result), answers.synthetic)
 
 

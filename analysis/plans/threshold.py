@@ -1,11 +1,12 @@
 """The analysis of thresholds: a psychometric function for each series and person, and series compared."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
@@ -21,7 +22,7 @@ from experiments.errors import InputError
 from experiments.trials.threshold.answer import CODES
 from experiments.trials.threshold.columns import THRESHOLDS
 from experiments.trials.threshold.declaration import Threshold, YesNo, threshold_of
-from experiments.trials.threshold.grid import series_of
+from experiments.trials.threshold.grid import seconds, series_of
 
 READING = Reading(THRESHOLDS, texts=("response", "series", "interval"), numbers=("value",))
 
@@ -39,7 +40,10 @@ class SeriesFit:
 
 @dataclass(frozen=True)
 class Difference:
-    """Thresholds of two series compared within people (paired t); p corrected by Holm over all pairs."""
+    """An estimate of two series compared; p corrected by Holm over all pairs of series.
+
+    Within people by a paired t test; between groups of people by Welch's, whose df are no whole number.
+    """
 
     first: str
     second: str
@@ -48,9 +52,10 @@ class Difference:
     ci_low: float
     ci_high: float
     t: float
-    df: int
+    df: float
     p: float
     p_holm: float
+    what: str = "threshold"
 
 
 def numbered(rows: pd.DataFrame) -> pd.DataFrame:
@@ -72,10 +77,14 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
 
 def analyse(prepared: Prepared) -> Contents:
     """Every series over all people and of each person, and series compared."""
+    if threshold_of(prepared.experiment).stimulus.second:
+        from analysis.plans.threshold_plane import analyse as analyse_plane
+
+        return analyse_plane(prepared)
     from analysis.report.threshold_contents import contents_of
 
     fits = fits_of(prepared)
-    return contents_of(prepared, fits, differences(fits))
+    return contents_of(prepared, fits, differences([(fit.label, _thresholds(fit)) for fit in fits]))
 
 
 def series_labels(experiment: Experiment) -> dict[str, str]:
@@ -88,22 +97,44 @@ def series_labels(experiment: Experiment) -> dict[str, str]:
     }
 
 
-def fits_of(prepared: Prepared) -> tuple[SeriesFit, ...]:
-    """The fits of every series that has answers, in declared order."""
-    trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
-    rows = prepared.rows
+def answers_of(prepared: Prepared) -> dict[str, Answers]:
+    """The answers of every series that has some, by name in declared order; 1 is yes, or right."""
+    trial, rows = threshold_of(prepared.experiment), prepared.rows
     seen = (rows["said"] == "yes").to_numpy()
     if not isinstance(trial.task, YesNo):
         seen = (rows["said"] == rows["interval"].astype(str)).to_numpy()
-    fits = []
-    for name, label in labels.items():
-        mine = (rows["series"] == name).to_numpy()
+    across = _seconds(prepared)
+    made = {}
+    for one in series_of(prepared.experiment):
+        mine = (rows["series"] == one.name).to_numpy()
         if mine.any():
-            people = rows["participant"].astype(str).to_numpy(dtype=object)[mine]
-            x, y = rows["value"].to_numpy(dtype=float)[mine], seen[mine].astype(float)
-            answers = Answers(x, y, people, None, prepared.source, prepared.synthetic, ())
-            fits.append(_fit(name, label, answers, trial))
-    return tuple(fits)
+            made[one.name] = Answers(
+                rows["value"].to_numpy(dtype=float)[mine],
+                seen[mine].astype(float),
+                rows["participant"].astype(str).to_numpy(dtype=object)[mine],
+                None,
+                prepared.source,
+                prepared.synthetic,
+                (),
+                None if across is None else across[mine],
+            )
+    return made
+
+
+def _seconds(prepared: Prepared) -> NDArray[np.float64] | None:
+    """The number along the second factor of each row; None where there is none."""
+    second = threshold_of(prepared.experiment).stimulus.second
+    if second is None:
+        return None
+    number = {level: value for value, level in seconds(prepared.experiment).items()}
+    refuse_unknown(prepared.rows, second.factor, list(number), f"level of {second.factor}", prepared.source)
+    return prepared.rows[second.factor].map(number).to_numpy(dtype=float)
+
+
+def fits_of(prepared: Prepared) -> tuple[SeriesFit, ...]:
+    """The fits of every series that has answers, in declared order."""
+    trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
+    return tuple(_fit(name, labels[name], answers, trial) for name, answers in answers_of(prepared).items())
 
 
 def _fit(name: str, label: str, answers: Answers, trial: Threshold) -> SeriesFit:
@@ -115,21 +146,35 @@ def _fit(name: str, label: str, answers: Answers, trial: Threshold) -> SeriesFit
     return SeriesFit(name, label, trials, result, None)
 
 
-def differences(fits: tuple[SeriesFit, ...]) -> tuple[Difference, ...]:
-    """Paired t tests between series, over the people who have a threshold in both."""
-    made = []
-    for one, other in combinations(fits, 2):
-        first, second = _thresholds(one), _thresholds(other)
-        both = sorted(first.keys() & second.keys())
-        gaps = np.array([first[who] - second[who] for who in both])
-        if len(both) < 2 or not np.ptp(gaps) > 0:
-            continue
-        test = stats.ttest_1samp(gaps, 0.0)
-        low, high = test.confidence_interval(0.95)
-        numbers = (float(gaps.mean()), float(low), float(high), float(test.statistic), len(both) - 1)
-        made.append((one.label, other.label, len(both), *numbers, float(test.pvalue)))
+def differences(
+    series: Sequence[tuple[str, Mapping[str, float]]], what: str = "threshold"
+) -> tuple[Difference, ...]:
+    """The estimates by person of every two series compared, in pairs where the same people have both."""
+    made = [row for one, other in combinations(series, 2) if (row := _compared(one, other)) is not None]
     holm = multipletests([row[-1] for row in made], method="holm")[1].tolist() if made else []
-    return tuple(Difference(*row, p) for row, p in zip(made, holm, strict=True))
+    return tuple(Difference(*row, p, what) for row, p in zip(made, holm, strict=True))
+
+
+def _compared(
+    one: tuple[str, Mapping[str, float]], other: tuple[str, Mapping[str, float]]
+) -> tuple[str, str, int, float, float, float, float, float, float] | None:
+    """Labels, people, difference with its interval, t, df and p; None where too few people say too little."""
+    (label, first), (other_label, second) = one, other
+    both = sorted(first.keys() & second.keys())
+    if both:
+        gaps = np.array([first[name] - second[name] for name in both])
+        if len(both) < 2 or not np.ptp(gaps) > 0:
+            return None
+        test, people, difference = stats.ttest_1samp(gaps, 0.0), len(both), float(gaps.mean())
+    else:
+        a, b = np.array(list(first.values())), np.array(list(second.values()))
+        if min(a.size, b.size) < 2 or not np.ptp(a) + np.ptp(b) > 0:
+            return None
+        test = stats.ttest_ind(a, b, equal_var=False)
+        people, difference = a.size + b.size, float(a.mean() - b.mean())
+    low, high = test.confidence_interval(0.95)
+    numbers = (difference, float(low), float(high), float(test.statistic), float(test.df))
+    return (label, other_label, people, *numbers, float(test.pvalue))
 
 
 def _thresholds(series: SeriesFit) -> Mapping[str, float]:

@@ -28,7 +28,8 @@ METHODS = (
     "rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% profiles "
     "of the likelihood. The first table pools all trials of a series, which flattens the slope where people "
     "differ; its last rows average thresholds over people (random effects by REML, Hartung-Knapp interval). "
-    "Series are compared within people by paired t tests, corrected by Holm. Stimuli were chosen by the "
+    "Series are compared within people by paired t tests, those of groups of people by Welch's, corrected by "
+    "Holm. Stimuli were chosen by the "
     "answers before them; the likelihood is the same as if they had been fixed. {weibull}"
 )
 SIGNIFICANCE = 0.05
@@ -100,11 +101,11 @@ def differences_table(differences: "Sequence[Difference]", name: str, synthetic:
     """Series compared within people."""
     rows = tuple(
         (
-            f"{d.first} - {d.second}",
+            f"{d.first} - {d.second}" + ("" if d.what == "threshold" else f", {d.what}"),
             str(d.people),
             fixed(d.difference, 3),
             interval((d.ci_low, d.ci_high), 3),
-            f"{fixed(d.t)} ({d.df})",
+            f"{fixed(d.t)} ({degrees(d.df)})",
             p_value(d.p_holm),
         )
         for d in differences
@@ -112,6 +113,11 @@ def differences_table(differences: "Sequence[Difference]", name: str, synthetic:
     header = ("Series", "People", "Difference", "95% CI", "t (df)", "p (Holm)")
     title = caption("Differences of thresholds", name, synthetic)
     return Table("threshold-differences", title, header, rows, 1)
+
+
+def degrees(df: float) -> str:
+    """Degrees of freedom: whole, or with two decimals where Welch's test gave them."""
+    return f"{df:.0f}" if float(df).is_integer() else f"{df:.2f}"
 
 
 def shares_table(fits: "Sequence[SeriesFit]", name: str, synthetic: bool) -> Table:
@@ -143,15 +149,16 @@ def sentences(
         else:
             said.append(f"{label}: the threshold over all trials was {fixed(fit.threshold, 3)}.")
         said += [f"{label}: {note}." for note in fit.notes]
-    return (*said, *(_difference(one) for one in differences))
+    return (*said, *(difference_sentence(one) for one in differences))
 
 
-def _difference(d: "Difference") -> str:
+def difference_sentence(d: "Difference") -> str:
+    """What a comparison of two series says."""
     verdict = "differed" if d.p_holm < SIGNIFICANCE else "did not differ significantly"
     corrected = apa_p(d.p_holm).removeprefix("p ")
     return (
-        f"Thresholds {verdict} between {d.first} and {d.second}, t({d.df}) = {fixed(d.t)}, {apa_p(d.p)} "
-        f"(after Holm {corrected})."
+        f"{d.what.capitalize()}s {verdict} between {d.first} and {d.second}, "
+        f"t({degrees(d.df)}) = {fixed(d.t)}, {apa_p(d.p)} (after Holm {corrected})."
     )
 
 

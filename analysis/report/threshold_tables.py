@@ -13,7 +13,7 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
         (
             condition,
             fixed(fit.threshold, 3),
-            _interval(fit.threshold_ci),
+            interval_text(fit.threshold_ci),
             fixed(fit.spread, 3),
             DASH if fit.x75 is None else fixed(fit.x75, 3),
             fixed(fit.lapse, 3),
@@ -52,7 +52,7 @@ def people_table(result: ThresholdsResult, name: str, synthetic: bool = False) -
             one.participant,
             one.condition,
             fixed(one.fit.threshold, 3),
-            _interval(one.fit.threshold_ci),
+            interval_text(one.fit.threshold_ci),
             fixed(one.fit.spread, 3),
         )
         for one in result.people
@@ -75,7 +75,8 @@ def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False)
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
 
 
-def _interval(interval: Interval) -> str:
+def interval_text(interval: Interval) -> str:
+    """Both ends; `open` where the likelihood never falls far enough."""
     low = "open" if interval.low is None else fixed(interval.low, 3)
     high = "open" if interval.high is None else fixed(interval.high, 3)
     return f"{low} to {high}"

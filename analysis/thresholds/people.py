@@ -26,7 +26,10 @@ NO = frozenset({"0", "no", "false", "wrong", "incorrect", "unseen", "n", "0.0"})
 
 @dataclass(frozen=True)
 class Answers:
-    """Rows of a table: stimulus x (n,), answer 0 or 1 (n,), and names of person and condition (n,)."""
+    """Rows of a table: stimulus x (n,), answer 0 or 1 (n,), and names of person and condition (n,).
+
+    second: a second stimulus variable (n,), where there is one.
+    """
 
     x: Array
     response: Array
@@ -35,6 +38,7 @@ class Answers:
     source: str
     synthetic: bool
     decisions: tuple[str, ...]
+    second: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,18 @@ class MeanThreshold:
 
 
 @dataclass(frozen=True)
+class Average:
+    """Mean of estimates with known errors over people; see `average`."""
+
+    people: int
+    mean: float
+    se: float
+    ci_low: float
+    ci_high: float
+    tau: float
+
+
+@dataclass(frozen=True)
 class ThresholdsResult:
     """Everything `analysis thresholds` knows of a table."""
 
@@ -76,22 +92,31 @@ class ThresholdsResult:
 
 
 def read_answers(
-    path: Path, x: str, response: str, participant: str | None = None, by: str | None = None
+    path: Path,
+    x: str,
+    response: str,
+    participant: str | None = None,
+    by: str | None = None,
+    second: str | None = None,
 ) -> Answers:
-    """Read one row a trial: a number `x` and a `response` of 0/1, yes/no or correct/wrong.
+    """Read one row a trial: numbers `x` and `second`, and a `response` of 0/1, yes/no or correct/wrong.
 
     Raises
     ------
     InputError
         As `read_text_table`; a response that is neither, a stimulus that is no number.
     """
-    roles = [x, response, *(name for name in (participant, by) if name)]
+    named = [name for name in (participant, by) if name]
+    roles = [x, response, *named, *([second] if second else [])]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, ("synthetic",))
-    for name in roles[2:]:
+    for name in named:
         texts_required(table, name)
     values, answers = numbers(table, x), _binary(table, response)
     keep = np.isfinite(values) & np.isfinite(answers)
+    across = numbers(table, second) if second else None
+    if across is not None:
+        keep &= np.isfinite(across)
     if not keep.all():
         lines = name_lines(table, ~keep)
         table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer left out ({lines})")
@@ -102,7 +127,14 @@ def read_answers(
         for name in (participant, by)
     ]
     return Answers(
-        values[keep], answers[keep], names[0], names[1], path.name, table.synthetic, tuple(table.decisions)
+        values[keep],
+        answers[keep],
+        names[0],
+        names[1],
+        path.name,
+        table.synthetic,
+        tuple(table.decisions),
+        None if across is None else across[keep],
     )
 
 
@@ -182,7 +214,15 @@ def _people(
 
 
 def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThreshold | None:
-    r"""Average thresholds over people, each weighted by 1 / (se^2 + tau^2); None below two people.
+    """Average thresholds over people; None below two people."""
+    own = [one.fit for one in people if one.condition == condition and one.fit is not None]
+    known = [(fit.threshold, fit.threshold_se) for fit in own if fit.threshold_se]
+    made = average(np.array([a for a, _ in known]), np.array([float(b or 0) for _, b in known]))
+    return None if made is None else MeanThreshold(condition, **vars(made))
+
+
+def average(y: Array, errors: Array) -> Average | None:
+    r"""Average estimates y (n,) over people, each weighted by 1 / (se^2 + tau^2); None below two people.
 
     tau^2 maximises the restricted likelihood of
 
@@ -190,13 +230,11 @@ def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThresho
 
         y_i \sim N(\mu, s_i^2 + \tau^2) \tag{1}
 
-    with y_i a person's threshold and s_i its standard error.
+    with y_i a person's estimate and s_i its standard error.
     """
-    own = [one.fit for one in people if one.condition == condition and one.fit is not None]
-    known = [(fit.threshold, fit.threshold_se) for fit in own if fit.threshold_se]
-    if len(known) < 2:
+    if len(y) < 2:
         return None
-    y, s2 = np.array([a for a, _ in known]), np.array([float(b or 0) ** 2 for _, b in known])
+    s2 = errors**2
 
     def restricted(log_tau2: float) -> float:
         weights = 1 / (s2 + np.exp(log_tau2))
@@ -212,7 +250,7 @@ def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThresho
     tau2 = float(np.exp(found.x)) if found.fun < restricted(-np.inf) else 0.0
     weights = 1 / (s2 + tau2)
     mean = float(np.sum(weights * y) / weights.sum())
-    count = len(known)
+    count = len(y)
     se = float(np.sqrt(np.sum(weights * (y - mean) ** 2) / ((count - 1) * weights.sum())))
     half = float(stats.t.ppf(0.975, count - 1)) * se
-    return MeanThreshold(condition, count, mean, se, mean - half, mean + half, float(np.sqrt(tau2)))
+    return Average(count, mean, se, mean - half, mean + half, float(np.sqrt(tau2)))

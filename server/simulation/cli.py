@@ -49,7 +49,8 @@ def simulate(
         str,
         typer.Option(
             help="In a study of thresholds, the true function: threshold=200,spread=30,sd=10,guess=0.02,"
-            "lapse=0.02; sd is that of people's thresholds. What is left out is usual for the stimuli."
+            "lapse=0.02 (sd is that of people's thresholds), with a second factor tilt=50 too. What is left "
+            "out is usual for the stimuli."
         ),
     ] = "",
     json_file: Annotated[

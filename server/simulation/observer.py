@@ -1,14 +1,13 @@
 """A simulated observer with a true psychometric function, for studies that look for thresholds."""
 
 import random
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from statistics import NormalDist
 
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.threshold.declaration import threshold_of
-from experiments.trials.threshold.grid import model, standard_of, stimuli
+from experiments.trials.threshold.grid import Point, model, point_at
 
 
 @dataclass(frozen=True)
@@ -18,7 +17,8 @@ class Truth:
     Attributes
     ----------
     threshold, spread: mean and SD of the normal distribution, in the stimulus's unit. sd: spread of the
-    thresholds of people around `threshold`. guess, lapse: the function's ends.
+    thresholds of people around `threshold`. guess, lapse: the function's ends. tilt: with a second factor,
+    how far the threshold moves per unit of its numbers; `threshold` is that at their middle.
     """
 
     threshold: float
@@ -26,14 +26,15 @@ class Truth:
     sd: float = 0.0
     guess: float = 0.02
     lapse: float = 0.02
+    tilt: float = 0.0
 
     def of_person(self, rng: random.Random) -> "Truth":
         """The function of one person."""
         return replace(self, threshold=self.threshold + rng.gauss(0, self.sd))
 
-    def probability(self, stimulus: float, *, falling: bool = False) -> float:
-        """How likely the answer is yes, or right."""
-        z = (stimulus - self.threshold) / self.spread
+    def probability(self, stimulus: float, *, off_middle: float = 0.0, falling: bool = False) -> float:
+        """How likely the answer is yes, or right; off_middle: the second number, from the middle of all."""
+        z = (stimulus - self.threshold - self.tilt * off_middle) / self.spread
         return self.guess + (1 - self.guess - self.lapse) * NormalDist().cdf(-z if falling else z)
 
 
@@ -69,11 +70,15 @@ def _settings(text: str) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Observer:
-    """Somebody who sees stimuli by their true function. numbers: of the stimulus in each clip, by hash."""
+    """Somebody who sees stimuli by their true function.
+
+    points: the stimulus in each clip, by hash. middle: of the second factor's numbers.
+    """
 
     truth: Truth
-    numbers: Mapping[str, float]
+    points: Mapping[str, Point]
     falling: bool
+    middle: float = 0.0
 
     def of_person(self, rng: random.Random) -> "Observer":
         """One person of those this stands for."""
@@ -81,19 +86,16 @@ class Observer:
 
     def sees(self, clip: str) -> float:
         """How likely they say yes to a clip, or name it rightly; nothing is to be seen in the standard."""
-        if clip not in self.numbers:
+        if clip not in self.points:
             return 0.0
-        return self.truth.probability(self.numbers[clip], falling=self.falling)
+        value, second = self.points[clip]
+        off_middle = 0.0 if second is None else second - self.middle
+        return self.truth.probability(value, off_middle=off_middle, falling=self.falling)
 
 
 def observer_of(experiment: Experiment, levels_of: Mapping[str, Mapping[str, str]], text: str) -> Observer:
     """The observers of a study of thresholds. levels_of: levels of each clip, by hash."""
-    falling = threshold_of(experiment).direction == "falling"
-    return Observer(truth_of(experiment, text), _numbers(experiment, levels_of), falling)
-
-
-def _numbers(experiment: Experiment, levels_of: Mapping[str, Mapping[str, str]]) -> dict[str, float]:
-    factor, standard = threshold_of(experiment).stimulus.factor, standard_of(threshold_of(experiment))
-    number = {level: value for value, level in stimuli(experiment).items()}
-    named: Iterable[tuple[str, str]] = ((clip, levels[factor]) for clip, levels in levels_of.items())
-    return {clip: number[level] for clip, level in named if level != standard}
+    assumed = model(experiment)
+    seen = {clip: point_at(experiment, levels) for clip, levels in levels_of.items()}
+    points = {clip: point for clip, point in seen.items() if point is not None}
+    return Observer(truth_of(experiment, text), points, assumed.falling, assumed.middle)

@@ -19,6 +19,7 @@ EFFECTS: dict[str, Effect] = {
     "lapse": "measured",
     "thresholds": "measured",
     "spreads": "measured",
+    "tilts": "measured",
     "stop": "measured",
     "ahead": "measured",
     "pointer_delay_ms": "wording",
@@ -65,6 +66,24 @@ first = { en = "The first" }
 second = { en = "The second" }
 gap_ms = 500
 """,
+    """\
+[trial]
+kind = "threshold"
+question = { en = "Which blink was slower?" }
+tilts = { lowest = -1.0, highest = 1.0, steps = 9 }
+stop = { trials = 40 }
+
+[trial.stimulus]
+factor = "duration"
+second = { factor = "lower_lid", values = { none = 0, horizontal = 1, both = 2 } }
+
+[trial.task]
+asks = "two_interval"
+standard = "100"
+standard_second = "none"
+first = { en = "The first" }
+second = { en = "The second" }
+""",
 )
 
 THRESHOLD = Kind(
@@ -82,4 +101,5 @@ THRESHOLD = Kind(
     plan=plan,
     check_response=check_response,
     adapts=True,
+    groups=True,
 )

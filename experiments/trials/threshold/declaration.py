@@ -32,6 +32,8 @@ class TwoInterval(Declaration):
     """Names this task."""
     standard: LevelName
     """Level of the stimulus factor that every stimulus is shown against; it is not a stimulus itself."""
+    standard_second: LevelName | None = None
+    """Level of the second factor that the standard has; where not given, that of the stimulus beside it."""
     first: Translated
     """Label of the answer that names the first clip."""
     second: Translated
@@ -48,6 +50,18 @@ class TwoInterval(Declaration):
 Task = Annotated[YesNo | TwoInterval, Field(discriminator="asks")]
 
 
+class SecondStimulus(Declaration):
+    """A second factor that changes from trial to trial: series then move over the grid of both.
+
+    The threshold along the first factor is taken to be a straight line over the numbers of the second.
+    """
+
+    factor: Name
+    """The factor. Its levels with those of the first are the stimuli."""
+    values: dict[LevelName, float] = Field(default_factory=dict)
+    """The number of each level; may be left out where the levels are named by their numbers."""
+
+
 class Stimulus(Declaration):
     """The factor along which each series looks for its threshold."""
 
@@ -55,10 +69,17 @@ class Stimulus(Declaration):
     """The factor. Its levels are the stimuli that were rendered, and a series moves between them."""
     values: dict[LevelName, float] = Field(default_factory=dict)
     """The number of each level; may be left out where the levels are named by their numbers."""
+    second: SecondStimulus | None = None
+    """A second factor along which series move too."""
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """The factors that a series moves along."""
+        return (self.factor, self.second.factor) if self.second else (self.factor,)
 
 
 class Series(Declaration):
-    """One adaptive series: a level of every factor but that of the stimulus."""
+    """One adaptive series: a level of every factor but those of the stimulus."""
 
     name: Name
     """Name of the series in the data."""
@@ -100,7 +121,8 @@ class Stop(Declaration):
     at_least: Annotated[int, Field(ge=1)] = 10
     """Answers that a series has before its certainty can end it."""
     sd: Annotated[float, Field(gt=0)] | None = None
-    """Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit."""
+    """Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit. With a
+    second factor the threshold is that at the middle of its numbers, and `entropy` regards the tilt too."""
     entropy: Annotated[float, Field(gt=0)] | None = None
     """Entropy of the posterior over all parameters at which a series ends, in bits."""
 
@@ -128,7 +150,11 @@ class Threshold(TrialDeclaration):
     lapse: Annotated[float, Field(ge=0.001, le=0.2)] = 0.02
     """Assumed share of wrong answers to what is plain to see: 1 minus the function's upper end."""
     thresholds: Range | None = None
-    """Thresholds considered; where not given, from the lowest stimulus to the highest."""
+    """Thresholds considered; where not given, from the lowest stimulus to the highest. With a second factor
+    they are those at the middle of its numbers."""
+    tilts: Range | None = None
+    """With a second factor, the considered changes of the threshold per unit of its numbers; where not given,
+    as steep as a threshold that crosses all stimuli of the first, either way."""
     spreads: Range | None = None
     """Considered SDs of the normal function (in the stimulus's unit), or slopes of the Weibull; where not
     given, a twentieth to a half of the stimuli's range, or 1 to 10."""

@@ -1,16 +1,19 @@
 """What in a declared threshold does not fit the rest of the experiment, in one line with what to do."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from experiments.assignment.groups import groups, name_of
 from experiments.errors import did_you_mean
-from experiments.trials.threshold.declaration import Range, Stimulus, Threshold, TwoInterval
+from experiments.trials.threshold.declaration import Range, Threshold, TwoInterval
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 MAX_TRIALS = 2000
+MAX_TABLE = 500_000
+"""Stimuli times considered parameters: one choice goes through all of them."""
 
 
 def fault(experiment: "Experiment", trial: Threshold) -> str | None:
@@ -19,13 +22,22 @@ def fault(experiment: "Experiment", trial: Threshold) -> str | None:
 
 
 def _faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
-    factor, names = trial.stimulus.factor, experiment.factor_names
-    if factor not in names:
-        yield f"trial.stimulus.factor: no factor is called '{factor}'{did_you_mean(factor, names)}"
-        return
+    names = experiment.factor_names
+    for path, factor in zip(("factor", "second.factor"), trial.stimulus.factors, strict=False):
+        if factor not in names:
+            yield f"trial.stimulus.{path}: no factor is called '{factor}'{did_you_mean(factor, names)}"
+            return
+        if experiment.factor(factor).between:
+            yield (
+                f"trial.stimulus.{path}: '{factor}' is between participants, and a series moves within one; "
+                "leave `between` out there"
+            )
     yield from _stimulus_faults(experiment, trial)
+    yield from _second_faults(experiment, trial)
+    yield from _table_faults(experiment)
     yield from _stop_faults(experiment, trial)
     yield from _series_faults(experiment, trial)
+    yield from _group_faults(experiment)
 
 
 def _stimulus_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
@@ -37,21 +49,81 @@ def _stimulus_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str
     if isinstance(trial.task, TwoInterval) and trial.task.standard not in levels:
         near = did_you_mean(trial.task.standard, levels)
         yield f"trial.task.standard: '{factor}' has no level '{trial.task.standard}'{near}"
+    yield from _number_faults("trial.stimulus", factor, trial.stimulus.values, tested(trial, levels))
+    numbers = [number_of(trial.stimulus.values, name) for name in tested(trial, levels)]
+    yield from _function_faults(trial, min((one for one in numbers if one is not None), default=0.0))
+
+
+def _number_faults(
+    path: str, factor: str, values: Mapping[str, float], levels: Sequence[str]
+) -> Iterator[str]:
+    """What is wrong with the numbers of the levels of a factor."""
     numbers: dict[float, str] = {}
-    for name in tested(trial, levels):
-        number = number_of(trial.stimulus, name)
+    for name in levels:
+        number = number_of(values, name)
         if number is None:
             yield (
-                f"trial.stimulus: expected a number for every level of '{factor}', got the level '{name}'; "
-                "name levels by their numbers, or give each one in trial.stimulus.values"
+                f"{path}: expected a number for every level of '{factor}', got the level '{name}'; "
+                f"name levels by their numbers, or give each one in {path}.values"
             )
             return
         if number in numbers:
-            yield f"trial.stimulus: levels '{numbers[number]}' and '{name}' have the same number {number:g}"
+            yield f"{path}: levels '{numbers[number]}' and '{name}' have the same number {number:g}"
         numbers[number] = name
     if len(numbers) < 2:
-        yield f"trial.stimulus: expected two stimuli or more, got {len(numbers)} level of '{factor}'"
-    yield from _function_faults(trial, min(numbers, default=0.0))
+        yield f"{path}: expected two stimuli or more, got {len(numbers)} level of '{factor}'"
+
+
+def _second_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
+    """What does not fit with a second factor, and what needs one."""
+    second, task = trial.stimulus.second, trial.task
+    beside = task.standard_second if isinstance(task, TwoInterval) else None
+    if second is None:
+        for path, given in (("tilts", trial.tilts), ("task.standard_second", beside)):
+            if given is not None:
+                yield f"trial.{path}: give trial.stimulus.second too, or leave it out"
+        return
+    levels = [level.name for level in experiment.factor(second.factor).levels]
+    if second.factor == trial.stimulus.factor:
+        yield f"trial.stimulus.second.factor: '{second.factor}' is the first already; name another factor"
+    for name in second.values:
+        if name not in levels:
+            near = did_you_mean(name, levels)
+            yield f"trial.stimulus.second.values: '{second.factor}' has no level '{name}'{near}"
+    yield from _number_faults("trial.stimulus.second", second.factor, second.values, levels)
+    if beside is not None and beside not in levels:
+        near = did_you_mean(beside, levels)
+        yield f"trial.task.standard_second: '{second.factor}' has no level '{beside}'{near}"
+    if trial.function != "normal":
+        yield (
+            "trial.function: expected normal with a second factor, whose thresholds may pass 0, "
+            f"got {trial.function}"
+        )
+
+
+def _table_faults(experiment: "Experiment") -> Iterator[str]:
+    """More stimuli and parameters than can be gone through for every trial."""
+    from experiments.trials.threshold.grid import model, points
+
+    assumed = model(experiment)
+    parameters = len(assumed.thresholds) * len(assumed.spreads) * max(1, len(assumed.tilts))
+    if (size := len(points(experiment)) * parameters) > MAX_TABLE:
+        yield (
+            f"trial.thresholds: {len(points(experiment))} stimuli times {parameters} sets of thresholds, "
+            f"spreads and tilts are {size}, more than {MAX_TABLE}; give them fewer steps"
+        )
+
+
+def _group_faults(experiment: "Experiment") -> Iterator[str]:
+    """A group of participants for which no series is declared."""
+    from experiments.trials.threshold.grid import series_in_group
+
+    for levels in groups(experiment):
+        if not series_in_group(experiment, levels):
+            yield (
+                f"trial.series: the group '{name_of(levels)}' has no series; declare one with its level, or "
+                "leave trial.series out"
+            )
 
 
 def _function_faults(trial: Threshold, lowest: float) -> Iterator[str]:
@@ -88,7 +160,7 @@ def _stop_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
             f"trial.stop.trials: {stop.trials} trials of a series do not divide into {repeats} blocks; "
             f"give a multiple of {repeats}"
         )
-    if split == trial.stimulus.factor:
+    if split in trial.stimulus.factors:
         yield f"blocks.split_by: '{split}' is what each series moves along; split by another factor, or not"
 
 
@@ -96,7 +168,7 @@ def _series_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
     others = {
         factor.name: [level.name for level in factor.levels]
         for factor in experiment.factors
-        if factor.name != trial.stimulus.factor
+        if factor.name not in trial.stimulus.factors
     }
     names = [series.name for series in trial.series]
     for place, one in enumerate(trial.series):
@@ -104,7 +176,7 @@ def _series_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
         if one.name in names[:place]:
             yield f"{here} is declared twice"
         for factor, level in one.levels.items():
-            if factor == trial.stimulus.factor:
+            if factor in trial.stimulus.factors:
                 yield f"{here}: '{factor}' is what the series moves along and has no level of its own"
             elif factor not in others:
                 yield f"{here}: no factor is called '{factor}'{did_you_mean(factor, others)}"
@@ -128,10 +200,10 @@ def tested(trial: Threshold, levels: list[str]) -> list[str]:
     return [level for level in levels if level != standard]
 
 
-def number_of(stimulus: Stimulus, level: str) -> float | None:
+def number_of(values: Mapping[str, float], level: str) -> float | None:
     """The number of a level: that declared, or the one it is named by; None where it has none."""
-    if level in stimulus.values:
-        return stimulus.values[level]
+    if level in values:
+        return values[level]
     try:
         number = float(level)
     except ValueError:

@@ -1,5 +1,6 @@
 """The rendered grid as series see it: stimuli with their numbers, and what QUEST+ is told of a function."""
 
+from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -11,11 +12,19 @@ if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 
+class Point(NamedTuple):
+    """A stimulus: its number along the factor, and along the second where there is one."""
+
+    value: float
+    second: float | None = None
+
+
 class Model(NamedTuple):
     """The psychometric function that a series assumes, and the parameters it considers.
 
     P(x) = guess + (1 - guess - lapse) F(x), F the normal distribution function of mean `threshold` and SD
     `spread`, or the Weibull 1 - exp(-(x / threshold)^spread). Where it falls, x and threshold change sign.
+    With `seconds`, z of them, the mean is threshold + tilt (z - middle); see `middle`.
     """
 
     function: Literal["normal", "weibull"]
@@ -25,24 +34,65 @@ class Model(NamedTuple):
     spreads: tuple[float, ...]
     guess: float
     lapse: float
+    seconds: tuple[float, ...] = ()
+    tilts: tuple[float, ...] = ()
+
+    @property
+    def middle(self) -> float:
+        """The number of the second factor at which `threshold` is the threshold: between its ends."""
+        return (self.seconds[0] + self.seconds[-1]) / 2 if self.seconds else 0.0
 
 
 def stimuli(experiment: "Experiment") -> dict[float, str]:
     """Level of the stimulus factor by its number, ascending."""
     trial = threshold_of(experiment)
     levels = [level.name for level in experiment.factor(trial.stimulus.factor).levels]
-    numbers = {number_of(trial.stimulus, level): level for level in tested(trial, levels)}
+    numbers = {number_of(trial.stimulus.values, level): level for level in tested(trial, levels)}
     return dict(sorted((number, level) for number, level in numbers.items() if number is not None))
+
+
+def seconds(experiment: "Experiment") -> dict[float, str]:
+    """Level of the second factor by its number, ascending; empty where series move along one."""
+    second = threshold_of(experiment).stimulus.second
+    if second is None:
+        return {}
+    levels = (level.name for level in experiment.factor(second.factor).levels)
+    numbers = {number_of(second.values, level): level for level in levels}
+    return dict(sorted((number, level) for number, level in numbers.items() if number is not None))
+
+
+def points(experiment: "Experiment") -> dict[Point, dict[str, str]]:
+    """Levels of each stimulus, those of the second factor slowest."""
+    factors = threshold_of(experiment).stimulus.factors
+    along, across = stimuli(experiment), seconds(experiment)
+    if not across:
+        return {Point(value): {factors[0]: level} for value, level in along.items()}
+    return {
+        Point(value, second): {factors[0]: level, factors[1]: other}
+        for second, other in across.items()
+        for value, level in along.items()
+    }
+
+
+def point_at(experiment: "Experiment", levels: Mapping[str, str]) -> Point | None:
+    """The stimulus that a clip of these levels is; None for a standard."""
+    factors = threshold_of(experiment).stimulus.factors
+    mine = {factor: levels[factor] for factor in factors}
+    return next((point for point, named in points(experiment).items() if named == mine), None)
 
 
 def model(experiment: "Experiment") -> Model:
     """The declared function with its defaults filled in."""
-    trial, numbers = threshold_of(experiment), tuple(stimuli(experiment))
+    trial, numbers, across = threshold_of(experiment), tuple(stimuli(experiment)), tuple(seconds(experiment))
     low, high = numbers[0], numbers[-1]
     weibull = trial.function == "weibull"
     usual = Range(lowest=1, highest=10, steps=10)
     if not weibull:
-        usual = Range(lowest=(high - low) / 20, highest=(high - low) / 2, steps=10)
+        usual = Range(lowest=(high - low) / 20, highest=(high - low) / 2, steps=6 if across else 10)
+    tilts: tuple[float, ...] = ()
+    if across:
+        steepest = (high - low) / (across[-1] - across[0])
+        tilts = (trial.tilts or Range(lowest=-steepest, highest=steepest, steps=11)).numbers
     return Model(
         trial.function,
         trial.direction == "falling",
@@ -51,6 +101,8 @@ def model(experiment: "Experiment") -> Model:
         (trial.spreads or usual).numbers,
         trial.task.guess,
         trial.lapse,
+        across,
+        tilts,
     )
 
 
@@ -59,16 +111,24 @@ def series_of(experiment: "Experiment") -> tuple[Series, ...]:
     trial = threshold_of(experiment)
     if trial.series:
         return trial.series
-    others = [factor for factor in experiment.factors if factor.name != trial.stimulus.factor]
+    others = [factor for factor in experiment.factors if factor.name not in trial.stimulus.factors]
     combinations = product(*([(factor.name, level.name) for level in factor.levels] for factor in others))
     return tuple(
         Series(name=f"s{number}", levels=dict(levels)) for number, levels in enumerate(combinations, start=1)
     )
 
 
-def clip_of(experiment: "Experiment", levels: dict[str, str], stimulus: str, exemplar: int) -> ClipSpec:
-    """The clip of the grid with this level of the stimulus factor."""
-    every = {**levels, threshold_of(experiment).stimulus.factor: stimulus}
+def series_in_group(experiment: "Experiment", levels: Iterable[tuple[str, str]]) -> tuple[Series, ...]:
+    """The series that a group of participants runs: those whose levels are the group's."""
+    mine = set(levels)
+    return tuple(one for one in series_of(experiment) if mine <= set(one.levels.items()))
+
+
+def clip_of(
+    experiment: "Experiment", levels: Mapping[str, str], stimulus: Mapping[str, str], exemplar: int
+) -> ClipSpec:
+    """The clip of the grid with these levels of a series and of a stimulus."""
+    every = {**levels, **stimulus}
     return ClipSpec(tuple((name, every[name]) for name in experiment.factor_names), exemplar)
 
 
@@ -80,3 +140,14 @@ def exemplar_at(experiment: "Experiment", position: int) -> int:
 def standard_of(trial: Threshold) -> str | None:
     """The level shown for comparison; None where one clip is shown."""
     return trial.task.standard if isinstance(trial.task, TwoInterval) else None
+
+
+def standard_beside(trial: Threshold, stimulus: Mapping[str, str]) -> dict[str, str] | None:
+    """Levels of the clip that this stimulus is shown against; None where one clip is shown."""
+    task = trial.task
+    if not isinstance(task, TwoInterval):
+        return None
+    levels = {**stimulus, trial.stimulus.factor: task.standard}
+    if trial.stimulus.second and task.standard_second is not None:
+        levels[trial.stimulus.second.factor] = task.standard_second
+    return levels

@@ -1,13 +1,24 @@
 """Which series has its turn when, and what stands there until the server has chosen."""
 
 import random
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from experiments.assignment.groups import groups, name_of, place_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec
 from experiments.trials.threshold.declaration import Series, Stop, threshold_of
-from experiments.trials.threshold.grid import clip_of, exemplar_at, model, series_of, standard_of, stimuli
+from experiments.trials.threshold.grid import (
+    clip_of,
+    exemplar_at,
+    model,
+    points,
+    series_in_group,
+    series_of,
+    standard_beside,
+    standard_of,
+)
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -21,50 +32,53 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
 
     Parameters
     ----------
-    seed: of practice, order of series and intervals. slot: place in the counterbalancing, for the blocks.
+    seed: of practice, order of series and intervals. slot: place in the counterbalancing, for the group of
+    participants and the blocks.
     """
-    rng = random.Random(seed)
-    trials = [_practice(experiment, rng) for _ in range(experiment.practice.trials)]
-    done = dict.fromkeys((one.name for one in series_of(experiment)), 0)
-    for number, block in enumerate(ordered_blocks(experiment, rng, slot), start=1):
+    rng, place_in_study = random.Random(seed), place_of(experiment, slot)
+    mine, levels = list(series_in_group(experiment, place_in_study.levels)), list(points(experiment).values())
+    trials = [_practice(experiment, mine, rng) for _ in range(experiment.practice.trials)]
+    done = dict.fromkeys((one.name for one in mine), 0)
+    for number, block in enumerate(ordered_blocks(experiment, rng, place_in_study.number), start=1):
         main: list[Trial] = []
-        here = _series_in(experiment, block)
+        here = _series_in(experiment, block, mine)
         for _ in range(_trials_a_block(experiment)):
             if experiment.blocks.trial_order == "random":
                 rng.shuffle(here)
             for one in here:
                 place = done[one.name]
                 done[one.name] += 1
-                level = _spread(list(stimuli(experiment).values()), place)
-                shown = _shown(experiment, one, level, exemplar_at(experiment, place + 1), rng)
+                shown = _shown(
+                    experiment, one, _spread(levels, place), exemplar_at(experiment, place + 1), rng
+                )
                 main.append(Trial("main", number, block.label, shown, series=one.name))
         if main:
             trials.extend(with_attention(experiment, main, rng, lambda draw: draw.randint(1, 2)))
     return trials
 
 
-def _practice(experiment: "Experiment", rng: random.Random) -> Trial:
+def _practice(experiment: "Experiment", mine: list[Series], rng: random.Random) -> Trial:
     """A stimulus drawn from the whole grid, so that plain and faint ones are met before they count."""
-    one = rng.choice(series_of(experiment))
-    level = rng.choice(list(stimuli(experiment).values()))
+    one = rng.choice(mine)
+    level = rng.choice(list(points(experiment).values()))
     exemplar = rng.randint(1, experiment.exemplars.per_cell)
     return Trial("practice", 0, "practice", _shown(experiment, one, level, exemplar, rng))
 
 
 def _shown(
-    experiment: "Experiment", one: Series, level: str, exemplar: int, rng: random.Random
+    experiment: "Experiment", one: Series, stimulus: dict[str, str], exemplar: int, rng: random.Random
 ) -> tuple[Shown, ...]:
     trial = threshold_of(experiment)
-    standard = standard_of(trial)
-    levels = [level] if standard is None else [level, standard]
+    standard = standard_beside(trial, stimulus)
+    levels = [stimulus] if standard is None else [stimulus, standard]
     if rng.random() < 0.5:
         levels.reverse()
     clips = [clip_of(experiment, one.levels, name, exemplar) for name in levels]
     return tuple(Shown(role, clip) for role, clip in zip(trial.roles, clips, strict=True))
 
 
-def _spread(levels: list[str], place: int) -> str:
-    """The levels in van der Corput's order of base 2: any run of places covers the grid evenly."""
+def _spread(levels: list[dict[str, str]], place: int) -> dict[str, str]:
+    """The stimuli in van der Corput's order of base 2: any run of places covers the grid evenly."""
     share, weight = 0.0, 0.5
     number = place + 1
     while number:
@@ -74,9 +88,8 @@ def _spread(levels: list[str], place: int) -> str:
     return levels[int(share * len(levels))]
 
 
-def _series_in(experiment: "Experiment", block: BlockSpec) -> list[Series]:
+def _series_in(experiment: "Experiment", block: BlockSpec, every: Iterable[Series]) -> list[Series]:
     split = experiment.blocks.split_by
-    every = series_of(experiment)
     return [one for one in every if split is None or one.levels[split] == block.label]
 
 
@@ -86,8 +99,9 @@ def _trials_a_block(experiment: "Experiment") -> int:
 
 
 def block_size(experiment: "Experiment", block: BlockSpec) -> int:
-    """Most trials of a participant in a block: those of every series in it."""
-    return len(_series_in(experiment, block)) * _trials_a_block(experiment)
+    """Most trials of a participant in a block: those of every series in it, of the group with most."""
+    each = (series_in_group(experiment, levels) for levels in groups(experiment))
+    return max(len(_series_in(experiment, block, mine)) for mine in each) * _trials_a_block(experiment)
 
 
 def plan(experiment: "Experiment") -> tuple[str, ...]:
@@ -96,14 +110,26 @@ def plan(experiment: "Experiment") -> tuple[str, ...]:
     standard = standard_of(trial)
     task = f"against the standard {standard}" if standard else "yes or no"
     named = ", ".join(f"{one.name} ({'/'.join(one.levels.values()) or 'all'})" for one in every)
-    numbers = assumed.stimuli
+    numbers, across = assumed.stimuli, assumed.seconds
+    grid = f"{trial.stimulus.factor}: {len(numbers)} stimuli from {numbers[0]:g} to {numbers[-1]:g}"
+    if trial.stimulus.second:
+        grid += (
+            f", times {len(across)} of {trial.stimulus.second.factor} from {across[0]:g} to {across[-1]:g}, "
+            f"tilts from {assumed.tilts[0]:g} to {assumed.tilts[-1]:g}"
+        )
+    between = [(name_of(levels), series_in_group(experiment, levels)) for levels in groups(experiment)]
+    length = _length(trial.stop, max(len(mine) for _, mine in between))
     return (
         f"{len(every)} adaptive series, interleaved: {named}",
-        f"each moves along {trial.stimulus.factor}: {len(numbers)} stimuli from {numbers[0]:g} to "
-        f"{numbers[-1]:g}, {task}",
+        *(
+            f"group {name}: {', '.join(one.name for one in mine)}"
+            for name, mine in between
+            if len(between) > 1
+        ),
+        f"each moves along {grid}, {task}",
         f"thresholds from {assumed.thresholds[0]:g} to {assumed.thresholds[-1]:g} are considered; guess "
         f"{assumed.guess:g}, lapse {assumed.lapse:g}",
-        f"{_length(trial.stop, len(every))}; up to {trial.ahead} trials of a series without connection",
+        f"{length}; up to {trial.ahead} trials of a series without connection",
     )
 
 

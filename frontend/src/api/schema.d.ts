@@ -5903,6 +5903,26 @@ export interface components {
             qr_svg: string;
         };
         /**
+         * SecondStimulus
+         * @description A second factor that changes from trial to trial: series then move over the grid of both.
+         *
+         *     The threshold along the first factor is taken to be a straight line over the numbers of the second.
+         */
+        SecondStimulus: {
+            /**
+             * Factor
+             * @description The factor. Its levels with those of the first are the stimuli.
+             */
+            factor: string;
+            /**
+             * Values
+             * @description The number of each level; may be left out where the levels are named by their numbers.
+             */
+            values: {
+                [key: string]: number;
+            };
+        };
+        /**
          * SeenClip
          * @description One clip of a view with its drawn frames.
          */
@@ -5925,7 +5945,7 @@ export interface components {
         };
         /**
          * Series
-         * @description One adaptive series: a level of every factor but that of the stimulus.
+         * @description One adaptive series: a level of every factor but those of the stimulus.
          */
         Series: {
             /**
@@ -6466,6 +6486,8 @@ export interface components {
             values: {
                 [key: string]: number;
             };
+            /** @description A second factor along which series move too. */
+            second: components["schemas"]["SecondStimulus"] | null;
         };
         /**
          * StimulusAnswers
@@ -6505,7 +6527,8 @@ export interface components {
             at_least: number;
             /**
              * Sd
-             * @description Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit.
+             * @description Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit. With a
+             *     second factor the threshold is that at the middle of its numbers, and `entropy` regards the tilt too.
              */
             sd: number | null;
             /**
@@ -6728,8 +6751,16 @@ export interface components {
              * @default 0.02
              */
             lapse: number;
-            /** @description Thresholds considered; where not given, from the lowest stimulus to the highest. */
+            /**
+             * @description Thresholds considered; where not given, from the lowest stimulus to the highest. With a second factor
+             *     they are those at the middle of its numbers.
+             */
             thresholds: components["schemas"]["Range"] | null;
+            /**
+             * @description With a second factor, the considered changes of the threshold per unit of its numbers; where not given,
+             *     as steep as a threshold that crosses all stimuli of the first, either way.
+             */
+            tilts: components["schemas"]["Range"] | null;
             /**
              * @description Considered SDs of the normal function (in the stimulus's unit), or slopes of the Weibull; where not
              *     given, a twentieth to a half of the stimuli's range, or 1 to 10.
@@ -7225,6 +7256,11 @@ export interface components {
              * @description Level of the stimulus factor that every stimulus is shown against; it is not a stimulus itself.
              */
             standard: string;
+            /**
+             * Standard Second
+             * @description Level of the second factor that the standard has; where not given, that of the stimulus beside it.
+             */
+            standard_second: string | null;
             /**
              * First
              * @description Label of the answer that names the first clip.
@@ -7840,6 +7876,7 @@ export type ScreenDevice = components['schemas']['ScreenDevice'];
 export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
 export type ScreenOut = components['schemas']['ScreenOut'];
 export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
+export type SecondStimulus = components['schemas']['SecondStimulus'];
 export type SeenClip = components['schemas']['SeenClip'];
 export type Series = components['schemas']['Series'];
 export type SeriesOut = components['schemas']['SeriesOut'];

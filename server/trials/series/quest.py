@@ -12,21 +12,25 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from experiments.trials.threshold.grid import Model
+from experiments.trials.threshold.grid import Model, Point
 
 if TYPE_CHECKING:
     from questplus import QuestPlus
 
 YES, NO = "yes", "no"
-MAX_STATES = 4096
-"""Posteriors kept: participants of one study share the first ones, and each answer needs that before it."""
+MAX_STATES, MAX_PARAMETERS = 4096, 4_000_000
+"""Posteriors kept, and parameters in all of them: participants of one study share the first ones, and each
+answer needs that before it."""
 
-Answers = tuple[tuple[float, bool], ...]
+Answers = tuple[tuple[Point, bool], ...]
 """Stimulus and whether the answer was yes (or right), in the order of answering."""
 
 
 class Estimate(NamedTuple):
-    """What is known after some answers: means over the posterior, its SD, and its entropy in bits."""
+    """What is known after some answers: means over the posterior, its SD, and its entropy in bits.
+
+    With a second factor the threshold is that at the middle of its numbers.
+    """
 
     threshold: float
     threshold_sd: float
@@ -37,7 +41,7 @@ class Estimate(NamedTuple):
 @dataclass(frozen=True)
 class _State:
     posterior: Any
-    chosen: float
+    chosen: Point
     yes_is_likelier: bool
     estimate: Estimate
 
@@ -52,13 +56,13 @@ def estimate(model: Model, answers: Answers) -> Estimate:
         return _after(model, answers).estimate
 
 
-def choices(model: Model, answers: Answers, count: int) -> list[float]:
+def choices(model: Model, answers: Answers, count: int) -> list[Point]:
     """The stimuli of the next `count` trials.
 
     The first is the one that leaves the least expected entropy. Those after it are chosen as if each one
     before had got the answer that is likelier by the posterior.
     """
-    chosen: list[float] = []
+    chosen: list[Point] = []
     with _working:
         for _ in range(count):
             state = _after(model, answers)
@@ -85,7 +89,7 @@ def _kept(model: Model, answers: Answers, before: _State | None) -> _State:
         warnings.simplefilter("ignore")
         state = _stepped(model, answers, before)
     _states[model, answers] = state
-    while len(_states) > MAX_STATES:
+    while len(_states) > min(MAX_STATES, max(1, MAX_PARAMETERS // state.posterior.size)):
         _states.popitem(last=False)
     return state
 
@@ -99,11 +103,12 @@ def _stepped(model: Model, answers: Answers, before: _State | None) -> _State:
         engine.update(stim=_spoken(model, stimulus), outcome={"response": YES if positive else NO})
         engine.stim_history.clear()
         engine.resp_history.clear()
-    chosen = engine.next_stim["intensity"]
-    likelihood = engine.likelihoods.sel(intensity=chosen, response=YES)
+    spoken = engine.next_stim
+    likelihood = engine.likelihoods.sel(**spoken, response=YES)
     share = float((engine.posterior * likelihood).sum())
     sign = -1 if model.falling else 1
-    return _State(engine.posterior, sign * chosen, share >= 0.5, _estimate(model, engine))
+    chosen = Point(sign * spoken["intensity"], spoken.get("second"))
+    return _State(engine.posterior, chosen, share >= 0.5, _estimate(model, engine))
 
 
 def _estimate(model: Model, engine: "QuestPlus") -> Estimate:
@@ -118,8 +123,9 @@ def _estimate(model: Model, engine: "QuestPlus") -> Estimate:
     return Estimate(sign * means[threshold], math.sqrt(variance), means[spread], max(0.0, entropy))
 
 
-def _spoken(model: Model, stimulus: float) -> dict[str, float]:
-    return {"intensity": -stimulus if model.falling else stimulus}
+def _spoken(model: Model, stimulus: Point) -> dict[str, float]:
+    spoken = {"intensity": -stimulus.value if model.falling else stimulus.value}
+    return spoken if stimulus.second is None else {**spoken, "second": stimulus.second}
 
 
 def _names(model: Model) -> tuple[str, str]:
@@ -131,6 +137,10 @@ def _engine(model: Model) -> "QuestPlus":
     """The library's object for a function; its likelihoods are made once, its posterior is set each time."""
     from questplus import QuestPlus
 
+    if model.seconds:
+        from server.trials.series.plane import engine
+
+        return engine(model, YES, NO)
     sign = -1 if model.falling else 1
     threshold, spread = _names(model)
     return QuestPlus(

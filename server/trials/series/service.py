@@ -7,17 +7,18 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.assignment.trial import Trial
-from experiments.design import ClipSpec
 from experiments.trials.threshold.answer import ThresholdAnswer
 from experiments.trials.threshold.declaration import Stop, TwoInterval, threshold_of
 from experiments.trials.threshold.grid import (
     Model,
+    Point,
     clip_of,
     exemplar_at,
     model,
+    point_at,
+    points,
     series_of,
     standard_of,
-    stimuli,
 )
 from server.db import Database
 from server.models import StudyRun
@@ -78,14 +79,14 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
 def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any]) -> Outlook:
     """The outlook on the series that these trials make, after these answers. Pure."""
     experiment = loaded.experiment
-    assumed, declared = model(experiment), threshold_of(experiment)
+    assumed, declared, levels = model(experiment), threshold_of(experiment), points(experiment)
     known: dict[str, int] = {}
     offers: list[Offer] = []
     estimates: dict[tuple[int, int], Estimate] = {}
     closing: list[int] = []
     for one in series_of(experiment):
         given = [row for row in answers if row.series == one.name]
-        said: Answers = tuple((row.value, row.positive) for row in given)
+        said: Answers = tuple((_point(loaded, row.version_clip_id), row.positive) for row in given)
         known[one.name] = len(given)
         for number, row in enumerate(given, start=1):
             if row.threshold is None:
@@ -98,7 +99,7 @@ def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any
         next_ones = waiting[: declared.ahead + 1]
         chosen = quest.choices(assumed, said, len(next_ones))
         for row, stimulus in zip(next_ones, chosen, strict=True):
-            clip = _clip(loaded, dict(one.levels), stimuli(experiment)[stimulus], row.position)
+            clip = _clip(loaded, dict(one.levels), levels[stimulus], row.position)
             offers.append(Offer(row.trial_index, row.role, len(given), clip))
     return Outlook(known, tuple(offers), estimates, tuple(closing))
 
@@ -112,9 +113,9 @@ def ended(stop: Stop, assumed: Model, said: Answers) -> bool:
     return sure and (stop.entropy is None or reached.entropy <= stop.entropy)
 
 
-def _clip(loaded: LoadedVersion, levels: dict[str, str], level: str, position: int) -> int:
+def _clip(loaded: LoadedVersion, levels: dict[str, str], stimulus: dict[str, str], position: int) -> int:
     """Id of the clip of this stimulus at this place of the series."""
-    spec = clip_of(loaded.experiment, levels, level, exemplar_at(loaded.experiment, position))
+    spec = clip_of(loaded.experiment, levels, stimulus, exemplar_at(loaded.experiment, position))
     return loaded.places[spec.cell, spec.exemplar]
 
 
@@ -229,7 +230,7 @@ def take(
         "trial_index": rating.trial_index,
         "play": rating.play,
         "version_clip_id": clip,
-        "value": _value(loaded, clip),
+        "value": _point(loaded, clip).value,
         "positive": right,
         "correct": right if counts else None,
         "counts": counts,
@@ -242,10 +243,11 @@ def take(
     return bool(place.closed)
 
 
-def _value(loaded: LoadedVersion, clip: int) -> float:
-    """The number of the stimulus that a clip shows."""
+def _point(loaded: LoadedVersion, clip: int) -> Point:
+    """The stimulus that a clip shows."""
     cell = next(cell for (cell, _), ident in loaded.places.items() if ident == clip)
-    experiment = loaded.experiment
-    spec = ClipSpec(tuple(zip(experiment.factor_names, cell.split("/"), strict=True)), 1)
-    level = spec.level(threshold_of(experiment).stimulus.factor)
-    return next(number for number, name in stimuli(experiment).items() if name == level)
+    levels = dict(zip(loaded.experiment.factor_names, cell.split("/"), strict=True))
+    point = point_at(loaded.experiment, levels)
+    if point is None:
+        raise AssertionError(f"the clip {cell} is a standard, and no stimulus")
+    return point

@@ -10,7 +10,7 @@ from experiments.definition import Experiment
 from experiments.load import DefinitionError, parse_experiment
 from experiments.trials.counts import block_sizes
 from experiments.trials.threshold import THRESHOLD
-from experiments.trials.threshold.grid import model, series_of, stimuli
+from experiments.trials.threshold.grid import Point, model, points, seconds, series_of, stimuli
 from tests.experiments.trials.test_kinds import text_with
 
 FACTORS = """
@@ -195,3 +195,134 @@ def test_the_plan_tells_series_stimuli_and_length() -> None:
 
 def test_clips_are_an_ordinary_grid_of_cells() -> None:
     assert len(design.cells(declared())) == 8
+
+
+GRID = YES_NO.replace(
+    'stimulus = { factor = "duration" }',
+    'stimulus = { factor = "duration", second = { factor = "asymmetry", values = { SL = 0, AL = 1 } } }',
+)
+GRID_OF_TWO = TWO.replace(
+    'stimulus = { factor = "duration" }',
+    'stimulus = { factor = "duration", second = { factor = "asymmetry", values = { SL = 0, AL = 1 } } }',
+)
+BETWEEN = 'levels = [{ name = "SL"'
+
+
+def on_a_grid(trial: str = GRID) -> Experiment:
+    return parse_experiment(
+        text_of(trial).replace('split_by = "character"', "").replace("repeats = 2", "repeats = 1")
+    )
+
+
+def test_a_second_factor_makes_one_series_over_the_grid_of_both() -> None:
+    experiment = on_a_grid()
+    assert seconds(experiment) == {0.0: "SL", 1.0: "AL"}
+    assert len(points(experiment)) == 8
+    assert points(experiment)[Point(400.0, 1.0)] == {"duration": "400", "asymmetry": "AL"}
+    assert [one.levels for one in series_of(experiment)] == [{}]
+    assumed = model(experiment)
+    assert (assumed.middle, assumed.tilts[0], assumed.tilts[-1], len(assumed.tilts)) == (0.5, -300, 300, 11)
+    shown = {
+        trial.shown[0].clip.levels for trial in THRESHOLD.assign(experiment, 1, 0) if trial.kind == "main"
+    }
+    assert len(shown) == 8
+    assert "times 2 of asymmetry from 0 to 1, tilts from -300 to 300" in " ".join(THRESHOLD.plan(experiment))
+
+
+def test_the_standard_has_the_stimulus_second_level_or_the_declared_one() -> None:
+    for task, fixed in (
+        (GRID_OF_TWO, False),
+        (GRID_OF_TWO.replace('standard = "100"', 'standard = "100"\nstandard_second = "SL"'), True),
+    ):
+        seen = set()
+        for trial in THRESHOLD.assign(on_a_grid(task), 2, 0):
+            if trial.kind == "main":
+                by = {
+                    shown.clip.level("duration") == "100": shown.clip.level("asymmetry")
+                    for shown in trial.shown
+                }
+                seen.add((by[False], by[True]))
+        assert seen == ({("SL", "SL"), ("AL", "SL")} if fixed else {("SL", "SL"), ("AL", "AL")})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            'second = { factor = "asymmetry"',
+            'second = { factor = "asymetry"',
+            "trial.stimulus.second.factor: no factor is called 'asymetry'; did you mean 'asymmetry'",
+        ),
+        (
+            'second = { factor = "asymmetry"',
+            'second = { factor = "duration"',
+            "'duration' is the first already",
+        ),
+        (
+            ", values = { SL = 0, AL = 1 }",
+            "",
+            "trial.stimulus.second: expected a number for every level of 'asymmetry', got the level 'SL'",
+        ),
+        ("AL = 1", "AL = 0", "levels 'SL' and 'AL' have the same number 0"),
+        ("AL = 1", "AX = 1", "'asymmetry' has no level 'AX'"),
+        ("[trial]", '[trial]\nfunction = "weibull"', "expected normal with a second factor"),
+        (
+            "[trial]",
+            "[trial]\nthresholds = { lowest = 1, highest = 2, steps = 101 }\n"
+            "spreads = { lowest = 1, highest = 2, steps = 101 }",
+            "more than 500000",
+        ),
+        (
+            "[trial]",
+            '[trial]\nseries = [{ name = "a", levels = { asymmetry = "SL" } }]',
+            "'asymmetry' is what the series moves along",
+        ),
+    ],
+)
+def test_faults_of_a_second_factor_are_named(old: str, new: str, said: str) -> None:
+    with pytest.raises(DefinitionError, match=re.escape(said)):
+        on_a_grid(GRID.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    ("trial", "said"),
+    [
+        (
+            YES_NO + "[trial.tilts]\nlowest = 0.0\nhighest = 1.0\n",
+            "trial.tilts: give trial.stimulus.second too",
+        ),
+        (TWO + 'standard_second = "SL"\n', "trial.task.standard_second: give trial.stimulus.second too"),
+    ],
+)
+def test_what_needs_a_second_factor_is_refused_without(trial: str, said: str) -> None:
+    with pytest.raises(DefinitionError, match=re.escape(said)):
+        declared(trial)
+
+
+def between(trial: str = YES_NO) -> Experiment:
+    text = text_of(trial).replace('label = "Asymmetry"', 'label = "Asymmetry"\nbetween = true')
+    return parse_experiment(text)
+
+
+def test_with_a_factor_between_participants_each_runs_the_series_of_their_group() -> None:
+    experiment = between()
+    for slot in range(4):
+        trials = [trial for trial in THRESHOLD.assign(experiment, 7, slot) if trial.shown]
+        assert {trial.shown[0].clip.level("asymmetry") for trial in trials} == {["SL", "AL"][slot % 2]}
+        assert {trial.series for trial in trials if trial.kind == "main"} == {["s1", "s2"][slot % 2]}
+        assert sum(trial.kind == "main" for trial in trials) == 12
+    assert sum(size.trials for size in block_sizes(experiment)) == 12
+    plan = " ".join(THRESHOLD.plan(experiment))
+    assert "group SL: s1 group AL: s2" in plan
+    assert "8 to 12 a participant" in plan
+
+
+def test_a_group_without_a_series_and_a_stimulus_between_people_are_refused() -> None:
+    only = YES_NO.replace("[trial]", '[trial]\nseries = [{ name = "a", levels = { asymmetry = "SL" } }]')
+    with pytest.raises(DefinitionError, match="the group 'AL' has no series"):
+        between(only)
+    text = text_of().replace('label = "Duration"', 'label = "Duration"\nbetween = true')
+    with pytest.raises(
+        DefinitionError, match="'duration' is between participants, and a series moves within one"
+    ):
+        parse_experiment(text)

@@ -1,5 +1,6 @@
 """Adaptive series through the API: chosen from stored answers, marked where ahead, ended, exported."""
 
+import json
 import uuid
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from server.trials.series import service as series
 from server.versions import Versions
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
-from tests.helpers.thresholds import TWO_INTERVAL, YES_NO, text_with, thresholds
+from tests.helpers.thresholds import FACTORS, TWO_INTERVAL, YES_NO, text_with, thresholds
 
 
 @pytest.fixture
@@ -292,6 +293,63 @@ def test_simulated_observers_answer_to_the_end_and_the_csv_has_their_series(
     header = lines[0].split(",")
     assert {"series", "duration", "value", "response", "correct", "ahead", "threshold"} <= set(header)
     assert "| ahead | integer |" in codebook
+
+
+SECOND = 'second = { factor = "character", values = { photorealistic = 0, cartoon = 1 } }'
+GRID = YES_NO.replace('{ factor = "duration" }', f'{{ factor = "duration", {SECOND} }}').replace(
+    "= 8", "= 24"
+)
+GRID_OF_TWO = TWO_INTERVAL.replace('{ factor = "duration" }', f'{{ factor = "duration", {SECOND} }}').replace(
+    'standard = "100"', 'standard = "100"\nstandard_second = "photorealistic"'
+)
+
+
+def levels_by_clip(services: Services) -> dict[str, dict[str, str]]:
+    """Levels of each clip of the first version, by hash."""
+    with services.database.read() as session:
+        version = services.versions.get(session, 1)
+        names = version.experiment.factor_names
+        return {
+            version.clips[ident].sha256: dict(zip(names, cell.split("/"), strict=True))
+            for (cell, _), ident in version.places.items()
+        }
+
+
+@pytest.mark.parametrize("task", [GRID, GRID_OF_TWO], ids=["yes_no", "two_interval"])
+def test_a_series_over_two_factors_moves_over_the_grid_of_both(
+    client: TestClient, services: Services, tmp_path: Path, task: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.participants.links.secrets.randbits", lambda _bits: 7)
+    study = add_study(services, tmp_path / "clips", text_with(SHORT, task))
+    levels = levels_by_clip(services)
+    seen = observer_of(study.experiment, levels, "threshold=300,spread=20,tilt=150")
+    person = Person(Api(client), Rater(1, 1, levels, seen))  # type: ignore[arg-type]
+    assert person.take_part(study.link(synthetic=True))
+    rows = [row for row in rows_of(services) if row["counts"]]
+    assert {row["series"] for row in rows} == {"s1"}
+    shown = {tuple(json.loads(row["levels"]).values()) for row in rows}
+    assert len(shown) > 2
+    assert {character for _, character in shown} == {"photorealistic", "cartoon"}
+    assert all(row["value"] == float(json.loads(row["levels"])["duration"]) for row in rows)
+    last = max(rows, key=lambda row: row["position"])
+    assert abs(last["threshold"] - 300) < 3 * last["threshold_sd"] + 20
+    assert last["entropy"] < rows[0]["entropy"]
+
+
+def test_each_group_runs_its_own_series(client: TestClient, services: Services, tmp_path: Path) -> None:
+    factors = FACTORS.replace('label = "Character"', 'label = "Character"\nbetween = true')
+    study = add_study(services, tmp_path / "clips", text_with(SHORT, YES_NO, factors))
+    levels = levels_by_clip(services)
+    seen = observer_of(study.experiment, levels, "threshold=250")
+    for number in range(2):
+        person = Person(Api(client), Rater(number, 1, levels, seen))  # type: ignore[arg-type]
+        assert person.take_part(study.link(synthetic=True))
+    rows = [row for row in rows_of(services) if row["counts"]]
+    series_of_run = {
+        run: {row["series"] for row in rows if row["run"] == run} for run in {r["run"] for r in rows}
+    }
+    assert sorted(map(sorted, series_of_run.values())) == [["s1"], ["s2"]]
+    assert all(row["threshold"] is not None for row in rows)
 
 
 def test_erasure_leaves_nothing_of_what_was_answered(

@@ -1,0 +1,51 @@
+"""The analysis of thresholds over two factors: a function with a line of thresholds for each series."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from analysis.plans.prepare import Prepared
+from analysis.plans.threshold import Difference, answers_of, differences, series_labels
+from analysis.report.contents import Contents
+from analysis.thresholds.people import Answers
+from analysis.thresholds.plane import Points, counted_points
+from analysis.thresholds.plane_people import PlanesResult, fit_planes
+from experiments.errors import InputError
+from experiments.trials.threshold.declaration import Threshold, threshold_of
+
+
+@dataclass(frozen=True)
+class SeriesPlane:
+    """One series: its trials by stimulus, and its fits; `result` is None where `reason` says why not."""
+
+    name: str
+    label: str
+    points: Points
+    result: PlanesResult | None
+    reason: str | None
+
+
+def analyse(prepared: Prepared) -> Contents:
+    """Every series over all people and of each person; thresholds and tilts of series compared."""
+    from analysis.report.plane_contents import contents_of
+
+    trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
+    fits = tuple(_fit(name, labels[name], mine, trial) for name, mine in answers_of(prepared).items())
+    compared: tuple[Difference, ...] = ()
+    for what in ("threshold", "tilt"):
+        compared += differences([(fit.label, _by_person(fit, what)) for fit in fits], what)
+    return contents_of(prepared, fits, compared)
+
+
+def _fit(name: str, label: str, answers: Answers, trial: Threshold) -> SeriesPlane:
+    across = answers.x if answers.second is None else answers.second
+    points, falling = counted_points(answers.x, across, answers.response), trial.direction == "falling"
+    try:
+        result = fit_planes(answers, "normal", trial.task.guess, trial.lapse, falling=falling)
+    except InputError as error:
+        return SeriesPlane(name, label, points, None, str(error).removeprefix(f"{answers.source}: "))
+    return SeriesPlane(name, label, points, result, None)
+
+
+def _by_person(series: SeriesPlane, what: str) -> Mapping[str, float]:
+    people = () if series.result is None else series.result.people
+    return {one.participant: getattr(one.fit, what) for one in people if one.fit is not None}

@@ -1,0 +1,189 @@
+"""The report of a study of thresholds over two factors: tables, sentences, and the lines of thresholds."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.plans.prepare import Prepared
+from analysis.report.captions import caption
+from analysis.report.contents import Contents, Part, Picture
+from analysis.report.formats import Table
+from analysis.report.json_output import exclusions_data
+from analysis.report.left_out import left_out
+from analysis.report.numbers import fixed
+from analysis.report.plane_tables import plane_tables
+from analysis.report.threshold_contents import difference_sentence, differences_table
+from analysis.thresholds.plane_people import PlanesResult
+from experiments.trials.threshold.declaration import threshold_of
+
+if TYPE_CHECKING:
+    from analysis.plans.threshold import Difference
+    from analysis.plans.threshold_plane import SeriesPlane
+
+METHODS = (
+    "P(x, z) = guess + (1 - guess - lapse) F((x - t - b (z - z0)) / s), F the normal distribution "
+    "function, x the {first}, z the {second}, with the declared guess rate {guess:g} and lapse rate "
+    "{lapse:g}, by maximum likelihood: the threshold t at the middle z0 moves by the tilt b along z. "
+    "Intervals are 95% profiles of the likelihood. 'fit p' tests the line and the shape against the "
+    "shares at every stimulus. Means over people are random effects by REML, with Hartung-Knapp "
+    "intervals. Series are compared within people by paired t tests, those of groups of people by "
+    "Welch's, corrected by Holm. Stimuli were chosen by the answers before them; the likelihood is the "
+    "same as if they had been fixed. "
+)
+
+
+def contents_of(
+    prepared: Prepared, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]"
+) -> Contents:
+    """What the report says."""
+    experiment, trial = prepared.experiment, threshold_of(prepared.experiment)
+    variables = _variables(prepared)
+    people = prepared.rows["participant"].astype(str).nunique()
+    tables = [_shares(fits, variables, experiment.name, prepared.synthetic)]
+    if differences:
+        tables.insert(0, differences_table(differences, experiment.name, prepared.synthetic))
+    merged = merge(fits)
+    if merged is not None:
+        tables = [*plane_tables(merged, variables, experiment.name, prepared.synthetic), *tables]
+    return Contents(
+        name=experiment.name,
+        title=experiment.title,
+        lead=f"{people} participants, {len(prepared.rows)} trials of {len(fits)} series along "
+        f"{' and '.join(trial.stimulus.factors)}",
+        source=prepared.source,
+        synthetic=prepared.synthetic,
+        n_participants=people,
+        left_out=left_out(prepared.exclusions),
+        decisions=prepared.decisions,
+        parts=(
+            Part(
+                tuple(tables),
+                (*sentences(fits, variables), *map(difference_sentence, differences)),
+                draw=lambda: (draw(fits, variables, prepared.synthetic, people),),
+            ),
+        ),
+        methods=METHODS.format(
+            first=variables[0], second=variables[1], guess=trial.task.guess, lapse=trial.lapse
+        ),
+        numbers=numbers(prepared, fits, differences, people),
+    )
+
+
+def _variables(prepared: Prepared) -> tuple[str, str]:
+    """Labels of the two factors."""
+    first, second = (
+        prepared.experiment.factor(name).label for name in threshold_of(prepared.experiment).stimulus.factors
+    )
+    return first, second
+
+
+def merge(fits: "Sequence[SeriesPlane]") -> PlanesResult | None:
+    """The fits of all series as one result, a condition a series; None where none was fitted."""
+    done = [(fit.label, fit.result) for fit in fits if fit.result is not None]
+    if not done:
+        return None
+    return PlanesResult(
+        {label: result.pooled["all"] for label, result in done},
+        {fit.label: fit.reason for fit in fits if fit.reason},
+        tuple(replace(one, condition=label) for label, result in done for one in result.people),
+        {label: result.means["all"] for label, result in done},
+        sum(result.n_trials for _, result in done),
+        (),
+    )
+
+
+def sentences(fits: "Sequence[SeriesPlane]", variables: tuple[str, str]) -> tuple[str, ...]:
+    """The threshold and the tilt of each series."""
+    said = [f"{fit.label}: no function was fitted, {fit.reason}." for fit in fits if fit.reason]
+    for series in fits:
+        if series.result is None:
+            continue
+        fit, means = series.result.pooled["all"], series.result.means["all"]
+        threshold, tilt, of = fit.threshold, fit.tilt, "over all trials"
+        if means.threshold is not None and means.tilt is not None:
+            threshold, tilt = means.threshold.mean, means.tilt.mean
+            of = f"of {means.threshold.people} people on average"
+        said.append(
+            f"{series.label}: the threshold {of} was {fixed(threshold, 3)} where {variables[1]} is "
+            f"{fit.middle:g}, and moved by {fixed(tilt, 3)} per unit of it."
+        )
+    return tuple(said)
+
+
+def _shares(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], name: str, synthetic: bool) -> Table:
+    rows = tuple(
+        (fit.label, f"{x:g}", f"{z:g}", f"{n:.0f}", f"{k:.0f}", fixed(k / n))
+        for fit in fits
+        for x, z, n, k in zip(*fit.points, strict=True)
+    )
+    header = ("Series", *variables, "Trials", "Yes or right", "Share")
+    title = caption("Answers at each stimulus", name, synthetic)
+    return Table("threshold-shares", title, header, rows, 1, (), folded=len(rows) > 24)
+
+
+def numbers(
+    prepared: Prepared, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]", people: int
+) -> dict[str, Any]:
+    """The JSON document; conditions are the series' names."""
+    experiment = prepared.experiment
+    names = {fit.label: fit.name for fit in fits}
+    done = [(fit.name, fit.result) for fit in fits if fit.result is not None]
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "kind": experiment.trial.kind,
+        "source": prepared.source,
+        "synthetic": prepared.synthetic,
+        "n_participants": people,
+        "n_trials": len(prepared.rows),
+        "labels": {fit.name: fit.label for fit in fits},
+        "pooled": {name: asdict(result.pooled["all"]) for name, result in done},
+        "reasons": {fit.name: fit.reason for fit in fits if fit.reason},
+        "people": [asdict(one) | {"condition": name} for name, result in done for one in result.people],
+        "means": {name: asdict(result.means["all"]) for name, result in done},
+        "differences": [
+            asdict(d) | {"first": names[d.first], "second": names[d.second]} for d in differences
+        ],
+        "decisions": list(prepared.decisions),
+        "exclusions": exclusions_data(prepared.exclusions),
+    }
+
+
+def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: bool, people: int) -> Picture:
+    """A panel a series: shares at every stimulus, and the line of thresholds with its interval."""
+    # matplotlib takes a second to import, which commands that draw nothing need not pay
+    import matplotlib as mpl
+
+    from analysis.report.pictures import STYLE, as_bytes, new_figure, write_note
+
+    with mpl.rc_context(STYLE):
+        figure = new_figure()
+        panels = figure.subplots(1, len(fits), sharey=True, squeeze=False)[0]
+        for axes, fit in zip(panels, fits, strict=True):
+            x, z, n, k = fit.points
+            sizes = 12 + 80 * np.sqrt(n / n.max())
+            axes.scatter(
+                z, x, s=sizes, c=k / n, cmap="cividis", vmin=0, vmax=1, edgecolor="0.4", linewidth=0.4
+            )
+            if fit.result is not None:
+                line = fit.result.pooled["all"].line
+                across = [point.z for point in line]
+                axes.plot(across, [point.threshold for point in line], color="black", linewidth=1.3)
+                ends = [(point.ci.low, point.ci.high) for point in line]
+                known = [
+                    (at, low, high) for at, (low, high) in zip(across, ends, strict=True) if low and high
+                ]
+                if len(known) > 1:
+                    at, low, high = zip(*known, strict=True)
+                    axes.fill_between(at, low, high, color="black", alpha=0.15, linewidth=0)
+            axes.set_title(fit.label, fontsize=9)
+            axes.set_xlabel(variables[1])
+            axes.margins(x=0.15)
+        panels[0].set_ylabel(variables[0])
+        note = f"N = {people}. Size: trials. Dark to light: share of yes, or right, 0 to 1. Line: threshold."
+        write_note(figure, note, synthetic, "answers")
+        alt = f"Thresholds of {len(fits)} series along {variables[0]} and {variables[1]}"
+        made = as_bytes(figure, "svg"), as_bytes(figure, "png")
+        return Picture("figure-thresholds", "Lines of thresholds", alt, *made)

@@ -1,0 +1,313 @@
+"""A psychometric function of two stimulus variables: its threshold is a straight line over the second."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special, stats
+
+from analysis.thresholds.likelihood import CHI2_95, Interval
+from experiments.errors import InputError
+
+Array = NDArray[np.float64]
+PlaneShape = Literal["normal", "logistic"]
+MAX_STEPS, TOLERANCE = 100, 1e-15
+FLATTEST = 1e-4
+"""Where F rises less than this at every stimulus shown, the answers switch without overlap."""
+
+
+class Points(NamedTuple):
+    """Trials counted by stimulus: x and z (m,), trials n (m,), positive (or correct) answers k (m,)."""
+
+    x: Array
+    z: Array
+    n: Array
+    k: Array
+
+
+@dataclass(frozen=True)
+class LinePoint:
+    """The threshold at one number of the second variable."""
+
+    z: float
+    threshold: float
+    ci: Interval
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A fitted function of two variables; see `fit_plane`.
+
+    Attributes
+    ----------
+    threshold : float
+        At z = `middle`, in the unit of x.
+    tilt : float
+        Change of the threshold per unit of z.
+    spread : float
+        SD (normal) or scale (logistic) along x.
+    line : tuple of LinePoint
+        The threshold at every z that was shown, with its profile likelihood interval.
+    p : float
+        Of the deviance against chi2 with `df`: small where the line or the shape does not hold.
+    """
+
+    shape: PlaneShape
+    guess: float
+    lapse: float
+    middle: float
+    threshold: float
+    threshold_se: float
+    threshold_ci: Interval
+    tilt: float
+    tilt_se: float
+    tilt_ci: Interval
+    spread: float
+    spread_ci: Interval
+    line: tuple[LinePoint, ...]
+    log_likelihood: float
+    deviance: float
+    df: int
+    p: float
+    n_trials: int
+    n_points: int
+    falling: bool
+
+
+def counted_points(x: Array, z: Array, response: Array) -> Points:
+    """Count trials and positive answers at each stimulus."""
+    places, index = np.unique(np.column_stack([x, z]), axis=0, return_inverse=True)
+    n = np.bincount(index.ravel(), minlength=len(places)).astype(float)
+    k = np.bincount(index.ravel(), weights=response, minlength=len(places))
+    return Points(places[:, 0], places[:, 1], n, k)
+
+
+def fit_plane(
+    points: Points,
+    shape: PlaneShape = "normal",
+    guess: float = 0.0,
+    lapse: float = 0.0,
+    *,
+    falling: bool = False,
+    middle: float | None = None,
+    along: bool = True,
+) -> Plane:
+    r"""Fit a threshold that is a straight line over z, by maximum likelihood.
+
+    .. math::
+
+        P(x, z) = \gamma + (1 - \gamma - \lambda) F\left(\frac{x - t - b (z - z_0)}{s}\right) \tag{1}
+
+    with guess rate gamma, lapse rate lambda, threshold t at z_0, tilt b and spread s. With gamma = lambda = 0
+    this is a probit (logit) regression on x and z. Intervals are profiles of the likelihood: every other
+    parameter is fitted anew at each value.
+
+    Parameters
+    ----------
+    points : Points
+    shape : {"normal", "logistic"}
+    guess, lapse : float
+        The function's ends.
+    falling : bool
+        Whether positive answers become rarer with x; F is then 1 - F.
+    middle : float, optional
+        z_0; where not given, between the lowest and the highest z.
+    along : bool
+        Whether to give the threshold at every z, with its interval.
+
+    Raises
+    ------
+    InputError
+        Fewer than two numbers of either variable, answers all alike, that do not change with x, or that
+        switch without overlap.
+    """
+    _refuse_unfit(points)
+    if middle is None:
+        middle = float(points.z.min() + points.z.max()) / 2
+    sign = -1.0 if falling else 1.0
+    link = _Link(points, shape, guess, lapse)
+    x, away = sign * points.x, points.z - middle
+    beta, value, information = link.fit(np.column_stack([np.ones_like(x), x, away]))
+    width = float(np.ptp(points.x))
+    if not beta[1] > 1e-6 / width:
+        raise InputError("the answers do not change with x as they should; there is no threshold to place")
+    if link.steepest(beta, np.column_stack([np.ones_like(x), x, away])) < FLATTEST:
+        raise InputError(
+            "the answers switch between stimuli without overlap; tilt and spread have no estimate"
+        )
+    threshold, tilt, spread = -beta[0] / beta[1], -beta[2] / beta[1], 1 / beta[1]
+    covariance = np.linalg.inv(information)
+    gradients = np.array([[-spread, -threshold * spread, 0.0], [0.0, -tilt * spread, -spread]])
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
+    profile = _Profiles(link, x, points.z, value)
+    deviance, df = link.deviance(beta, np.column_stack([np.ones_like(x), x, away])), points.n.size - 3
+    line = tuple(
+        LinePoint(
+            float(z),
+            float(sign * (threshold + tilt * (z - middle))),
+            _turned(profile.threshold(threshold + tilt * (z - middle), z), sign),
+        )
+        for z in (np.unique(points.z) if along else ())
+    )
+    return Plane(
+        shape,
+        guess,
+        lapse,
+        middle,
+        float(sign * threshold),
+        float(errors[0]),
+        _turned(profile.threshold(threshold, middle), sign),
+        float(sign * tilt),
+        float(errors[1]),
+        _turned(profile.tilt(tilt), sign),
+        float(spread),
+        profile.spread(spread),
+        line,
+        value,
+        deviance,
+        df,
+        float(stats.chi2.sf(deviance, df)) if df > 0 else float("nan"),
+        int(points.n.sum()),
+        points.n.size,
+        falling,
+    )
+
+
+def _refuse_unfit(points: Points) -> None:
+    for name, values in (("x", points.x), ("the second variable", points.z)):
+        if np.unique(values).size < 2:
+            raise InputError(
+                f"expected answers at two numbers of {name} or more, got {np.unique(values).size}"
+            )
+    if points.k.sum() in (0.0, points.n.sum()):
+        raise InputError(
+            f"all {int(points.n.sum())} answers are alike; there is no threshold among these stimuli"
+        )
+
+
+def _turned(interval: Interval, sign: float) -> Interval:
+    if sign > 0:
+        return interval
+    low, high = interval.high, interval.low
+    return Interval(None if low is None else -low, None if high is None else -high)
+
+
+class _Link:
+    """The likelihood of eq. (1) in the predictor X beta + offset, maximised by Fisher scoring."""
+
+    def __init__(self, points: Points, shape: PlaneShape, guess: float, lapse: float) -> None:
+        self.n, self.k, self.shape = points.n, points.k, shape
+        self.guess, self.scale = guess, 1 - guess - lapse
+
+    def _share(self, eta: Array) -> tuple[Array, Array]:
+        """P and dP/d eta."""
+        if self.shape == "normal":
+            f, slope = special.ndtr(eta), np.exp(-0.5 * eta**2) / np.sqrt(2 * np.pi)
+        else:
+            f = special.expit(eta)
+            slope = f * special.expit(-eta)
+        return np.clip(self.guess + self.scale * f, 1e-12, 1 - 1e-12), self.scale * slope
+
+    def value(self, eta: Array) -> float:
+        """The log-likelihood, without its binomial coefficients."""
+        p, _ = self._share(eta)
+        return float(special.xlogy(self.k, p).sum() + special.xlog1py(self.n - self.k, -p).sum())
+
+    def fit(
+        self, x: Array, offset: Array | float = 0.0, start: Array | None = None
+    ) -> tuple[Array, float, Array]:
+        """The maximum over beta, its log-likelihood and the expected information (p, p)."""
+        beta = self._start(x, offset) if start is None else start
+        value = self.value(x @ beta + offset)
+        information = np.eye(x.shape[1])
+        for _ in range(MAX_STEPS):
+            p, slope = self._share(x @ beta + offset)
+            variance = p * (1 - p)
+            information = x.T @ (x * (self.n * slope**2 / variance)[:, None])
+            score = x.T @ ((self.k - self.n * p) / variance * slope)
+            step = np.linalg.lstsq(information, score, rcond=None)[0]
+            beta, value, gained = self._stepped(x, offset, beta, step, value)
+            if gained < TOLERANCE * (1 + abs(value)):
+                break
+        return beta, value, information
+
+    def _stepped(
+        self, x: Array, offset: Array | float, beta: Array, step: Array, before: float
+    ) -> tuple[Array, float, float]:
+        """The step, halved until the likelihood rises."""
+        for halving in range(40):
+            moved = beta + step * 0.5**halving
+            value = self.value(x @ moved + offset)
+            if value >= before:
+                return moved, value, value - before
+        return beta, before, 0.0
+
+    def _start(self, x: Array, offset: Array | float) -> Array:
+        """Least squares on smoothed shares, put back on the predictor's scale."""
+        share = ((self.k + 0.5) / (self.n + 1) - self.guess) / self.scale
+        share = np.clip(share, 0.02, 0.98)
+        eta = special.ndtri(share) if self.shape == "normal" else special.logit(share)
+        root = np.sqrt(self.n)[:, None]
+        return np.asarray(np.linalg.lstsq(x * root, (eta - offset) * root[:, 0], rcond=None)[0])
+
+    def steepest(self, beta: Array, x: Array) -> float:
+        """The greatest dP/d eta at a stimulus."""
+        return float(self._share(x @ beta)[1].max()) / self.scale
+
+    def deviance(self, beta: Array, x: Array) -> float:
+        """Twice what the saturated model gains."""
+        p, _ = self._share(x @ beta)
+        yes, no = self.k, self.n - self.k
+        terms = special.xlogy(yes, yes / (self.n * p)) + special.xlogy(no, no / (self.n * (1 - p)))
+        return float(2 * terms.sum())
+
+
+class _Profiles:
+    """Ends of the likelihood's profiles: the predictor is written so that one parameter is a constant."""
+
+    def __init__(self, link: _Link, x: Array, z: Array, value: float) -> None:
+        self.link, self.x, self.z, self.value = link, x, z, value
+        self.width, self.span = float(np.ptp(x)), float(np.ptp(z))
+
+    def threshold(self, best: float, at: float) -> Interval:
+        """Of the threshold at z = `at`: b1 (x - t) + b2 (z - at)."""
+
+        def loss(t: float) -> float:
+            return self._loss(np.column_stack([self.x - t, self.z - at]))
+
+        return self._ends(loss, best, self.width / 20, 10 * self.width)
+
+    def tilt(self, best: float) -> Interval:
+        """b0 + b1 (x - b z)."""
+
+        def loss(b: float) -> float:
+            return self._loss(np.column_stack([np.ones_like(self.x), self.x - b * self.z]))
+
+        return self._ends(loss, best, self.width / self.span / 20, 20 * self.width / self.span)
+
+    def spread(self, best: float) -> Interval:
+        """x / s is an offset beside b0 + b2 z; searched by the logarithm."""
+
+        def loss(log_s: float) -> float:
+            columns = np.column_stack([np.ones_like(self.x), self.z])
+            return self._loss(columns, self.x / float(np.exp(log_s)))
+
+        ends = self._ends(loss, float(np.log(best)), 0.1, 8.0)
+        return Interval(*(None if end is None else float(np.exp(end)) for end in (ends.low, ends.high)))
+
+    def _loss(self, columns: Array, offset: Array | float = 0.0) -> float:
+        return 2 * (self.value - self.link.fit(columns, offset)[1]) - CHI2_95
+
+    def _ends(self, loss: Callable[[float], float], best: float, step: float, most: float) -> Interval:
+        return Interval(self._end(loss, best, -step, most), self._end(loss, best, step, most))
+
+    def _end(self, loss: Callable[[float], float], best: float, step: float, most: float) -> float | None:
+        inside = best
+        while abs(inside + step - best) <= most:
+            outside = inside + step
+            if loss(outside) > 0:
+                return float(optimize.brentq(loss, inside, outside, xtol=1e-10 * abs(step), rtol=1e-12))
+            inside, step = outside, step * 1.6
+        return None

@@ -1,0 +1,122 @@
+"""Thresholds over two stimulus variables: of every condition and person, and their means over people."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.thresholds.people import Answers, Average, average
+from analysis.thresholds.plane import Plane, PlaneShape, Points, counted_points, fit_plane
+from experiments.errors import InputError
+
+
+@dataclass(frozen=True)
+class PersonPlane:
+    """One person's fit in one condition; `fit` is None where `reason` says why not."""
+
+    participant: str
+    condition: str
+    fit: Plane | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class PlaneMeans:
+    """Means over people of the threshold at the middle and of the tilt; None below two people."""
+
+    threshold: Average | None
+    tilt: Average | None
+
+
+@dataclass(frozen=True)
+class PlanesResult:
+    """Everything that is known of answers over two variables; `reasons` of conditions without a fit."""
+
+    pooled: dict[str, Plane]
+    reasons: dict[str, str]
+    people: tuple[PersonPlane, ...]
+    means: dict[str, PlaneMeans]
+    n_trials: int
+    decisions: tuple[str, ...]
+
+
+def fit_planes(
+    answers: Answers, shape: PlaneShape, guess: float, lapse: float, *, falling: bool | None = None
+) -> PlanesResult:
+    """Fit every condition over all trials and, where people are named, every person in it.
+
+    Where it is not said whether the function is `falling`, the answers tell, without a guess rate alone.
+
+    Raises
+    ------
+    InputError
+        Where no condition can be fitted.
+    """
+    if answers.second is None:
+        raise InputError(f"{answers.source}: expected a second stimulus variable, got none")
+    size = answers.x.size
+    labels = np.full(size, "all", dtype=object) if answers.condition is None else answers.condition
+    names = np.full(size, "", dtype=object) if answers.participant is None else answers.participant
+    middle = float(answers.second.min() + answers.second.max()) / 2
+    pooled: dict[str, Plane] = {}
+    reasons: dict[str, str] = {}
+    people: list[PersonPlane] = []
+    for condition in sorted({str(label) for label in labels}):
+        rows = labels == condition
+        down = _falls(answers, rows, guess) if falling is None else falling
+        fit, reason = fitted(_points(answers, rows), shape, guess, lapse, down, middle)
+        if fit is None:
+            reasons[condition] = reason
+        else:
+            pooled[condition] = fit
+        for name in sorted({str(one) for one in names[rows]} - {""}):
+            mine = _points(answers, rows & (names == name))
+            fitted_own = fitted(mine, shape, guess, lapse, down, middle, along=False)
+            people.append(PersonPlane(name, condition, *fitted_own))
+    if not pooled:
+        raise InputError(f"{answers.source}: {next(iter(reasons.values()))}")
+    means = {
+        condition: means_of([one for one in people if one.condition == condition]) for condition in pooled
+    }
+    return PlanesResult(pooled, reasons, tuple(people), means, size, answers.decisions)
+
+
+def _falls(answers: Answers, rows: NDArray[np.bool_], guess: float) -> bool:
+    x, y = answers.x[rows], answers.response[rows]
+    return guess == 0.0 and float(np.sum((x - x.mean()) * y)) < 0
+
+
+def _points(answers: Answers, rows: NDArray[np.bool_]) -> Points:
+    second = answers.x if answers.second is None else answers.second
+    return counted_points(answers.x[rows], second[rows], answers.response[rows])
+
+
+def fitted(
+    points: Points,
+    shape: PlaneShape,
+    guess: float,
+    lapse: float,
+    falling: bool,
+    middle: float,
+    *,
+    along: bool = True,
+) -> tuple[Plane | None, str]:
+    """The fit, or None and why there is none."""
+    try:
+        return fit_plane(points, shape, guess, lapse, falling=falling, middle=middle, along=along), ""
+    except InputError as error:
+        return None, str(error)
+
+
+def means_of(people: Sequence[PersonPlane]) -> PlaneMeans:
+    """Means over the people who have a fit."""
+    fits = [one.fit for one in people if one.fit is not None]
+    each: Mapping[str, Average | None] = {
+        name: average(
+            np.array([getattr(fit, name) for fit in fits]),
+            np.array([getattr(fit, f"{name}_se") for fit in fits]),
+        )
+        for name in ("threshold", "tilt")
+    }
+    return PlaneMeans(each["threshold"], each["tilt"])
