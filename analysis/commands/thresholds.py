@@ -105,7 +105,9 @@ def _planes(
     if lapse is None:
         raise InputError("--second: expected --lapse as a number; it is not fitted beside a tilt")
     with saying("fitting"):
-        result = fit_planes(answers, function.value, guess, lapse)
+        result = fit_planes(
+            answers, "logistic" if function is FunctionChoice.LOGISTIC else "normal", guess, lapse
+        )
     typer.echo(plane_text(result, variables, name, answers.synthetic))
     for table in plane_tables(result, variables, name, answers.synthetic):
         show_tables(table)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -128,7 +129,7 @@ def _seconds(prepared: Prepared) -> NDArray[np.float64] | None:
         return None
     number = {level: value for value, level in seconds(prepared.experiment).items()}
     refuse_unknown(prepared.rows, second.factor, list(number), f"level of {second.factor}", prepared.source)
-    return prepared.rows[second.factor].map(number).to_numpy(dtype=float)
+    return np.asarray(prepared.rows[second.factor].map(number), dtype=np.float64)
 
 
 def fits_of(prepared: Prepared) -> tuple[SeriesFit, ...]:
@@ -165,7 +166,8 @@ def _compared(
         gaps = np.array([first[name] - second[name] for name in both])
         if len(both) < 2 or not np.ptp(gaps) > 0:
             return None
-        test, people, difference = stats.ttest_1samp(gaps, 0.0), len(both), float(gaps.mean())
+        test: Any = stats.ttest_1samp(gaps, 0.0)
+        people, difference = len(both), float(gaps.mean())
     else:
         a, b = np.array(list(first.values())), np.array(list(second.values()))
         if min(a.size, b.size) < 2 or not np.ptp(a) + np.ptp(b) > 0:

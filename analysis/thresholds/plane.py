@@ -1,6 +1,6 @@
 """A psychometric function of two stimulus variables: its threshold is a straight line over the second."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -16,6 +16,9 @@ PlaneShape = Literal["normal", "logistic"]
 MAX_STEPS, TOLERANCE = 100, 1e-15
 FLATTEST = 1e-4
 """Where F rises less than this at every stimulus shown, the answers switch without overlap."""
+MAX_CONDITION = 1e16
+BROAD = (1 / 3, 1 / 10)
+"""Spreads from which a fit starts too, in ranges of x: guesses and lapses make several maxima."""
 
 
 class Points(NamedTuple):
@@ -80,7 +83,7 @@ def counted_points(x: Array, z: Array, response: Array) -> Points:
     """Count trials and positive answers at each stimulus."""
     places, index = np.unique(np.column_stack([x, z]), axis=0, return_inverse=True)
     n = np.bincount(index.ravel(), minlength=len(places)).astype(float)
-    k = np.bincount(index.ravel(), weights=response, minlength=len(places))
+    k = np.asarray(np.bincount(index.ravel(), weights=response, minlength=len(places)), dtype=np.float64)
     return Points(places[:, 0], places[:, 1], n, k)
 
 
@@ -129,11 +132,12 @@ def fit_plane(
     sign = -1.0 if falling else 1.0
     link = _Link(points, shape, guess, lapse)
     x, away = sign * points.x, points.z - middle
-    beta, value, information = link.fit(np.column_stack([np.ones_like(x), x, away]))
     width = float(np.ptp(points.x))
+    columns = np.column_stack([np.ones_like(x), x, away])
+    beta, value, information = link.best(columns, [link.start(columns), *_broad(x, width)])
     if not beta[1] > 1e-6 / width:
         raise InputError("the answers do not change with x as they should; there is no threshold to place")
-    if link.steepest(beta, np.column_stack([np.ones_like(x), x, away])) < FLATTEST:
+    if link.steepest(beta, columns) < FLATTEST or np.linalg.cond(information) > MAX_CONDITION:
         raise InputError(
             "the answers switch between stimuli without overlap; tilt and spread have no estimate"
         )
@@ -141,8 +145,8 @@ def fit_plane(
     covariance = np.linalg.inv(information)
     gradients = np.array([[-spread, -threshold * spread, 0.0], [0.0, -tilt * spread, -spread]])
     errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
-    profile = _Profiles(link, x, points.z, value)
-    deviance, df = link.deviance(beta, np.column_stack([np.ones_like(x), x, away])), points.n.size - 3
+    profile = _Profiles(link, x, points.z, value, (float(beta[0] - beta[2] * middle), beta[1], beta[2]))
+    deviance, df = link.deviance(beta, columns), points.n.size - 3
     line = tuple(
         LinePoint(
             float(z),
@@ -187,6 +191,11 @@ def _refuse_unfit(points: Points) -> None:
         )
 
 
+def _broad(x: Array, width: float) -> list[Array]:
+    """Functions of these spreads about the middle of x, without a tilt."""
+    return [np.array([-x.mean(), 1.0, 0.0]) / (share * width) for share in BROAD]
+
+
 def _turned(interval: Interval, sign: float) -> Interval:
     if sign > 0:
         return interval
@@ -215,11 +224,15 @@ class _Link:
         p, _ = self._share(eta)
         return float(special.xlogy(self.k, p).sum() + special.xlog1py(self.n - self.k, -p).sum())
 
-    def fit(
-        self, x: Array, offset: Array | float = 0.0, start: Array | None = None
+    def best(
+        self, x: Array, starts: Sequence[Array], offset: Array | float = 0.0
     ) -> tuple[Array, float, Array]:
-        """The maximum over beta, its log-likelihood and the expected information (p, p)."""
-        beta = self._start(x, offset) if start is None else start
+        """The best of the maxima that these starts lead to."""
+        return max((self.fit(x, start, offset) for start in starts), key=lambda fit: fit[1])
+
+    def fit(self, x: Array, start: Array, offset: Array | float = 0.0) -> tuple[Array, float, Array]:
+        """A maximum over beta, its log-likelihood and the expected information (p, p)."""
+        beta = start
         value = self.value(x @ beta + offset)
         information = np.eye(x.shape[1])
         for _ in range(MAX_STEPS):
@@ -227,7 +240,7 @@ class _Link:
             variance = p * (1 - p)
             information = x.T @ (x * (self.n * slope**2 / variance)[:, None])
             score = x.T @ ((self.k - self.n * p) / variance * slope)
-            step = np.linalg.lstsq(information, score, rcond=None)[0]
+            step: Array = np.asarray(np.linalg.lstsq(information, score, rcond=None)[0], dtype=np.float64)
             beta, value, gained = self._stepped(x, offset, beta, step, value)
             if gained < TOLERANCE * (1 + abs(value)):
                 break
@@ -244,13 +257,13 @@ class _Link:
                 return moved, value, value - before
         return beta, before, 0.0
 
-    def _start(self, x: Array, offset: Array | float) -> Array:
+    def start(self, x: Array) -> Array:
         """Least squares on smoothed shares, put back on the predictor's scale."""
         share = ((self.k + 0.5) / (self.n + 1) - self.guess) / self.scale
         share = np.clip(share, 0.02, 0.98)
         eta = special.ndtri(share) if self.shape == "normal" else special.logit(share)
         root = np.sqrt(self.n)[:, None]
-        return np.asarray(np.linalg.lstsq(x * root, (eta - offset) * root[:, 0], rcond=None)[0])
+        return np.asarray(np.linalg.lstsq(x * root, eta * root[:, 0], rcond=None)[0])
 
     def steepest(self, beta: Array, x: Array) -> float:
         """The greatest dP/d eta at a stimulus."""
@@ -265,17 +278,23 @@ class _Link:
 
 
 class _Profiles:
-    """Ends of the likelihood's profiles: the predictor is written so that one parameter is a constant."""
+    """Ends of the likelihood's profiles: the predictor is written so that one parameter is a constant.
 
-    def __init__(self, link: _Link, x: Array, z: Array, value: float) -> None:
-        self.link, self.x, self.z, self.value = link, x, z, value
+    best: b0, b1 and b2 of b0 + b1 x + b2 z at the maximum, from which every fit starts.
+    """
+
+    def __init__(
+        self, link: _Link, x: Array, z: Array, value: float, best: tuple[float, float, float]
+    ) -> None:
+        self.link, self.x, self.z, self.value, self.best = link, x, z, value, best
         self.width, self.span = float(np.ptp(x)), float(np.ptp(z))
 
     def threshold(self, best: float, at: float) -> Interval:
         """Of the threshold at z = `at`: b1 (x - t) + b2 (z - at)."""
 
         def loss(t: float) -> float:
-            return self._loss(np.column_stack([self.x - t, self.z - at]))
+            starts = [self.best[1:], *((1 / (share * self.width), 0.0) for share in BROAD)]
+            return self._loss(np.column_stack([self.x - t, self.z - at]), starts)
 
         return self._ends(loss, best, self.width / 20, 10 * self.width)
 
@@ -283,7 +302,10 @@ class _Profiles:
         """b0 + b1 (x - b z)."""
 
         def loss(b: float) -> float:
-            return self._loss(np.column_stack([np.ones_like(self.x), self.x - b * self.z]))
+            columns = np.column_stack([np.ones_like(self.x), self.x - b * self.z])
+            along = float(columns[:, 1].mean())
+            broad = ((-along / (share * self.width), 1 / (share * self.width)) for share in BROAD)
+            return self._loss(columns, [self.best[:2], *broad])
 
         return self._ends(loss, best, self.width / self.span / 20, 20 * self.width / self.span)
 
@@ -292,13 +314,18 @@ class _Profiles:
 
         def loss(log_s: float) -> float:
             columns = np.column_stack([np.ones_like(self.x), self.z])
-            return self._loss(columns, self.x / float(np.exp(log_s)))
+            s = float(np.exp(log_s))
+            starts = [(self.best[0], self.best[2]), (-float(self.x.mean()) / s, 0.0)]
+            return self._loss(columns, starts, self.x / s)
 
         ends = self._ends(loss, float(np.log(best)), 0.1, 8.0)
         return Interval(*(None if end is None else float(np.exp(end)) for end in (ends.low, ends.high)))
 
-    def _loss(self, columns: Array, offset: Array | float = 0.0) -> float:
-        return 2 * (self.value - self.link.fit(columns, offset)[1]) - CHI2_95
+    def _loss(
+        self, columns: Array, starts: Sequence[tuple[float, ...]], offset: Array | float = 0.0
+    ) -> float:
+        value = self.link.best(columns, [np.array(start) for start in starts], offset)[1]
+        return 2 * (self.value - value) - CHI2_95
 
     def _ends(self, loss: Callable[[float], float], best: float, step: float, most: float) -> Interval:
         return Interval(self._end(loss, best, -step, most), self._end(loss, best, step, most))
