@@ -1,5 +1,6 @@
 """The view of paired comparisons."""
 
+import sqlalchemy as sa
 from alembic import op
 
 revision = "0008"
@@ -89,4 +90,10 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
+    stored = op.get_bind().scalar(sa.text("SELECT count(*) FROM trial_ratings WHERE kind = 'paired_comparison'"))
+    if stored:
+        raise RuntimeError(
+            f"revision {down_revision} has no view of the {stored} comparisons that are stored; keep this revision, or "
+            "take a backup and delete the runs of these studies first"
+        )
     op.execute("DROP VIEW comparisons")
