@@ -93,7 +93,7 @@ def test_two_workers_choose_pairs_and_follow_series_as_one(
     adaptive = add_study(services, tmp_path / "series", text_with(SHORT, YES_NO), name="adaptive")
     links = [study.link(synthetic=True) for study in (pairs, adaptive)] * PEOPLE
     with ThreadPoolExecutor(2) as pool:
-        dealt = list(pool.map(lambda address: _dealt(address, links[0]), workers))
+        dealt = list(pool.map(lambda worker: _dealt(workers[worker], links[0], 100 + worker), range(2)))
     assert len(dealt[0] | dealt[1]) == 6, "who begins at once at two workers gets other pairs"
 
     def takes_part(number: int) -> Counter[int]:
@@ -110,10 +110,10 @@ def test_two_workers_choose_pairs_and_follow_series_as_one(
     _check_series(services)
 
 
-def _dealt(address: str, link: str) -> set[frozenset[str]]:
+def _dealt(address: str, link: str, seed: int) -> set[frozenset[str]]:
     """The pairs of a run that is begun now."""
     client = JsonClient(address)
-    Person(client, Rater(0, 1, {})).begin(link)
+    Person(client, Rater(seed, 1, {})).begin(link)
     client.put("/api/run/consent", {"agreed": True})
     trials = client.get("/api/run")["trials"]
     client.close()
