@@ -28,6 +28,7 @@ from server.participants import view_endpoints as views
 from server.reports import endpoints as reports
 from server.results import endpoints as results
 from server.runs import endpoints as runs
+from server.seals import endpoints as seals
 from server.settings import Settings
 from server.studies import endpoints as studies
 from server.studies import life_endpoints as life_cycle
@@ -51,6 +52,7 @@ def _routers() -> tuple[APIRouter, ...]:
         monitor.router,
         results.router,
         runs.router,
+        seals.router,
         export.router,
         reports.router,
         methods.router,

@@ -1227,6 +1227,50 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/studies/{study}/seal": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Seal
+         * @description Whether there is a sealed plan.
+         */
+        get: operations["get_seal"];
+        put?: never;
+        /**
+         * Seal Study
+         * @description Seal design, exclusions, analysis plan and power, once, before the first participant.
+         */
+        post: operations["seal_study"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/seal/plan.{ending}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Seal
+         * @description The sealed file, or a page of it that prints well.
+         */
+        get: operations["download_seal"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/data/ratings.csv": {
         parameters: {
             query?: never;
@@ -4293,6 +4337,19 @@ export interface components {
             sensitivity?: boolean;
         };
         /**
+         * NewSeal
+         * @description What is sealed with the plan.
+         */
+        NewSeal: {
+            /**
+             * Power
+             * @description What `analysis power --json` wrote.
+             */
+            power?: {
+                [key: string]: unknown;
+            } | null;
+        };
+        /**
          * NewStudy
          * @description A study from a shipped experiment, from a definition, or from uploaded clips.
          */
@@ -5889,6 +5946,28 @@ export interface components {
             data?: {
                 [key: string]: unknown;
             };
+        };
+        /**
+         * SealOut
+         * @description Whether the plan of the active version's data series is sealed, and since when.
+         */
+        SealOut: {
+            /** Sealed At */
+            sealed_at: string | null;
+            /** Sha256 */
+            sha256: string | null;
+            /** Version */
+            version: number | null;
+            /**
+             * Power
+             * @description Whether power was sealed with it.
+             */
+            power: boolean;
+            /**
+             * Participants
+             * @description Who has begun in this series: after the first nothing is sealed.
+             */
+            participants: number;
         };
         /**
          * SecondFactorSetup
@@ -7826,6 +7905,7 @@ export type NewInvitation = components['schemas']['NewInvitation'];
 export type NewInvitationOut = components['schemas']['NewInvitationOut'];
 export type NewLinks = components['schemas']['NewLinks'];
 export type NewReport = components['schemas']['NewReport'];
+export type NewSeal = components['schemas']['NewSeal'];
 export type NewStudy = components['schemas']['NewStudy'];
 export type NewToken = components['schemas']['NewToken'];
 export type NewTokenOut = components['schemas']['NewTokenOut'];
@@ -7875,6 +7955,7 @@ export type ScreenAttention = components['schemas']['ScreenAttention'];
 export type ScreenDevice = components['schemas']['ScreenDevice'];
 export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
 export type ScreenOut = components['schemas']['ScreenOut'];
+export type SealOut = components['schemas']['SealOut'];
 export type SecondFactorSetup = components['schemas']['SecondFactorSetup'];
 export type SecondStimulus = components['schemas']['SecondStimulus'];
 export type SeenClip = components['schemas']['SeenClip'];
@@ -10819,6 +10900,129 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Erased"];
                 };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    get_seal: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SealOut"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    seal_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewSeal"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SealOut"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    download_seal: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+                ending: "json" | "html";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The request's content is not acceptable */
             422: {
