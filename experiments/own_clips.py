@@ -144,7 +144,13 @@ def suggest_pattern(names: Iterable[str]) -> str | None:
     if not stems or len(endings) != 1 or len({len(parts) for parts in stems}) != 1 or len(stems[0]) < 2:
         return None
     columns = list(zip(*stems, strict=True))
-    words = [f"factor{place}" for place in range(1, len(columns) + 1)]
-    if all(part.isdigit() for part in columns[-1]):
-        words[-1] = FIRST_FIELD
-    return "_".join("{" + word + "}" for word in words) + endings.pop()
+    varying = [len(set(column)) > 1 for column in columns]
+    if not any(varying):
+        return None
+    words: list[str] = []
+    for column, varies in zip(columns, varying, strict=True):
+        # A part that every name has is no factor: it stands in the pattern as it is.
+        words.append(f"{{factor{1 + sum('{' in word for word in words)}}}" if varies else column[0])
+    if varying[-1] and sum(varying) > 1 and all(part.isdigit() for part in columns[-1]):
+        words[-1] = "{" + FIRST_FIELD + "}"
+    return "_".join(words) + endings.pop()

@@ -1,0 +1,23 @@
+"""The pattern that is suggested for the names of own clips."""
+
+import pytest
+
+from experiments.own_clips import levels_from_names, suggest_pattern
+
+
+@pytest.mark.parametrize(
+    ("names", "pattern"),
+    [
+        (["fast_sad_1.mp4", "fast_happy_1.mp4", "slow_sad_2.mp4"], "{factor1}_{factor2}_{exemplar}.mp4"),
+        (["blink_slow_1.mp4", "blink_fast_2.mp4"], "blink_{factor1}_{exemplar}.mp4"),
+        (["blink_100.mp4", "blink_200.mp4"], "blink_{factor1}.mp4"),
+        (["blink_slow_1.mp4", "blink_fast_1.mp4"], "blink_{factor1}_1.mp4"),
+        (["Ärm_x.mp4", "Örm_x.mp4"], "{factor1}_x.mp4"),
+        (["one_1.mp4"], None),
+        (["a_1.mp4", "b.mp4"], None),
+    ],
+)
+def test_parts_that_vary_are_factors(names: list[str], pattern: str | None) -> None:
+    assert suggest_pattern(names) == pattern
+    if pattern is not None:
+        assert set(levels_from_names(pattern, names)) == set(names)
