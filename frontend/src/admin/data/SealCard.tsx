@@ -1,6 +1,6 @@
 /** The plan of the study, sealed before its first participant. */
 
-import { Anchor, Card, FileInput, Group, Stack, Text, Title } from "@mantine/core";
+import { Button, Card, FileInput, Group, Stack, Text, Title } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
@@ -39,18 +39,18 @@ interface Props {
 function Sealed({ study, seal }: Props) {
   const address = (ending: string) => `/api/admin/studies/${study}/seal/plan.${ending}`;
   return (
-    <Stack gap={4}>
+    <Stack gap="xs">
       <Text size="sm" className="wrap-anywhere">
         Version {seal.version} was sealed {when(seal.sealed_at ?? "")}, {seal.power ? "with its power" : "without power"}; sha256{" "}
         <code>{seal.sha256}</code>
       </Text>
       <Group>
-        <Anchor underline="always" size="sm" href={address("json")} download>
+        <Button component="a" variant="default" size="xs" href={address("json")} download>
           Sealed file (JSON)
-        </Anchor>
-        <Anchor underline="always" size="sm" href={address("html")} download>
+        </Button>
+        <Button component="a" variant="default" size="xs" href={address("html")} download>
           Page to print
-        </Anchor>
+        </Button>
       </Group>
     </Stack>
   );
