@@ -72,6 +72,7 @@ EVIDENCE_COLUMNS = (
     _share("tickets", "Share of answers with a good ticket of the server."),
     _share("digests", "Share of rated clips shown to have been fetched, of those that could be checked."),
     _amount("clip_time", "Length of the clips over the server's time from first ticket to last answer."),
+    _amount("claimed_time", "The same with the response times added that the page claims."),
     _share("order", "Share of trials that came in their order."),
     _share("late", "Share of answers delivered late; says nothing against a run."),
     _share("interaction", "Share of answers with a key or pointer press reported."),

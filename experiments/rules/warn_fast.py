@@ -1,6 +1,7 @@
 """Warning of answers too fast to be given by looking."""
 
 from collections.abc import Sequence
+from functools import partial
 from statistics import median
 from typing import Annotated, Literal
 
@@ -8,6 +9,7 @@ from pydantic import Field
 
 from experiments.base import Translated
 from experiments.rules.warning import GivenAnswer, Warns
+from experiments.rules.warning_words import FAST_ANSWERS, in_every_language
 
 
 class WarnFast(Warns):
@@ -19,15 +21,7 @@ class WarnFast(Warns):
     """Answers of which the median is taken."""
     below_ms: Annotated[float, Field(gt=0)] = 250.0
     """Median response time, in ms from the clip's end, under which the warning comes."""
-    text: Translated = Field(
-        default_factory=lambda: {
-            "en": "# A word in between\n\nYour last answers came very fast. Please watch each clip to its "
-            "end, and then answer by your impression; nobody counts the seconds.",
-            "de": "# Ein Wort zwischendurch\n\nIhre letzten Antworten kamen sehr schnell. Bitte sehen Sie "
-            "jeden Clip bis zum Ende an, und antworten Sie dann nach Ihrem Eindruck; niemand zählt die "
-            "Sekunden.",
-        }
-    )
+    text: Translated = Field(default_factory=partial(in_every_language, FAST_ANSWERS))
     """Markdown of the warning, in every language."""
 
     def lapses(self, given: Sequence[GivenAnswer]) -> bool:

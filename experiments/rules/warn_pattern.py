@@ -1,12 +1,14 @@
 """Warning of answers that repeat in a cycle."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from experiments.base import Translated
 from experiments.rules.warning import GivenAnswer, Warns, follow_a_cycle
+from experiments.rules.warning_words import REPEATED_PATTERN, in_every_language
 
 
 class WarnPattern(Warns):
@@ -18,15 +20,7 @@ class WarnPattern(Warns):
     """Answers in a row that follow the pattern."""
     longest: Annotated[int, Field(ge=2, le=10)] = 4
     """Length of the longest pattern looked for; 1, 2, 3, 1, 2, 3 has length 3."""
-    text: Translated = Field(
-        default_factory=lambda: {
-            "en": "# A word in between\n\nYour last answers repeat a pattern. Please answer each clip by "
-            "what you see in it; there is no hurry, and a short break does no harm.",
-            "de": "# Ein Wort zwischendurch\n\nIhre letzten Antworten folgen einem Muster. Bitte "
-            "beantworten Sie jeden Clip nach dem, was Sie darin sehen; es eilt nicht, und eine kurze Pause "
-            "schadet nicht.",
-        }
-    )
+    text: Translated = Field(default_factory=partial(in_every_language, REPEATED_PATTERN))
     """Markdown of the warning, in every language."""
 
     def lapses(self, given: Sequence[GivenAnswer]) -> bool:

@@ -91,7 +91,7 @@ class Intake:
             if enforced:
                 # Each run has a share of its own: who sends false answers hinders nobody else.
                 self._false_answers.hit(answer.run_id)
-                # An outbox that was months away is no false answer: it is noted, and says nothing of the run.
+                # A page that stood open for months sends no false answer: noted, and no word on the run.
                 event = repository.EXPIRED if isinstance(refusal, TicketExpired) else repository.REFUSED
                 repository.note_refusal(connection, answer.run, event, refusal.code, answer.received_at)
                 raise
@@ -102,7 +102,9 @@ class Intake:
         if given is None:
             raise TicketMissing("Expected a ticket with the answer, got none; please load the page again.")
         where = (answer.run_id, answer.trial_index, answer.play)
-        return check_ticket(self.key, given.batch, given.ticket, *where, answer.received_at), given
+        # By the client's word, which only tells a late delivery: so old a ticket leaves time for any clip.
+        given_at = min(answer.received_at, answer.answered_at or answer.received_at)
+        return check_ticket(self.key, given.batch, given.ticket, *where, given_at), given
 
     def _digest(self, answer: Answer, given: RatingEvidence) -> bool | None:
         """True where the digest is right; None where none is needed, or the clip is not at hand."""

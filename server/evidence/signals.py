@@ -56,6 +56,7 @@ class Signals:
     tickets: share of answers with a good ticket. digests: share of rated clips, of those that could be
     checked, whose digest was right.
     clip_time: length of the clips over the server's time from the first ticket to the last answer.
+    claimed_time: the same with the response times that the page claims added to the clips.
     order: share of first plays that came in the order of the trials. late: share of late deliveries.
     interaction: share of answers with a press reported. trusted: share of presses made by input, not by
     scripts.
@@ -73,6 +74,7 @@ class Signals:
     tickets: float | None = None
     digests: float | None = None
     clip_time: float | None = None
+    claimed_time: float | None = None
     order: float | None = None
     late: float | None = None
     interaction: float | None = None
@@ -114,7 +116,8 @@ def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ())
     return Signals(
         tickets=_share([one.issued_at is not None for one in answers]),
         digests=_share([one.digest_right is True for one in clips]),
-        clip_time=_clip_time(came),
+        clip_time=_of_time_there_was(came, sum(one.clip_ms for one in came)),
+        claimed_time=_of_time_there_was(came, sum(one.clip_ms + (one.rt or 0.0) for one in came)),
         order=_order([one.trial_index for one in came if one.play == 1]),
         late=_share([one.late for one in answers]),
         interaction=_share([(one.presses or 0) > 0 for one in answers]),
@@ -168,10 +171,10 @@ def _share(facts: Sequence[bool]) -> float | None:
     return sum(facts) / len(facts) if facts else None
 
 
-def _clip_time(came: Sequence[JudgedAnswer]) -> float | None:
+def _of_time_there_was(came: Sequence[JudgedAnswer], claimed_ms: float) -> float | None:
     issued = [one.issued_at for one in came if one.issued_at is not None]
     there_was = (came[-1].received_at - min(issued)) / timedelta(milliseconds=1) if issued else 0.0
-    return sum(one.clip_ms for one in came) / there_was if there_was > 0 else None
+    return claimed_ms / there_was if there_was > 0 else None
 
 
 def _order(indices: Sequence[int]) -> float | None:

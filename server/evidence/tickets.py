@@ -20,7 +20,7 @@ from server.evidence.refusals import TicketExpired, TicketInvalid, TicketOfAnoth
 CODE_BYTES = 16
 NONCE_BYTES = 6
 LIFETIME = timedelta(days=60)
-"""Longer than a visit may last anywhere, so that an outbox may be as late as its visit."""
+"""From the ticket to its answer: longer than a visit may last anywhere. Delivery may be later still."""
 MAX_OPENED = 4096
 """Batches kept open: the answers of a visit come by the same one, whose seal is looked at once."""
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -80,13 +80,16 @@ def claimed_time(text: str) -> datetime | None:
 
 
 def check_ticket(
-    key: bytes, batch: str, code: str, run: str, trial_index: int, play: int, moment: datetime
+    key: bytes, batch: str, code: str, run: str, trial_index: int, play: int, given_at: datetime
 ) -> Batch:
-    """The batch of a ticket that is good for this play of this run; refused by name where it is not."""
+    """The batch of a ticket that is good for this play of this run; refused by name where it is not.
+
+    given_at: when the answer was given, which may be long before it is delivered.
+    """
     opened = open_batch(key, batch)
     if opened.run != run:
         raise TicketOfAnotherRun("Expected a ticket of this visit, got one of another; nothing is stored.")
-    if moment - opened.issued_at > LIFETIME:
+    if given_at - opened.issued_at > LIFETIME:
         raise TicketExpired(f"Expected a ticket issued within {LIFETIME.days} days, got an older one.")
     if not hmac.compare_digest(ticket(key, opened, trial_index, play).encode(), code.encode()):
         raise TicketOfAnotherTrial(

@@ -31,6 +31,7 @@ BANDS: dict[str, tuple[Band, ...]] = {
     "tickets": (Band(0, 1, -3), Band(1, INFINITE, 1)),
     "digests": (Band(0, 1, -4), Band(1, INFINITE, 1)),
     "clip_time": (Band(1.05, INFINITE, -4),),
+    "claimed_time": (Band(1.05, INFINITE, -4),),
     "order": (Band(0, 0.8, -2),),
     "interaction": (Band(0, 0.5, -3), Band(0.9, INFINITE, 1)),
     "trusted": (Band(0, 0.5, -2), Band(0.9, INFINITE, 2)),

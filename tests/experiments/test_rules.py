@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from experiments.rules.warn_fast import WarnFast
+from experiments.rules.warn_pattern import WarnPattern
+from experiments.rules.warn_same_answer import WarnSameAnswer
 from tests.conftest import REPOSITORY
 
 NEW = '''from typing import Literal
@@ -94,3 +97,14 @@ def unhandled(folder: Path, user: str) -> list[str]:
     command = [sys.executable, "-m", "mypy", *options, "pydantic.pyi", user, *copied]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
     return [line for line in done.stdout.splitlines() if "NewRule" in line]
+
+
+def test_warnings_have_words_in_every_language_of_the_page() -> None:
+    pages = REPOSITORY / "frontend" / "src" / "i18n" / "languages"
+    languages = {path.stem for path in pages.glob("*.ts")}
+    assert len(languages) >= 11
+    for rule in (WarnFast, WarnPattern, WarnSameAnswer):
+        words = rule().text
+        assert set(words) == languages
+        assert len({text.split("\n", 1)[1] for text in words.values()}) == len(languages)
+        assert all(text.startswith("# ") for text in words.values())

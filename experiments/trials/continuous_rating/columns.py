@@ -76,6 +76,7 @@ TRACES = View(
         *base.VIEWS,
         *base.CHECK,
         *base.PRESENTATION,
+        *base.EVIDENCE,
     ),
     rows=rows_of("continuous_rating", {"shown": "c"}, "LEFT JOIN clips k ON k.sha256 = c.clip_sha256\n"),
 )

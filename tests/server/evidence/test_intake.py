@@ -227,7 +227,7 @@ def test_views_told_of_at_once_are_no_time_to_watch_them(watcher: Watcher) -> No
 
 
 def test_an_expired_ticket_is_refused_and_costs_the_run_nothing(watcher: Watcher, services: Services) -> None:
-    """An outbox that was away for months: its answers are not taken, and nobody is doubted for them."""
+    """A page that stood open for months: its answer is not taken, and nobody is doubted for it."""
     first, *others = watcher.state()["trials"]
     old = watcher.evidence(first)
     watcher.wait(61 * 86_400)
@@ -252,3 +252,38 @@ def test_a_replayed_ticket_brings_no_second_answer(watcher: Watcher, services: S
     again = watcher.answer(trial, given | {"digest": None}, play=2)
     assert code(again) == "422 ticket_of_another_trial"
     assert len(rows(services)) == 1
+
+
+def test_an_outbox_that_was_away_for_months_is_a_late_delivery(watcher: Watcher, services: Services) -> None:
+    """Given in time, delivered after the ticket's time: taken, marked late, nothing noted against it."""
+    given = []
+    for trial in watcher.state()["trials"]:
+        watcher.wait(SHOWN_S)
+        given.append((trial, watcher.moment))
+    watcher.wait(90 * 86_400)
+    for trial, moment in given:
+        answer = watcher.rate(trial, evidence=watcher.evidence(trial), answered_at_client=moment.isoformat())
+        assert answer.status_code == 201
+    assert [row.late for row in rows(services)] == [True] * len(given)
+    with services.database.read() as session:
+        [run] = session.scalars(select(StudyRun))
+        assert not has_refusals(session, run)
+        assert judge_run(session, run).signals.late == 1
+
+
+def test_each_refusal_has_the_one_error_shape_and_is_noted_once(watcher: Watcher, services: Services) -> None:
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(SHOWN_S)
+    good = watcher.evidence(trial)
+    for changes in ({"batch": "x.1.2.3"}, {"ticket": "A" * 22}, {"digest": None}, {"digest": "0" * 64}):
+        for _ in range(3):
+            answer = watcher.answer(trial, good | changes)
+            assert 400 <= answer.status_code < 500
+            assert set(answer.json()) == {"error"}
+            assert set(answer.json()["error"]) == {"code", "message", "details"}
+    with services.database.read() as session:
+        noted = [event.data["code"] for event in session.scalars(select(RunEvent))]
+    assert sorted(code for code in noted if code) == sorted(
+        ("ticket_invalid", "ticket_of_another_trial", "clip_digest_missing", "clip_digest_differs")
+    )
+    assert watcher.answer(trial, good).status_code == 201

@@ -2,7 +2,7 @@
 
 import random
 from collections import Counter
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -197,3 +197,19 @@ def test_the_export_has_a_column_a_signal() -> None:
 def test_a_run_of_refused_answers_is_unlikely_and_one_without_answers_is_not_judged() -> None:
     assert judge([], refused=True).verdict == "unlikely"
     assert judge([]).verdict == "not_judged"
+
+
+def test_response_times_that_there_was_no_time_for_speak_against_a_run() -> None:
+    """A program that waits as long as the clips last, and claims the response times of a person."""
+    person = gamma_person(1)
+    assert judge(person).verdict == "likely"
+    hurried = [
+        replace(one, received_at=START + (index + 1) * timedelta(milliseconds=CLIP_MS + 50), issued_at=START)
+        for index, one in enumerate(person)
+    ]
+    signals = judge(hurried).signals
+    assert signals.clip_time is not None
+    assert signals.clip_time < 1
+    assert signals.claimed_time is not None
+    assert signals.claimed_time > 1.05
+    assert judge(hurried).verdict != "likely"

@@ -1,0 +1,66 @@
+"""`server simulate --as MANNER --json OUT`: what scripts may rely on, for every manner."""
+
+import json
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from server.context import Services
+from server.models import StudyRun
+from server.simulation.manners import MANNERS
+from tests.helpers.databases import run_server_command
+from tests.helpers.studies import SHORT, StudyInDatabase, add_study
+from tests.server.evidence.conftest import CLIP_FRAMES
+
+CHECKS = '[evidence.motion_checks]\nper_block = 5\nkinds = ["direction"]\nclips = 16\n\n'
+STUDY = SHORT.replace("per_cell = 2", "per_cell = 6").replace("[trial]\n", f"{CHECKS}[trial]\n", 1)
+EXPECTED = {
+    "http": {"unlikely"},
+    "http-slow": {"unlikely"},
+    "script": {"unlikely"},
+    "frames": {"unclear", "unlikely"},
+    "flow": {"unclear", "unlikely"},
+    "careless": {"unclear", "unlikely"},
+    "assistive": {"unclear"},
+    "honest": {"likely", "unclear"},
+}
+PEOPLE = 2
+
+
+@pytest.fixture
+def study(services: Services, quick_folder: Path) -> StudyInDatabase:
+    """Clips of three seconds, ten motion checks."""
+    return add_study(services, quick_folder / "clips", STUDY, frames=CLIP_FRAMES)
+
+
+def test_every_manner_has_an_expectation() -> None:
+    assert set(EXPECTED) == set(MANNERS)
+
+
+@pytest.mark.parametrize("manner", EXPECTED)
+def test_a_manner_is_simulated_judged_and_written(
+    services: Services, study: StudyInDatabase, tmp_path: Path, manner: str
+) -> None:
+    out = tmp_path / "runs.json"
+    command = ("simulate", study.name, "--as", manner, "--participants", str(PEOPLE), "--json", str(out))
+    called = run_server_command(services.settings, *command)
+    assert (called.returncode, called.stderr) == (0, "")
+    assert f"{PEOPLE} as {manner}" in called.stdout
+    runs = json.loads(out.read_text(encoding="utf-8"))["runs"]
+    assert len(runs) == PEOPLE
+    assert {run["verdict"] for run in runs} <= EXPECTED[manner]
+    if manner == "honest":  # one person in a hundred may be doubted, not both of two
+        assert "likely" in {run["verdict"] for run in runs}
+    with services.database.read() as session:
+        stored = {run.public_id: run.origin for run in session.scalars(select(StudyRun))}
+    assert stored == {run["run"]: "simulated" for run in runs}
+    assert all({"tickets", "trusted", "motion_checks_guessed"} <= set(run["signals"]) for run in runs)
+
+
+def test_an_unknown_manner_is_one_clear_line(services: Services, study: StudyInDatabase) -> None:
+    called = run_server_command(services.settings, "simulate", study.name, "--as", "htp")
+    assert called.returncode != 0
+    assert "no manner 'htp'" in called.stderr
+    assert "http" in called.stderr
+    assert "Traceback" not in called.stderr
