@@ -23,7 +23,7 @@ text = { en = "# Thank you\\n\\nThis one is left out.", de = "# Danke" }
 
 """
 CHECKED = PLAIN.replace("[trial]\n", f"{CHECKS}[trial]\n", 1)
-WARNED = PLAIN.replace("per_cell = 3", "per_cell = 5") + (
+WARNED = PLAIN.replace("per_cell = 3", "per_cell = 8") + (
     '\n[warnings]\nmaximum = 1\nthen = "go_on"\n\n[[warnings.rules]]\nrule = "same_answer"\nanswers = 5\n'
 )
 NARROW = {"width": 390, "height": 844}
@@ -101,9 +101,9 @@ def test_a_check_is_answered_by_touch(server: ServerProcess, tmp_path: Path, chr
 
 def test_a_warning_is_read_and_left_by_key(server: ServerProcess, tmp_path: Path, page: Page) -> None:
     visit = begun(server, page, WARNED, tmp_path)
-    for _ in range(5):
+    warning = "h1:has-text('A word in between')"
+    while page.wait_for_selector(f".ready, {warning}") and not page.query_selector(warning):
         visit.rate("4")
-    page.wait_for_selector("text=A word in between")
     assert axe_violations(page) == []
     page.set_viewport_size(NARROW)
     assert axe_violations(page) == []
