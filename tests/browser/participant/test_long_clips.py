@@ -125,7 +125,7 @@ def test_a_long_clip_is_decoded_while_it_is_shown(server: ServerProcess, tmp_pat
     logged = indices(row)
     assert held["seen"][: len(logged)] == logged
     assert row["frames_drawn"] + row["frames_missing"] == FRAMES
-    # A busy machine loses frames, and its verdict says so; one that only begins would show the 32 fed at first.
+    # A busy machine loses frames, and its verdict says so; one that only begins shows the 32 fed at first.
     assert row["frames_drawn"] >= FRAMES / 4
     assert visit.problems == []
 
