@@ -7,6 +7,8 @@ from typing import Any
 from analysis.read.files.cells import Cells, cells_of
 from experiments.errors import InputError
 
+LARGEST = 2**63 - 1
+
 
 def header(path: Path) -> list[str]:
     """Keys of all objects, in the order of their first appearance."""
@@ -23,8 +25,9 @@ def cells(path: Path, names: list[str]) -> Cells:
 def _objects(path: Path) -> list[dict[str, Any]]:
     try:
         read = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"{path.name} is not JSON ({error})") from error
+    except (ValueError, RecursionError) as error:  # of digits too: Python reads 4,300 of a whole number
+        said = str(error).partition(";")[0]
+        raise InputError(f"{path.name} is not JSON that can be read ({said})") from error
     if isinstance(read, dict) and isinstance(read.get("trials"), list):
         read = read["trials"]
     rows = read if isinstance(read, list) else []
@@ -34,4 +37,7 @@ def _objects(path: Path) -> list[dict[str, Any]]:
 
 
 def _plain(value: Any) -> Any:
+    """As a cell holds it: lists and objects as JSON, whole numbers that no table has as their digits."""
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return str(value)
     return json.dumps(value, ensure_ascii=False) if isinstance(value, list | dict) else value

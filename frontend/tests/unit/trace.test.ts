@@ -1,9 +1,18 @@
 import { describe, expect, it } from "vitest";
 
-import { stepFrames, traceOf } from "../../src/participant/trials/continuous_rating/trace";
+import { begins, stepFrames, traceOf } from "../../src/participant/trials/continuous_rating/trace";
 
 const drawn = (frames: number, except: number[] = []): [number, number][] =>
   Array.from({ length: frames }, (_, index): [number, number] => [index, 1_000 + index * 100]).filter(([index]) => !except.includes(index));
+
+describe("a movement of the slider", () => {
+  const at = (...times: number[]): { at_ms: number; value: number }[] => times.map((at_ms, value) => ({ at_ms, value }));
+  it("begins with the first move, however soon after the slider is there, and after each rest", () => {
+    expect(begins(at(1_000), 1_016)).toBe(true);
+    expect(begins(at(1_000, 1_016), 1_032)).toBe(false);
+    expect(begins(at(1_000, 1_016), 1_400)).toBe(true);
+  });
+});
 
 describe("the trace of a continuous rating", () => {
   it("is the slider's place when each sampled frame was drawn", () => {

@@ -6,6 +6,14 @@ export interface Move {
   value: number;
 }
 
+const REST_MS = 300;
+
+/** Whether a move at this time begins a movement: the first one does, however soon it comes, and each after a rest. */
+export function begins(moves: readonly Move[], at_ms: number): boolean {
+  const before = moves.at(-1);
+  return moves.length < 2 || !before || at_ms - before.at_ms > REST_MS;
+}
+
 export function stepFrames(fps: number, sample_hz: number): number {
   return Math.max(1, Math.round(fps / sample_hz));
 }

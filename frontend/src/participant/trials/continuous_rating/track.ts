@@ -4,7 +4,7 @@ import { pick } from "../../../i18n";
 import { h, uniqueId } from "../../../ui/element";
 import { absoluteNow } from "../../playback/protocol";
 import "./track.css";
-import type { Move } from "./trace";
+import { begins, type Move } from "./trace";
 
 export interface Track {
   parts: HTMLElement[];
@@ -14,7 +14,6 @@ export interface Track {
   focus(): void;
 }
 
-const REST_MS = 300;
 const SAMPLES_A_STEP = 200;
 const DIRECTION: Record<string, -1 | 1> = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 };
 
@@ -30,10 +29,10 @@ export function makeTrack(declared: ShownContinuousRating, language: string, sig
   let starts = 0;
 
   function noted(at_ms: number): void {
-    const before = moves.at(-1);
-    if (before?.value === input.valueAsNumber) return;
-    if (!before || at_ms - before.at_ms > REST_MS) starts += 1;
-    moves.push({ at_ms, value: Math.round(input.valueAsNumber * 100) / 100 });
+    const value = Math.round(input.valueAsNumber * 100) / 100;
+    if (moves.at(-1)?.value === value) return;
+    if (begins(moves, at_ms)) starts += 1;
+    moves.push({ at_ms, value });
     input.setAttribute("aria-valuetext", `${Math.round(input.valueAsNumber)} (${minimum} ${ends[0] ?? ""}, ${maximum} ${ends[1] ?? ""})`);
   }
   input.addEventListener("input", (event) => noted(performance.timeOrigin + event.timeStamp), { signal });
