@@ -51,6 +51,12 @@ def thresholds(
             help="Column of a second stimulus variable, a number: the threshold is a straight line over it."
         ),
     ] = None,
+    hierarchical: Annotated[
+        bool,
+        typer.Option(
+            help="One model over all people: threshold and spread differ between them (--participant)."
+        ),
+    ] = False,
     json: JsonOption = None,
 ) -> None:
     """Psychometric functions: thresholds with profile likelihood intervals.
@@ -61,12 +67,19 @@ def thresholds(
 
       analysis thresholds trials.csv --x duration --response correct --guess 0.5 --participant id
 
+      analysis thresholds trials.csv --x duration --participant id --hierarchical --lapse 0.02
+
       analysis thresholds trials.csv --x contrast --function weibull --lapse fit --by eye
 
       analysis thresholds trials.csv --x duration --second asymmetry --response correct --participant id
     """
-    from analysis.report.threshold_tables import people_table, threshold_table, threshold_text
-    from analysis.thresholds.people import fit_thresholds, read_answers
+    from analysis.report.threshold_tables import (
+        people_table,
+        population_table,
+        threshold_table,
+        threshold_text,
+    )
+    from analysis.thresholds.people import fit_thresholds, read_answers, with_population
     from experiments.errors import InputError
 
     if not 0 <= guess < 1:
@@ -75,12 +88,18 @@ def thresholds(
     with saying("reading trials"):
         answers = read_answers(file, x, response, participant, by, second)
     if second is not None:
+        if hierarchical:
+            raise InputError("--hierarchical is of one stimulus variable; leave out --second or it")
         _planes(answers, function, guess, upper, (x, second), file.stem, json)
         return
     with saying("fitting"):
         result = fit_thresholds(answers, function.value, guess, upper)
+        if hierarchical:
+            result = with_population(result, answers, function.value, guess, upper)
     typer.echo(threshold_text(result, file.stem, answers.synthetic))
     show_tables(threshold_table(result, file.stem, answers.synthetic))
+    if result.population:
+        show_tables(population_table(result, file.stem, answers.synthetic))
     if result.people:
         show_tables(people_table(result, file.stem, answers.synthetic))
     save_json(json, asdict(result), answers.synthetic)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.plans.result import Analysis
 from analysis.within.effect_tests import Effect
-from analysis.within.homogeneity import levene_tests
+from analysis.within.homogeneity import box_test, levene_tests
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
@@ -54,6 +54,7 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in analysis.anova.effects],
         "marginal_means": [asdict(mean) for mean in analysis.means],
         "pairwise": [asdict(pair) for pair in analysis.pairs],
+        "box_m": None if (box := box_test(analysis.anova)) is None else asdict(box),
         "levene": [asdict(test) for test in levene_tests(analysis.anova)],
         "simple_effects": [
             {

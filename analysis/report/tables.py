@@ -7,6 +7,7 @@ from analysis.report.captions import caption
 from analysis.report.formats import Table
 from analysis.report.numbers import (
     DASH,
+    apa_p,
     f_text,
     fixed,
     interval,
@@ -16,7 +17,7 @@ from analysis.report.numbers import (
     sum_text,
 )
 from analysis.within.effect_tests import Effect, UnivariateTest
-from analysis.within.homogeneity import levene_tests
+from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.simple_effects import SIGNIFICANCE
 
 TIMES = " × "
@@ -177,7 +178,15 @@ def levene_table(analysis: Analysis) -> Table:
     rows = tuple(
         (t.where, f_text(t.f_value), f"{t.df_effect}, {t.df_error}", p_value(t.p_value)) for t in tests
     )
-    notes = ("Distances from the median of the group (Brown-Forsythe). means: over all cells.",)
+    notes: tuple[str, ...] = (
+        "Distances from the median of the group (Brown-Forsythe). means: over all cells.",
+    )
+    box = box_test(analysis.anova)
+    if box is not None and box.chi2 is not None and box.p_value is not None:
+        said = f"χ²({box.df}) = {fixed(box.chi2)}, {apa_p(box.p_value)}"
+        notes = (*notes, f"Box's M of the cells' covariance matrices: {said}.")
+    elif box is not None:
+        notes = (*notes, f"Box's M: none, {box.reason}.")
     title = _title(analysis, "Levene's test of equal spread")
     return Table("levene", title, ("Scores", "F", "df", "p"), rows, 1, notes, folded=len(rows) > 12)
 

@@ -43,6 +43,25 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
     return Table("thresholds", title, header, tuple(rows), 1, notes)
 
 
+def population_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
+    """The model over all people of each condition."""
+    rows = tuple(
+        (
+            condition,
+            fixed(fit.threshold, 3),
+            interval_text(fit.threshold_ci),
+            fixed(fit.threshold_sd, 3),
+            fixed(fit.spread, 3),
+            fixed(fit.log_spread_sd, 3),
+            str(fit.people),
+        )
+        for condition, fit in result.population.items()
+    )
+    header = ("Condition", "Threshold", "95% CI", "SD", "Spread", "SD of log", "People")
+    notes = ("Threshold and log spread are normal over people; profile likelihood interval of the mean.",)
+    return Table("population", caption("Thresholds over people", name, synthetic), header, rows, 1, notes)
+
+
 def people_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
     """Every person's threshold."""
     rows = tuple(

@@ -1,6 +1,6 @@
 """Thresholds of every person and condition, and their mean over people."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from analysis.read.text_table import (
     texts_required,
 )
 from analysis.thresholds.likelihood import Shape, Trials
+from analysis.thresholds.population import Population, fit_population
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
 
@@ -89,6 +90,7 @@ class ThresholdsResult:
     means: tuple[MeanThreshold, ...]
     n_trials: int
     decisions: tuple[str, ...]
+    population: dict[str, Population] = field(default_factory=dict)
 
 
 def read_answers(
@@ -189,6 +191,30 @@ def fit_thresholds(
             people += _people(answers, rows, condition, shape, guess, lapse, falling)
     means = [mean for condition in pooled if (mean := mean_threshold(people, condition)) is not None]
     return ThresholdsResult(pooled, tuple(people), tuple(means), answers.x.size, answers.decisions)
+
+
+def with_population(
+    result: ThresholdsResult, answers: Answers, shape: Shape, guess: float, lapse: float | None
+) -> ThresholdsResult:
+    """The result with, for each condition, one model over all people: `fit_population`.
+
+    Raises
+    ------
+    InputError
+        No column names the person, a lapse rate to be fitted, or as `fit_population`.
+    """
+    if answers.participant is None:
+        raise InputError("--hierarchical needs --participant, the column that names the person")
+    if lapse is None:
+        raise InputError("--hierarchical holds the lapse rate; give it as a number, --lapse 0.02")
+    found = {}
+    for condition, pooled in result.pooled.items():
+        own = np.ones(answers.x.size, bool) if answers.condition is None else answers.condition == condition
+        people = sorted({str(name) for name in answers.participant[own]})
+        rows = [own & (answers.participant.astype(str) == name) for name in people]
+        trials = [counted(answers.x[one], answers.response[one]) for one in rows]
+        found[condition] = fit_population(trials, shape, guess, lapse, pooled.falling)
+    return replace(result, population=found)
 
 
 def _people(

@@ -1,4 +1,4 @@
-"""Levene's test: whether groups differ in the spread of their scores."""
+"""Levene's test and Box's M: whether groups differ in the spread of their scores."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -24,6 +24,55 @@ class LeveneTest:
     df_effect: int
     df_error: int
     p_value: float
+
+
+@dataclass(frozen=True)
+class BoxTest:
+    """Box's M: whether groups have one covariance matrix of their cells; `reason` says why there is none."""
+
+    m: float | None
+    chi2: float | None
+    df: int
+    p_value: float | None
+    reason: str | None = None
+
+
+def box_test(result: AnovaResult) -> BoxTest | None:
+    r"""Box's M of the cells of the factors within, chi-squared approximation; None where nothing is compared.
+
+    Notes
+    -----
+    With :math:`\nu_i` the df of group i, S_i its covariance matrix of p cells and S the pooled one,
+
+    .. math::
+
+        M = \nu \ln|S| - \sum_i \nu_i \ln|S_i|, \quad \nu = \sum_i \nu_i \tag{1}
+
+        c = \frac{2p^2 + 3p - 1}{6(p + 1)(g - 1)} \left(\sum_i 1/\nu_i - 1/\nu\right) \tag{2}
+
+    and (1 - c) M is referred to chi-squared on p (p + 1) (g - 1) / 2 df. Source: Box (1949), Biometrika 36.
+    """
+    flat = result.y.reshape(result.n_participants, -1)
+    p = flat.shape[1]
+    if not result.between.factors or p < 2:
+        return None
+    _, groups = np.unique(result.between.codes, axis=0, return_inverse=True)
+    own = [flat[groups.ravel() == g] for g in range(int(groups.max()) + 1)]
+    df = p * (p + 1) * (len(own) - 1) // 2
+    nu = np.array([len(y) - 1 for y in own], dtype=np.float64)
+    if nu.min() < p:
+        few = int(nu.min()) + 1
+        reason = f"a group has {few} participants for {p} cells; it takes more participants than cells"
+        return BoxTest(None, None, df, None, reason)
+    matrices = np.stack([np.cov(y, rowvar=False) for y in own])
+    pooled = np.tensordot(nu / nu.sum(), matrices, 1)
+    signs, logs = np.linalg.slogdet(np.concatenate([matrices, pooled[None]]))
+    if (signs <= 0).any():
+        return BoxTest(None, None, df, None, "a group's covariance matrix is singular")
+    m = float(nu.sum() * logs[-1] - nu @ logs[:-1])
+    c = (2 * p**2 + 3 * p - 1) / (6 * (p + 1) * (len(own) - 1)) * float((1 / nu).sum() - 1 / nu.sum())
+    chi2 = (1 - c) * m
+    return BoxTest(m, chi2, df, float(special.chdtrc(df, max(chi2, 0.0))))
 
 
 def levene_tests(result: AnovaResult) -> tuple[LeveneTest, ...]:

@@ -1,0 +1,205 @@
+"""Thresholds of a population: every person has a threshold and a spread, drawn from one distribution."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special, stats
+
+from analysis.thresholds.likelihood import Array, Interval, Shape, Trials
+from experiments.errors import InputError
+
+NODES = 15
+"""Gauss-Hermite nodes for a person's threshold, and for the spread."""
+
+NEWTON_STEPS = 25
+STEP = 1e-4
+LOG_SD_MIN = -12.0
+CHI2_95 = float(stats.chi2.ppf(0.95, 1))
+SHAPES_WITH_POPULATION = ("normal", "logistic")
+
+
+@dataclass(frozen=True)
+class Population:
+    """What the thresholds a_i and log spreads of people are drawn from.
+
+    Attributes
+    ----------
+    threshold, threshold_se : float
+        Mean over people of a_i, in the unit of x.
+    threshold_ci : Interval
+        Profile likelihood interval (95%): all else is fitted anew.
+    threshold_sd : float
+        SD of a_i between people.
+    spread : float
+        exp of the mean log spread, in the unit of x.
+    log_spread_sd : float
+        SD of the log spread between people.
+    lapse : float
+        As it was held.
+    """
+
+    people: int
+    threshold: float
+    threshold_se: float
+    threshold_ci: Interval
+    threshold_sd: float
+    spread: float
+    log_spread_sd: float
+    lapse: float
+    log_likelihood: float
+
+
+class PopulationLikelihood:
+    r"""Marginal likelihood of people's trials.
+
+    .. math::
+
+        L = \prod_i \int \prod_j P(x_{ij})^{k_{ij}} (1 - P(x_{ij}))^{n_{ij} - k_{ij}}
+            \phi(u_1) \phi(u_2) \, du, \quad a_i = \mu + \tau u_1, \ \log b_i = \nu + \omega u_2 \tag{1}
+
+    by adaptive Gauss-Hermite quadrature around each person's mode. Trials are padded to (people, levels).
+    """
+
+    def __init__(
+        self, trials: Sequence[Trials], shape: Shape, guess: float, lapse: float, falling: bool
+    ) -> None:
+        size = max(len(one.x) for one in trials)
+        self.x, self.n, self.k = (
+            np.array([np.pad(getattr(one, name), (0, size - len(one.x))) for one in trials])[:, None, :]
+            for name in ("x", "n", "k")
+        )
+        self.shape, self.guess, self.lapse, self.falling = shape, guess, lapse, falling
+        nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+        self.nodes = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
+        # the weights' own normal density is divided out: the integrand is evaluated whole
+        self.log_weights = np.log(np.outer(weights, weights)).ravel() + (self.nodes**2).sum(axis=1) / 2
+        self.modes = np.zeros((len(trials), 2))
+
+    def joint(self, values: Array, u: Array) -> Array:
+        """Log of trials' likelihood times both normal densities, at u (people, m, 2): (people, m)."""
+        mu, log_tau, nu, log_omega = values
+        location = mu + np.exp(log_tau) * u[..., :1]
+        log_spread = np.clip(nu + np.exp(log_omega) * u[..., 1:], -30.0, 30.0)
+        z = (self.x - location) * np.exp(-log_spread)
+        rising = special.ndtr(z) if self.shape == "normal" else special.expit(z)
+        f = 1 - rising if self.falling else rising
+        p = np.clip(self.guess + (1 - self.guess - self.lapse) * f, 1e-12, 1 - 1e-12)
+        trials = (self.k * np.log(p) + (self.n - self.k) * np.log1p(-p)).sum(axis=-1)
+        return np.asarray(trials - (u**2).sum(axis=-1) / 2 - np.log(2 * np.pi))
+
+    def _differences(self, values: Array, u: Array) -> tuple[Array, Array]:
+        """Gradient (people, 2) and Hessian (people, 2, 2) of `joint` at u (people, 2), by differences."""
+        moves = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]], dtype=float)
+        at = self.joint(values, u[:, None, :] + moves)
+        gradient = np.stack([at[:, 1] - at[:, 2], at[:, 3] - at[:, 4]], axis=1) / (2 * STEP)
+        first = (at[:, 1] + at[:, 2] - 2 * at[:, 0]) / STEP**2
+        second = (at[:, 3] + at[:, 4] - 2 * at[:, 0]) / STEP**2
+        mixed = (at[:, 5] + at[:, 6] - 2 * at[:, 0]) / STEP**2
+        mixed = (mixed - first - second) / 2
+        return gradient, np.stack([first, mixed, mixed, second], axis=1).reshape(-1, 2, 2)
+
+    def value(self, values: Array) -> float:
+        """Log-likelihood at (mu, log tau, nu, log omega)."""
+        u = self.modes
+        for _ in range(NEWTON_STEPS):
+            gradient, hessian = self._differences(values, u)
+            curvature = _positive(-hessian)
+            step = np.linalg.solve(curvature, gradient[:, :, None])[:, :, 0]
+            step *= np.minimum(1.0, 1.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-12))
+            better = self.joint(values, (u + step)[:, None])[:, 0] >= self.joint(values, u[:, None])[:, 0]
+            u = u + np.where(better[:, None], step, step / 8)
+            if np.abs(step).max() < 1e-5:
+                break
+        self.modes = u
+        _, hessian = self._differences(values, u)
+        root = np.linalg.cholesky(np.linalg.inv(_positive(-hessian)))
+        points = u[:, None, :] + self.nodes @ root.transpose(0, 2, 1)
+        total = special.logsumexp(self.joint(values, points) + self.log_weights, axis=1)
+        return float((total + np.log(root[:, 0, 0]) + np.log(root[:, 1, 1])).sum())
+
+
+def _positive(matrices: Array) -> Array:
+    """Symmetric matrices (people, 2, 2) with eigenvalues of at least one half: the prior's are one."""
+    values, vectors = np.linalg.eigh(matrices)
+    return np.asarray((vectors * np.maximum(values, 0.5)[:, None, :]) @ vectors.transpose(0, 2, 1))
+
+
+def fit_population(
+    trials: Sequence[Trials], shape: Shape, guess: float, lapse: float, falling: bool
+) -> Population:
+    """Maximise the marginal likelihood of people's trials over means and SDs of threshold and log spread.
+
+    Raises
+    ------
+    InputError
+        Fewer than three people, or a Weibull function, whose threshold is no normal variable.
+    """
+    if shape not in SHAPES_WITH_POPULATION:
+        raise InputError("thresholds of a population need --function normal or logistic")
+    if len(trials) < 3:
+        raise InputError(f"thresholds of a population need three people or more, got {len(trials)}")
+    model = PopulationLikelihood(trials, shape, guess, lapse, falling)
+    x = np.concatenate([one.x for one in trials])
+    width = float(np.ptp(x)) or 1.0
+    start = np.array([x.mean(), np.log(width / 8), np.log(width / 6), np.log(0.3)])
+    best = _maximum(model, start, width, None)
+    value, mu = model.value(best), float(best[0])
+    h = 1e-3 * width
+    sides = [_profiled(model, best, width, mu + sign * h) for sign in (1, -1)]
+    curvature = (2 * value - sum(sides)) / h**2
+    se = float(1 / np.sqrt(curvature)) if curvature > 0 else float("nan")
+    ends = [
+        _end(model, best, value, width, sign * (se if np.isfinite(se) else width / 8)) for sign in (-1, 1)
+    ]
+    return Population(
+        len(trials),
+        mu,
+        se,
+        Interval(ends[0], ends[1]),
+        float(np.exp(best[1])),
+        float(np.exp(best[2])),
+        float(np.exp(best[3])),
+        lapse,
+        value,
+    )
+
+
+def _maximum(model: PopulationLikelihood, start: Array, width: float, mu: float | None) -> Array:
+    scale = np.array([width, 1.0, 1.0, 1.0])
+
+    def negative(scaled: NDArray[np.float64]) -> float:
+        full = scaled if mu is None else np.concatenate([[mu / width], scaled])
+        return -model.value(full * scale)
+
+    first = start / scale
+    free = first if mu is None else first[1:]
+    bounds = [(None, None), (LOG_SD_MIN + np.log(width), None), (None, None), (LOG_SD_MIN, 2.0)]
+    found = optimize.minimize(
+        negative,
+        free,
+        method="L-BFGS-B",
+        bounds=bounds[4 - len(free) :],
+        options={"ftol": 1e-12, "gtol": 1e-6},
+    )
+    whole = found.x if mu is None else np.concatenate([[mu / width], found.x])
+    return np.asarray(whole * scale)
+
+
+def _profiled(model: PopulationLikelihood, best: Array, width: float, mu: float) -> float:
+    return model.value(_maximum(model, np.concatenate([[mu], best[1:]]), width, mu))
+
+
+def _end(model: PopulationLikelihood, best: Array, value: float, width: float, step: float) -> float | None:
+    """Where the profile has fallen by half the chi-squared quantile, in the direction of `step`."""
+
+    def fall(mu: float) -> float:
+        return 2 * (value - _profiled(model, best, width, mu)) - CHI2_95
+
+    inside, outside = float(best[0]), float(best[0]) + 2 * step
+    for _ in range(8):
+        if fall(outside) > 0:
+            return float(optimize.brentq(fall, inside, outside, xtol=1e-6 * width))
+        inside, outside = outside, outside + 2 * step
+    return None
