@@ -44,7 +44,7 @@ def balanced_blocks(items: int, size: int) -> tuple[Block, ...] | None:
     Examples
     --------
     >>> balanced_blocks(7, 3)[:2]
-    ((0, 1, 3), (2, 4, 5))
+    ((0, 1, 3), (0, 2, 6))
     >>> balanced_blocks(5, 6) is None
     True
     """

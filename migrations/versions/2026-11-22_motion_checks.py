@@ -332,6 +332,11 @@ FURTHER = {
 NAMES = ("ratings", "comparisons", "thresholds", "traces")
 NO_SCALE = ("IN ('attention', 'check')", "= 'attention'")
 BEFORE, AFTER = ("practice", "main", "attention"), ("practice", "main", "attention", "check")
+ANSWERED = """
+SELECT 1 FROM trial_ratings t
+JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
+WHERE a.kind = 'check' LIMIT 1
+"""
 CHECK = "ck_assigned_trials_kind_known"
 
 
@@ -344,6 +349,10 @@ def upgrade() -> None:
 
 def downgrade() -> None:
     dialect = op.get_bind().dialect.name
+    if op.get_bind().execute(sa.text(ANSWERED)).scalar():
+        raise RuntimeError(
+            "Answers to motion checks are stored; export them, and delete their studies, before going back."
+        )
     _drop_views()
     # An earlier program knows no motion checks, nor clips without a cell.
     gone = "SELECT 1 FROM assigned_trials a WHERE a.kind = 'check' AND a.study_run_id = {0}.study_run_id"

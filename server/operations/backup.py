@@ -23,7 +23,9 @@ from experiments.errors import InputError
 from experiments.files import whole_private_file
 from server.clock import iso, now
 from server.context import Services
-from server.operations.rows import Content, Digest, read_rows, snapshot, tables_of
+from server.operations.repository import clip_hashes
+from server.operations.rows import Content, Digest
+from server.operations.rows_repository import read_rows, snapshot, tables_of
 
 DESCRIPTION, TABLES, CLIPS, KEY = "backup.json", "tables/", "clips/", "secret_key"
 SPOOL_BYTES = 1 << 24
@@ -67,7 +69,7 @@ def _describe(connection: Connection, services: Services, folder: Path, with_cli
     if revision is None:
         raise InputError("the database has no tables yet; there is nothing to back up")
     tables = {table.name: _dump(connection, table, folder / table.name) for table in tables_of(connection)}
-    clips = connection.exec_driver_sql("SELECT sha256 FROM clips ORDER BY sha256").scalars().all()
+    clips = clip_hashes(connection)
     return Description(
         program_version=version("palpebra"),
         revision=revision,

@@ -11,11 +11,9 @@ from itertools import islice
 from typing import Literal
 from urllib.parse import urlsplit
 
-from sqlalchemy import func, select, text
-
 from server.context import Services
 from server.migrate import current_revision, newest_revision
-from server.models import Account, Clip, Study
+from server.operations import repository
 from server.operations.modes import open_to_others
 from server.tallies.recount import Recount
 
@@ -106,16 +104,17 @@ def _sqlite(services: Services) -> Iterator[Finding]:
     advice = "" if fine else "install a Python with SQLite 3.38 or newer"
     yield Finding("SQLite", "ok" if fine else "failed", sqlite3.sqlite_version, advice)
     with services.database.read() as session:
-        said = str(session.scalar(text("PRAGMA quick_check(1)")))
+        said = repository.sqlite_complaint(session)
     advice = "" if said == "ok" else "stop the server and restore the last backup: server restore FILE"
     yield Finding("SQLite file", "ok" if said == "ok" else "failed", said, advice)
 
 
 def _postgres(services: Services) -> Iterator[Finding]:
     with services.database.read() as session:
-        number = int(str(session.scalar(text("SHOW server_version_num"))))
-        durable = {name: session.scalar(text(f"SHOW {name}")) for name in ("fsync", "synchronous_commit")}
-        most = int(str(session.scalar(text("SHOW max_connections"))))
+        number = int(repository.postgres_setting(session, "server_version_num"))
+        names = ("fsync", "synchronous_commit")
+        durable = {name: repository.postgres_setting(session, name) for name in names}
+        allowed = int(repository.postgres_setting(session, "max_connections"))
     fine = number >= OLDEST_POSTGRES
     advice = "" if fine else "use PostgreSQL 13 or newer"
     yield Finding("PostgreSQL", "ok" if fine else "failed", f"version {number // 10000}", advice)
@@ -123,10 +122,10 @@ def _postgres(services: Services) -> Iterator[Finding]:
     advice = f"set {' and '.join(off)} on: a power cut could lose acknowledged ratings" if off else ""
     said = ", ".join(f"{name} {value}" for name, value in durable.items())
     yield Finding("durability", "warning" if off else "ok", said, advice)
-    wanted = 2 * services.settings.database_pool
-    advice = f"a worker may use {wanted}: raise max_connections or lower PALPEBRA_DATABASE_POOL"
-    tight = wanted + 5 > most
-    yield Finding("connections", "warning" if tight else "ok", f"{most} allowed", advice if tight else "")
+    needed = 2 * services.settings.database_pool
+    advice = f"a worker may use {needed}: raise max_connections or lower PALPEBRA_DATABASE_POOL"
+    tight = needed + 5 > allowed
+    yield Finding("connections", "warning" if tight else "ok", f"{allowed} allowed", advice if tight else "")
 
 
 def counts(services: Services) -> Iterator[Finding]:
@@ -146,7 +145,7 @@ def counts(services: Services) -> Iterator[Finding]:
 def clips(services: Services) -> Iterator[Finding]:
     """Every clip that a study names is in the store, with the right length."""
     with services.database.read() as session:
-        named = session.execute(select(Clip.sha256, Clip.bytes)).all()
+        named = repository.clip_sizes(session)
     wrong = [sha256 for sha256, size in named if services.clips.size(sha256) != size]
     if wrong:
         advice = "add the study again from its clips (server study add), or restore a backup"
@@ -182,10 +181,9 @@ def public_address(services: Services) -> Iterator[Finding]:
 def people(services: Services) -> Iterator[Finding]:
     """Somebody can sign in; there is something to take part in."""
     with services.database.read() as session:
-        query = select(func.count()).select_from(Account).where(Account.disabled_at.is_(None))
-        owners = session.scalar(query.where(Account.role == "owner")) or 0
-        without = session.scalar(query.where(Account.totp_confirmed_at.is_(None))) or 0
-        studies = session.scalar(select(func.count()).select_from(Study)) or 0
+        owners = repository.owner_count(session)
+        without = repository.count_without_second_factor(session)
+        studies = repository.study_count(session)
     advice = "" if owners else "run: server admin link, and open the address it prints"
     counted = "1 owner" if owners == 1 else f"{owners} owners"
     yield Finding("accounts", "ok" if owners else "warning", counted, advice)

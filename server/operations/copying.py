@@ -8,8 +8,8 @@ from sqlalchemy.exc import OperationalError
 from experiments.errors import InputError
 from server.db import Database
 from server.migrate import current_revision, newest_revision, upgrade
-from server.operations.rows import (
-    Content,
+from server.operations.rows import Content
+from server.operations.rows_repository import (
     content_of,
     read_rows,
     refuse_unless_empty,

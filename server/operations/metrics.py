@@ -12,10 +12,9 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
-from sqlalchemy import func, select
 
 from server.db import Database
-from server.models import Study, StudyRun
+from server.operations.repository import run_counts
 
 MULTIPROCESS_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"
 BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
@@ -53,15 +52,9 @@ class StoredCounts(Collector):
         runs = GaugeMetricFamily(
             "palpebra_runs", "Runs stored, previews left out.", labels=("study", "phase", "origin", "status")
         )
-        query = (
-            select(Study.name, StudyRun.phase, StudyRun.origin, StudyRun.status, func.count())
-            .join(Study, Study.id == StudyRun.study_id)
-            .where(StudyRun.origin != "preview")
-            .group_by(Study.name, StudyRun.phase, StudyRun.origin, StudyRun.status)
-        )
         with self.database.read() as session:
-            for name, phase, origin, status, count in session.execute(query):
-                runs.add_metric((name, phase, origin, status), count)
+            for *labels, count in run_counts(session):
+                runs.add_metric(list(map(str, labels)), count)
         yield runs
         build = GaugeMetricFamily("palpebra_build_info", "The program that runs.", labels=("version",))
         build.add_metric((version("palpebra"),), 1)

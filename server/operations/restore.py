@@ -17,7 +17,8 @@ from server.context import Services
 from server.migrate import alembic_config, known_revision
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
 from server.operations.erasures import ledger
-from server.operations.rows import Row, refuse_unless_empty, tables_of, write_rows
+from server.operations.rows import Row
+from server.operations.rows_repository import refuse_unless_empty, tables_of, write_rows
 from server.runs.erasure import replay
 from server.settings import Settings
 

@@ -4,34 +4,20 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 from pydantic import Field
-from sqlalchemy.orm import Session
 
 from server.accounts.identity import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.models import Study
 from server.participants.schemas import Origin
-from server.results import repository, service
+from server.results import counting
 from server.results.cache import Revision
-from server.results.kinds import summary_of
 from server.results.schemas import AnyResults
-from server.studies.lookup import definition_of, find_study
-from server.studies.series import version_of_series
+from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["results"], responses=ERROR_RESPONSES)
 
 
 ByKind = Annotated[AnyResults, Field(discriminator="kind")]
-
-
-def _counted(
-    session: Session, study: Study, origin: Origin, series: int | None, scale: str | None
-) -> tuple[Revision, AnyResults]:
-    # The revision is read first: a rating that comes in between is counted again, never left out.
-    version = version_of_series(session, study, series)
-    pool = service.pool(study, version, origin, scale)
-    summarise = summary_of(definition_of(version).trial.kind)
-    return repository.revision(session, study, pool), summarise(session, study, version, pool)
 
 
 @router.get(
@@ -57,13 +43,12 @@ def get_results(
 
     def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
-            return _counted(session, find_study(session, study), origin, series, scale)
+            return counting.counted(session, find_study(session, study), origin, series, scale)
 
     with services.database.read() as session:
         found = find_study(session, study)
-        key = service.pool(found, version_of_series(session, found, series), origin, scale)
-        revision = repository.revision(session, found, key)
-    counted = services.results.get(key, revision, count)
+        pool, revision = counting.pool_and_revision(session, found, origin, series, scale)
+    counted = services.results.get(pool, revision, count)
     headers = {"etag": counted.etag, "cache-control": "private, no-cache"}
     if if_none_match == counted.etag:
         return Response(status_code=304, headers=headers)

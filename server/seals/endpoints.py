@@ -10,9 +10,8 @@ from server.accounts.identity import Experimenter, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.seals.page import page
-from server.seals.repository import people_of_series
-from server.seals.service import seal_of, seal_plan
-from server.studies.lookup import active_version, find_study
+from server.seals.service import people_begun, seal_of, seal_plan
+from server.studies.lookup import find_study
 from server.text import encoded
 
 router = APIRouter(prefix="/api/admin/studies/{study}/seal", tags=["data"], responses=ERROR_RESPONSES)
@@ -43,7 +42,7 @@ def get_seal(services: ServicesDep, _who: Viewer, study: str) -> SealOut:
     with services.database.read() as session:
         known = find_study(session, study)
         seal = seal_of(session, known)
-        people = people_of_series(session, known, active_version(session, known).series)
+        people = people_begun(session, known)
     if seal is None:
         return SealOut(sealed_at=None, sha256=None, version=None, power=False, participants=people)
     return SealOut(

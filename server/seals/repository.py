@@ -19,9 +19,14 @@ def people_of_series(session: Session, study: Study, series: int) -> int:
 
 
 def sealed_document(session: Session, study: str, series: int, action: str) -> dict[str, Any] | None:
-    """The seal that the audit log keeps of this study's data series."""
+    """The seal that the audit log keeps of this study's data series.
+
+    What was sealed of a deleted study is no seal of a later one that has its name.
+    """
+    of_study = (AuditEntry.target_kind == "study", AuditEntry.target == study)
+    deleted = select(func.max(AuditEntry.id)).where(*of_study, AuditEntry.action == "study deleted")
     query = select(AuditEntry).where(
-        AuditEntry.target_kind == "study", AuditEntry.target == study, AuditEntry.action == action
+        *of_study, AuditEntry.action == action, AuditEntry.id > (session.scalar(deleted) or 0)
     )
     for entry in session.scalars(query.order_by(AuditEntry.id)):
         if entry.details.get("series") == series:

@@ -12,6 +12,7 @@ from server.accounts.identity import Identity
 from server.clock import iso, now
 from server.errors import Conflict
 from server.models import Study
+from server.participants.repository import lock_study
 from server.seals.repository import people_of_series, sealed_document
 from server.studies.lookup import active_version, definition_of
 
@@ -24,8 +25,15 @@ def seal_of(session: Session, study: Study) -> Seal | None:
     return Seal.model_validate(document) if document else None
 
 
+def people_begun(session: Session, study: Study) -> int:
+    """How many participants have begun in the active version's data series."""
+    return people_of_series(session, study, active_version(session, study).series)
+
+
 def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[str, Any] | None) -> Seal:
     """Seal the active version; Conflict where its series is sealed, or people have taken part already."""
+    # Held until the seal is stored: nobody begins meanwhile, nor does another seal.
+    study = lock_study(session, study.id)
     version = active_version(session, study)
     if sealed := seal_of(session, study):
         raise Conflict(f"The plan was sealed {sealed.sealed_at} already; a seal is never replaced.")

@@ -22,14 +22,14 @@ from server.studies.importing import add_version, check_against_design, create_s
 from server.studies.links import (
     LinkKind,
     LinkOptions,
-    check_group,
     general_links,
     link_url,
+    make_links,
     numbered_labels,
     prepared_links,
 )
-from server.studies.links_repository import add_links, links_of
-from server.studies.lookup import active_definition, active_version, find_study
+from server.studies.links_repository import links_of
+from server.studies.lookup import active_version, find_study
 from server.studies.planned import planned_experiment
 
 study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
@@ -180,8 +180,7 @@ def create(
         rows = prepared_links(settings.key, options, numbered_labels(label, count) if count > 1 else [label])
         with services.database.write() as session:
             found = find_study(session, study)
-            check_group(active_definition(session, found), KINDS[kind], group)
-            add_links(session, found, rows)
+            make_links(session, found, KINDS[kind], group, rows)
             record(session, None, "links created", "study", found.name, kind=kind, count=count)
     for row in rows:
         url = link_url(settings.public_url, settings.key, row["public_id"])

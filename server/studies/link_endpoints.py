@@ -11,19 +11,19 @@ from server.accounts.audit import record
 from server.accounts.identity import Experimenter
 from server.clock import now
 from server.context import Services, ServicesDep
-from server.errors import ERROR_RESPONSES, NotFound
+from server.errors import ERROR_RESPONSES
 from server.models import Link
 from server.studies.links import (
     LinkOptions,
-    check_group,
     link_url,
     links_with_runs,
+    make_links,
     numbered_labels,
     page_of_links,
     prepared_links,
+    withdraw,
 )
-from server.studies.links_repository import add_links, find_link, number_of_links, runs_by_link
-from server.studies.lookup import active_definition, find_study
+from server.studies.lookup import find_study
 from server.studies.schemas import LinkOut, LinkPage, NewLinks
 
 router = APIRouter(prefix="/api/admin/studies/{study}/links", tags=["links"], responses=ERROR_RESPONSES)
@@ -48,12 +48,11 @@ def list_links(
     """The links of a study in the order they were made, a page at a time: go on with `after` = `next`."""
     with services.database.read() as session:
         found = find_study(session, study)
-        links = page_of_links(session, found, after, limit + 1)
-        runs = runs_by_link(session, links[:limit])
+        page = page_of_links(session, found, after, limit)
         return LinkPage(
-            links=[_link_out(services, link, *runs.get(link.id, (0, 0))) for link in links[:limit]],
-            total=number_of_links(session, found),
-            next=links[limit - 1].public_id if len(links) > limit else None,
+            links=[_link_out(services, link, *runs) for link, runs in page.links],
+            total=page.total,
+            next=page.next,
         )
 
 
@@ -74,8 +73,7 @@ def create_links(services: ServicesDep, who: Experimenter, study: str, body: New
     rows = prepared_links(services.settings.key, options, labels)
     with services.database.write() as session:
         found = find_study(session, study)
-        check_group(active_definition(session, found), body.kind, body.group)
-        add_links(session, found, rows)
+        make_links(session, found, body.kind, body.group, rows)
         record(session, who, "links made", "study", study, links=body.kind, number=len(rows))
     return [_link_out(services, row) for row in rows]
 
@@ -100,8 +98,5 @@ def revoke_link(services: ServicesDep, who: Experimenter, study: str, link: str)
     """Withdraw a link; runs that began with it go on."""
     with services.database.write() as session:
         found = find_study(session, study)
-        row = find_link(session, found, link)
-        if row is None or row.revoked_at is not None:
-            raise NotFound("There is no such link.")
-        row.revoked_at = now()
-        record(session, who, "link withdrawn", "study", study, label=row.label)
+        withdrawn = withdraw(session, found, link)
+        record(session, who, "link withdrawn", "study", study, label=withdrawn.label)

@@ -1,9 +1,9 @@
 """Links into a study. A link's token is derived from the server's key, so that it can be shown again."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from sqlalchemy.orm import Session
 
@@ -32,6 +32,18 @@ class LinkOptions:
     expires_at: datetime | None = None
     recruiter: dict[str, Any] | None = None
     created_by: int | None = None
+
+
+RunsOfLink = tuple[int, int]
+"""Runs, and complete runs."""
+
+
+class LinksPage(NamedTuple):
+    """Some links with their runs, how many links there are, and behind which one the rest stands."""
+
+    links: list[tuple[Link, RunsOfLink]]
+    total: int
+    next: str | None
 
 
 def numbered_labels(label: str, count: int) -> list[str]:
@@ -86,12 +98,40 @@ def link_url(public_url: str, key: bytes, public_id: str) -> str:
     return f"{public_url}/run/{derived_token(key, PURPOSE, public_id)}"
 
 
-def page_of_links(session: Session, study: Study, after: str | None, limit: int) -> list[Link]:
+def page_of_links(session: Session, study: Study, after: str | None, limit: int) -> LinksPage:
     """At most `limit` links in the order they were made, those behind the link `after`."""
     last = None if after is None else repository.find_link(session, study, after)
     if after is not None and last is None:
         raise NotFound(f"There is no link '{after[:40]}' in the study '{study.name}'.")
-    return repository.links_after(session, study, last, limit)
+    links = repository.links_after(session, study, last, limit + 1)
+    shown = links[:limit]
+    return LinksPage(
+        _with_runs(session, shown),
+        repository.number_of_links(session, study),
+        shown[-1].public_id if len(links) > limit else None,
+    )
+
+
+def _with_runs(session: Session, links: Sequence[Link]) -> list[tuple[Link, RunsOfLink]]:
+    runs = repository.runs_by_link(session, links)
+    return [(link, runs.get(link.id, (0, 0))) for link in links]
+
+
+def make_links(
+    session: Session, study: Study, kind: LinkKind, group: str, rows: Sequence[dict[str, Any]]
+) -> None:
+    """Store prepared links, all of one kind and group."""
+    check_group(active_definition(session, study), kind, group)
+    repository.add_links(session, study, rows)
+
+
+def withdraw(session: Session, study: Study, public_id: str) -> Link:
+    """Withdraw a link; runs that began with it go on. NotFound where there is none, or no more."""
+    link = repository.find_link(session, study, public_id)
+    if link is None or link.revoked_at is not None:
+        raise NotFound("There is no such link.")
+    link.revoked_at = now()
+    return link
 
 
 def links_with_runs(
@@ -100,8 +140,7 @@ def links_with_runs(
     """Every link (of one kind) with its runs and complete runs, read `limit` at a time."""
     last = None
     while links := repository.links_after(session, study, last, limit):
-        runs = repository.runs_by_link(session, links)
-        yield from ((link, *runs.get(link.id, (0, 0))) for link in links if kind in (None, link.kind))
+        yield from ((link, *runs) for link, runs in _with_runs(session, links) if kind in (None, link.kind))
         last = links[-1]
 
 

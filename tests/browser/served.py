@@ -66,6 +66,13 @@ def start_clip(page: Page) -> None:
     page.wait_for_selector(".trial.playing")
 
 
+def show_to_answers(page: Page) -> None:
+    """Press the start key; back once the buttons of a choice are there."""
+    page.wait_for_selector(".ready")
+    page.keyboard.press(" ")
+    page.wait_for_selector(".pair-answers")
+
+
 def reload_in_next_clip(page: Page, after_ms: int = 300) -> None:
     """The page reloads in the midst of its next clip.
 

@@ -1,16 +1,10 @@
 """Error bars without the differences between participants."""
 
-import doctest
 import math
 
 import pytest
 
-from experiments import error_bars
 from experiments.error_bars import within_participant_errors
-
-
-def test_the_example_holds() -> None:
-    assert doctest.testmod(error_bars).failed == 0
 
 
 def test_two_conditions_by_hand() -> None:

@@ -36,3 +36,28 @@ def test_these_parts_import_in_one_direction_at_most(graph: grimp.ImportGraph, o
     there = graph.find_shortest_chains(one, other)
     back = graph.find_shortest_chains(other, one)
     assert not (there and back), (sorted(there)[:1], sorted(back)[:1])
+
+
+def _called(graph: grimp.ImportGraph, word: str) -> set[str]:
+    """Modules called by this word, or ending in it: `repository` and `links_repository`."""
+    names = {module: module.rsplit(".", 1)[-1] for module in graph.modules}
+    return {module for module, name in names.items() if name == word or name.endswith(f"_{word}")}
+
+
+def test_what_lies_behind_never_imports_what_lies_before_it(graph: grimp.ImportGraph) -> None:
+    """The contracts of import-linter, for modules with longer names too."""
+    endpoints, services = _called(graph, "endpoints"), _called(graph, "service")
+    repositories = _called(graph, "repository")
+    assert len(endpoints) > 10
+    assert len(repositories) > 10
+    for behind, before in ((repositories, services | endpoints), (services, endpoints)):
+        for module in behind:
+            known = graph.find_upstream_modules(module) & before
+            assert not known, f"{module} knows {sorted(known)}"
+
+
+def test_endpoints_ask_no_repository(graph: grimp.ImportGraph) -> None:
+    repositories = _called(graph, "repository")
+    for module in _called(graph, "endpoints"):
+        asked = graph.find_modules_directly_imported_by(module) & repositories
+        assert not asked, f"{module} asks {sorted(asked)}: put it into the folder's service"

@@ -10,7 +10,8 @@ from sqlalchemy import text
 
 from server.db import Database
 from server.migrate import current_revision, newest_revision, upgrade
-from server.operations.rows import Content, content_of, snapshot, tables_of
+from server.operations.rows import Content
+from server.operations.rows_repository import content_of, snapshot, tables_of
 from tests.conftest import REPOSITORY
 from tests.helpers.databases import BACKENDS
 from tests.helpers.older_databases import load_older_database

@@ -10,7 +10,7 @@ from playwright.sync_api import Page
 from server.cli_common import migrated_services
 from server.models import View, ViewClip
 from server.views.frame_log import unpacked
-from tests.browser.served import Served, go_back, reload_in_next_clip, serve, start_clip
+from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations
 
@@ -51,12 +51,6 @@ def stored(studies: Served, count: int = 0) -> list[dict[str, object]]:
     return studies.rows_of_latest("comparisons", "time_elapsed, play", count)
 
 
-def show(page: Page) -> None:
-    page.wait_for_selector(".ready")
-    page.keyboard.press(" ")
-    page.wait_for_selector(".pair-answers")
-
-
 def answer(page: Page, key: str) -> None:
     page.keyboard.press(key)
     page.wait_for_selector(".pair-answers", state="detached")
@@ -65,7 +59,7 @@ def answer(page: Page, key: str) -> None:
 def test_pairs_by_keyboard(studies: Served, page: Page) -> None:
     visit = studies.visit("pairs", page)
     for key in ("ArrowRight", "3"):
-        show(page)
+        show_to_answers(page)
         assert axe_violations(page) == []
         answer(page, key)
     visit.trials()
@@ -97,7 +91,7 @@ def test_a_reload_on_the_question_returns_to_it(
     studies: Served, page: Page, study: str, key: str, winner: str
 ) -> None:
     studies.visit(study, page)
-    show(page)
+    show_to_answers(page)
     page.reload()
     go_back(page)
     page.wait_for_selector(".pair-answers")
@@ -119,7 +113,7 @@ def test_a_reload_in_the_midst_of_a_pair_ends_its_view_and_it_comes_again(
     page.keyboard.press(" ")
     go_back(page)
     for _ in range(2):
-        show(page)
+        show_to_answers(page)
         answer(page, "ArrowRight")
     visit.trials()
     first, other, again = stored(studies)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page
 
-from tests.browser.served import Served, go_back, reload_in_next_clip, serve, start_clip
+from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations
 from tests.helpers.thresholds import FACTORS, TWO_INTERVAL, YES_NO
@@ -46,14 +46,8 @@ def stored(studies: Served, count: int = 0) -> list[dict[str, object]]:
     return studies.rows_of_latest("thresholds", "trial_index, play", count)
 
 
-def show(page: Page) -> None:
-    page.wait_for_selector(".ready")
-    page.keyboard.press(" ")
-    page.wait_for_selector(".pair-answers")
-
-
 def answer(page: Page, key: str) -> None:
-    show(page)
+    show_to_answers(page)
     page.keyboard.press(key)
     page.wait_for_selector(".pair-answers", state="detached")
 
@@ -61,7 +55,7 @@ def answer(page: Page, key: str) -> None:
 def test_a_series_goes_on_without_connection_as_far_as_declared(studies: Served, page: Page) -> None:
     visit = studies.visit("yes_no", page)
     answer(page, "1")
-    show(page)
+    show_to_answers(page)
     assert axe_violations(page) == []
     page.click(".pair-answer[data-answer=no]")
     page.wait_for_selector(".pair-answers", state="detached")
@@ -92,7 +86,7 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(studies: Served,
 
 def test_two_clips_in_turn(studies: Served, page: Page) -> None:
     visit = studies.visit("in_turn", page)
-    show(page)
+    show_to_answers(page)
     assert axe_violations(page) == []
     page.keyboard.press("1")
     page.wait_for_selector(".pair-answers", state="detached")
@@ -109,7 +103,7 @@ def test_two_clips_in_turn(studies: Served, page: Page) -> None:
 @pytest.mark.parametrize(("study", "chosen"), [("yes_no", "yes"), ("in_turn", "first")])
 def test_a_reload_on_the_question_returns_to_it(studies: Served, page: Page, study: str, chosen: str) -> None:
     studies.visit(study, page)
-    show(page)
+    show_to_answers(page)
     page.reload()
     go_back(page)
     page.wait_for_selector(".pair-answers")

@@ -15,7 +15,8 @@ from server.db import Database
 from server.operations.backup import back_up
 from server.operations.copying import copy_database
 from server.operations.restore import restore
-from server.operations.rows import Content, content_of, snapshot, tables_of
+from server.operations.rows import Content
+from server.operations.rows_repository import content_of, snapshot, tables_of
 from server.settings import Settings
 from tests.helpers.databases import BACKENDS
 from tests.helpers.studies import Participant

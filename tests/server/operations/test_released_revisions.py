@@ -7,7 +7,8 @@ import pytest
 from server.context import open_services
 from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.operations.restore import restore
-from server.operations.rows import Content, content_of, snapshot, tables_of
+from server.operations.rows import Content
+from server.operations.rows_repository import content_of, snapshot, tables_of
 from server.settings import Settings
 from server.tallies.recount import Recount
 from tests.conftest import REPOSITORY

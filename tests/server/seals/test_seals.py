@@ -1,6 +1,8 @@
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
+from threading import Event
 
 import pytest
 from fastapi.testclient import TestClient
@@ -16,6 +18,7 @@ from server.seals.page import page
 from server.seals.service import seal_of, seal_plan
 from server.studies.lookup import find_study
 from tests.analysis.ratings_file import rows_of, simulate, write_export
+from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
 POWER = {"effects": {"speed": 0.91}}
@@ -38,6 +41,49 @@ def test_after_the_first_participant_nothing_is_sealed(services: Services, parti
     participant.agree()
     with services.database.write() as session, pytest.raises(Conflict, match="1 participants have begun"):
         seal_plan(session, find_study(session, "short"), None, None)
+
+
+def test_a_later_study_of_the_same_name_is_not_sealed_by_the_deleted_one(
+    services: Services, experimenter: Admin, tmp_path: Path
+) -> None:
+    add_study(services, tmp_path / "clips", status="draft")
+    with services.database.write() as session:
+        seal_plan(session, find_study(session, "short"), None, None)
+    assert experimenter.send("DELETE", "/studies/short").status_code == 204
+    add_study(services, tmp_path / "again")
+    with services.database.write() as session:
+        assert seal_of(session, find_study(session, "short")) is None
+        later = seal_plan(session, find_study(session, "short"), None, POWER)
+        assert seal_of(session, find_study(session, "short")) == later
+
+
+def test_a_plan_is_sealed_once_though_two_seal_it_together(
+    services: Services, study: StudyInDatabase
+) -> None:
+    """The second waits for the first to be stored, and is refused then."""
+    sealed, go_on = Event(), Event()
+
+    def first() -> None:
+        with services.database.write() as session:
+            seal_plan(session, find_study(session, study.name), None, POWER)
+            session.flush()
+            sealed.set()
+            go_on.wait(30)
+
+    def second() -> None:
+        with services.database.write() as session:
+            seal_plan(session, find_study(session, study.name), None, None)
+
+    with ThreadPoolExecutor(2) as pool:
+        one = pool.submit(first)
+        assert sealed.wait(30)
+        other = pool.submit(second)
+        waited = wait([other], timeout=0.5).not_done
+        go_on.set()
+        one.result(30)
+        with pytest.raises(Conflict, match="a seal is never replaced"):
+            other.result(30)
+    assert waited
 
 
 def test_what_differs_from_the_plan_is_named(services: Services, tmp_path: Path) -> None:

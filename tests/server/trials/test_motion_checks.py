@@ -15,6 +15,7 @@ from experiments.manifest import Manifest
 from server.app import create_app
 from server.context import Services
 from server.export.formats import FORMATS
+from server.migrate import current_revision, downgrade, newest_revision
 from server.models import Study
 from server.simulation.acting import Actor
 from server.simulation.adversaries import act, manner_called
@@ -262,3 +263,15 @@ def test_a_study_is_not_taken_in_without_the_checks_it_asks_for(
                 manifest.model_copy(update={"checks": ()}),
                 None,
             )
+
+
+def test_no_downgrade_takes_answers_to_checks(
+    services: Services, study: StudyInDatabase, participant: Participant
+) -> None:
+    participant.answer_forms()
+    trial = of_kind(participant.state(), "check")[0]
+    assert answered(participant, trial, 1).status_code == 201
+    with pytest.raises(RuntimeError, match="Answers to motion checks are stored"):
+        downgrade(services.database, "0017")
+    assert current_revision(services.database) == newest_revision()
+    assert len([row for row in rows(services, study.name) if row["kind"] == "check"]) == 1

@@ -21,9 +21,8 @@ function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
       const { check_scale } = declaredRating(session);
       const response = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? check_scale.minimum);
       const answers = { [check_scale.name]: { response } };
-      const shown_at_ms = absoluteNow();
-      const rated = { answers, at_ms: {}, answered_at_ms: shown_at_ms, changes: 0, comment: null };
-      await (await loaded).store(session, parameters.trial, shown_at_ms, rated);
+      const rated = { answers, at_ms: {}, answered_at_ms: absoluteNow(), changes: 0, comment: null };
+      await (await loaded).store(session, parameters.trial, rated, 0);
       return { response };
     },
     act: (display) => pressWhile(display, ".attention", [".key", ".primary"]),

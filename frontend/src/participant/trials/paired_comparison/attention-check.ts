@@ -1,14 +1,10 @@
 /** An instructed answer between pairs: the same buttons without clips. */
 import type { TrialInfo } from "../../../api/schema";
-import { h } from "../../../ui/element";
-import { markdown } from "../../../ui/markdown";
-import { focusHeading } from "../../../ui/page";
 import { OBJECT, plugin, STRING, type PluginClass, pressWhile } from "../../jspsych";
-import { absoluteNow } from "../../playback/protocol";
 import { playbackRecord } from "../../playback/record";
-import { screenSignal, stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
+import { askAttention } from "../shared/attention";
 import { winnerOf, type Winner } from "./answer-keys";
 import { askWinner } from "./answers";
 import { comparisonBody } from "./body";
@@ -37,23 +33,14 @@ export function pairCheck(session: Session): PluginClass<Parameters> {
 }
 
 async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<Data> {
-  const { signal, done } = screenSignal(session);
   const { language, t } = session;
   const declared = declaredPairs(session);
-  const below = h("div", { class: "below" });
-  const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
-  section.append(stopButton(session));
-  display.replaceChildren(section);
-  const title = h("h1", { class: "eyebrow" }, t("attention_title"));
-  const question = h("div", { class: "question" }, title, ...markdown(trial.prompt ?? ""));
-  const shown_at_ms = absoluteNow();
   const { arrangement } = declared.presentation;
-  const answer = askWinner(below, { trial: declared, arrangement, language, t, signal, question });
-  focusHeading(section);
-  const { winner, answered_at_ms } = await answer;
-  done();
-  await store(session, trial, winner, Math.round((answered_at_ms - shown_at_ms) * 100) / 100);
-  return { winner };
+  const { answer, rt } = await askAttention(session, display, trial, (below, question, signal) =>
+    askWinner(below, { trial: declared, arrangement, language, t, signal, question }),
+  );
+  await store(session, trial, answer.winner, rt);
+  return { winner: answer.winner };
 }
 
 function store(session: Session, trial: TrialInfo, winner: Winner, rt: number): Promise<void> {

@@ -1,14 +1,10 @@
 /** An instructed answer between trials: the same buttons without clips. */
 import type { TrialInfo } from "../../../api/schema";
-import { h } from "../../../ui/element";
-import { markdown } from "../../../ui/markdown";
-import { focusHeading } from "../../../ui/page";
 import { OBJECT, plugin, STRING, type PluginClass, pressWhile } from "../../jspsych";
-import { absoluteNow } from "../../playback/protocol";
 import { playbackRecord } from "../../playback/record";
-import { stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
+import { askAttention } from "../shared/attention";
 import { askResponse, type Response } from "./answers";
 import { thresholdBody } from "./body";
 import { declaredThreshold } from "./declared";
@@ -37,18 +33,9 @@ export function thresholdCheck(session: Session): PluginClass<Parameters> {
 }
 
 async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<Data> {
-  const below = h("div", { class: "below" });
-  const section = h("section", { class: "trial attention" }, h("div", { class: "above" }), below);
-  section.append(stopButton(session));
-  display.replaceChildren(section);
-  const title = h("h1", { class: "eyebrow" }, session.t("attention_title"));
-  const question = h("div", { class: "question" }, title, ...markdown(trial.prompt ?? ""));
-  const shown_at_ms = absoluteNow();
-  const answer = askResponse(session, below, question);
-  focusHeading(section);
-  const { name, answered_at_ms } = await answer;
-  await store(session, trial, name, Math.round((answered_at_ms - shown_at_ms) * 100) / 100);
-  return { chosen: name };
+  const { answer, rt } = await askAttention(session, display, trial, (below, question) => askResponse(session, below, question));
+  await store(session, trial, answer.name, rt);
+  return { chosen: answer.name };
 }
 
 function store(session: Session, trial: TrialInfo, chosen: Response, rt: number): Promise<void> {

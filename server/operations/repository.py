@@ -1,0 +1,70 @@
+"""What the doctor, the metrics and backups ask of the whole database."""
+
+from typing import NamedTuple
+
+from sqlalchemy import Connection, func, select, text
+from sqlalchemy.orm import Session
+
+from server.models import Account, Clip, Study, StudyRun
+
+
+class RunCount(NamedTuple):
+    """Runs of one study that are alike in phase, origin and status."""
+
+    study: str
+    phase: str
+    origin: str
+    status: str
+    runs: int
+
+
+class ClipSize(NamedTuple):
+    """A clip's hash and its length in bytes."""
+
+    sha256: str
+    bytes: int
+
+
+def run_counts(session: Session) -> list[RunCount]:
+    """The runs of all studies, previews left out."""
+    alike = (Study.name, StudyRun.phase, StudyRun.origin, StudyRun.status)
+    query = select(*alike, func.count()).join(Study, Study.id == StudyRun.study_id)
+    rows = session.execute(query.where(StudyRun.origin != "preview").group_by(*alike))
+    return [RunCount(*row) for row in rows]
+
+
+def clip_sizes(session: Session) -> list[ClipSize]:
+    """Every clip that a study names."""
+    return [ClipSize(*row) for row in session.execute(select(Clip.sha256, Clip.bytes))]
+
+
+def clip_hashes(connection: Connection) -> list[str]:
+    """The hashes of all clips, ascending; of a database of any revision."""
+    return list(connection.scalars(text("SELECT sha256 FROM clips ORDER BY sha256")))
+
+
+def study_count(session: Session) -> int:
+    """How many studies there are."""
+    return session.scalar(select(func.count()).select_from(Study)) or 0
+
+
+def owner_count(session: Session) -> int:
+    """Owners who may sign in."""
+    query = select(func.count()).where(Account.disabled_at.is_(None), Account.role == "owner")
+    return session.scalar(query) or 0
+
+
+def count_without_second_factor(session: Session) -> int:
+    """People who may sign in by a password alone."""
+    query = select(func.count()).where(Account.disabled_at.is_(None), Account.totp_confirmed_at.is_(None))
+    return session.scalar(query) or 0
+
+
+def sqlite_complaint(session: Session) -> str:
+    """The first thing SQLite finds wrong with its file; `ok` for none."""
+    return str(session.scalar(text("PRAGMA quick_check(1)")))
+
+
+def postgres_setting(session: Session, name: str) -> str:
+    """A setting of the PostgreSQL server."""
+    return str(session.scalar(text(f"SHOW {name}")))

@@ -1,0 +1,92 @@
+"""A database's rows, read and written whole.
+
+Tables are read from the database itself, not from the models: one of an older revision is handled too.
+"""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from itertools import islice
+
+from sqlalchemy import JSON, Connection, DateTime, Integer, MetaData, Table, func, insert, select, text
+
+from experiments.errors import InputError
+from server.db import Database
+from server.operations.rows import Content, Digest, Row, time_of, time_text
+from server.text import visible
+
+BATCH = 500
+REVISION_TABLE = "alembic_version"
+
+
+@contextmanager
+def snapshot(database: Database) -> Iterator[Connection]:
+    """A connection that sees one moment of the database, however long it reads."""
+    with database.engine.connect() as connection:
+        if not database.is_sqlite:  # SQLite's transactions are snapshots in themselves
+            connection = connection.execution_options(isolation_level="REPEATABLE READ")
+        yield connection
+
+
+def tables_of(connection: Connection) -> list[Table]:
+    """The tables, each after those it refers to."""
+    metadata = MetaData()
+    metadata.reflect(connection)
+    tables = [table for table in metadata.sorted_tables if table.name != REVISION_TABLE]
+    for table in tables:
+        for column in table.columns:
+            if isinstance(column.type, JSON):
+                column.type = JSON(none_as_null=True)
+    return tables
+
+
+def read_rows(connection: Connection, table: Table) -> Iterator[Row]:
+    """Every row in order of the primary key, in constant memory; what no file could hold is made visible."""
+    query = select(table).order_by(*table.primary_key.columns).execution_options(yield_per=BATCH)
+    times = {column.name for column in table.columns if isinstance(column.type, DateTime)}
+    for found in connection.execute(query).mappings():
+        yield {name: time_text(value) if name in times else visible(value) for name, value in found.items()}
+
+
+def write_rows(connection: Connection, table: Table, rows: Iterable[Row]) -> Content:
+    """Insert rows as `read_rows` gives them; return what was written."""
+    digest, left = Digest(), iter(rows)
+    times = {column.name for column in table.columns if isinstance(column.type, DateTime)}
+    aware = connection.dialect.name == "postgresql"
+    while batch := list(islice(left, BATCH)):
+        for row in batch:
+            digest.add(row)
+        connection.execute(
+            insert(table),
+            [
+                {name: time_of(row[name], aware) if name in times else row[name] for name in row}
+                for row in batch
+            ],
+        )
+    _next_ids(connection, table)
+    return digest.content()
+
+
+def content_of(connection: Connection, table: Table) -> Content:
+    """Count and hash of a table."""
+    digest = Digest()
+    for row in read_rows(connection, table):
+        digest.add(row)
+    return digest.content()
+
+
+def refuse_unless_empty(connection: Connection, what: str) -> None:
+    """InputError where any table holds a row."""
+    for table in tables_of(connection):
+        if connection.scalar(select(func.count()).select_from(table)):
+            raise InputError(f"{what} already holds rows (table {table.name}); give an empty database")
+
+
+def _next_ids(connection: Connection, table: Table) -> None:
+    """PostgreSQL counts ids by itself and must learn which are taken."""
+    if connection.dialect.name != "postgresql" or "id" not in table.columns:
+        return
+    if isinstance(table.columns["id"].type, Integer):
+        highest = connection.scalar(select(func.max(table.columns["id"])))
+        if highest is not None:
+            statement = text("SELECT setval(pg_get_serial_sequence(:name, 'id'), :highest)")
+            connection.execute(statement, {"name": table.name, "highest": highest})
