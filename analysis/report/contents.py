@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from analysis.report.formats import Table
-from experiments.seal import Seal, deviations_said
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
+    from experiments.seal import Seal
 
 Progress = Callable[[str], None]
 
@@ -110,12 +110,15 @@ class Contents:
 
 
 def held_against(
-    contents: Contents, seal: Seal, experiment: "Experiment", clips: str | None = None
+    contents: Contents, seal: "Seal", experiment: "Experiment", clips: str | None = None
 ) -> Contents:
     """The contents with a line for each deviation from the sealed plan, or one that there is none.
 
     `clips` is the hash of the clips that were shown, None where it is not known.
     """
+    # a declaration takes a tenth of a second to import, which a plain CSV does without
+    from experiments.seal import deviations_said
+
     said = deviations_said(seal, experiment, contents.n_participants, clips)
     numbers = {**contents.numbers, "sealed_plan": {"sha256": seal.sha256, "said": list(said)}}
     return replace(contents, decisions=(*said, *contents.decisions), numbers=numbers)
