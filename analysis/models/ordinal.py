@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.design import ModelData, ModelTerms, Slopes, model_data, slope_groups
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
+from analysis.models.separation import refuse_separation
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -111,6 +112,7 @@ def fit_ordinal(
             f"expected at most {MAXIMUM_CATEGORIES} distinct ratings, got {len(categories)}; "
             "use the linear mixed model for continuous ratings"
         )
+    refuse_separation(data)
     groups, left_out = slope_groups(data, slopes)
     ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups)
     likelihood = LaplaceLikelihood(ordinal)

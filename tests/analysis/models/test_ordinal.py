@@ -160,3 +160,22 @@ def test_continuous_ratings_are_refused():
     rows = pd.read_csv(GOLDEN / "mixed_two_by_two.csv")
     with pytest.raises(InputError, match="at most 20 distinct ratings"):
         fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip")
+
+
+@pytest.mark.parametrize("shared", [0, 1])
+def test_separated_ratings_are_refused(shared):
+    """Also where the two levels share one category: its thresholds can then move apart without end."""
+    rng = np.random.default_rng(2)
+    rows = pd.DataFrame(
+        [
+            (f"p{p}", level, rng.integers(1, 3) if level == "m" else rng.integers(3 - shared, 6))
+            for p in range(8)
+            for level in "mn"
+            for _ in range(6)
+        ],
+        columns=["who", "level", "y"],
+    )
+    with pytest.raises(InputError, match="no rating at level=m lies above any other"):
+        fit_ordinal(rows, "who", "y", ["level"])
+    overlapping = pd.concat([rows, pd.DataFrame([("p0", "m", 5)], columns=rows.columns)])
+    assert np.isfinite(fit_ordinal(overlapping, "who", "y", ["level"]).log_likelihood)
