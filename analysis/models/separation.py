@@ -21,6 +21,6 @@ def refuse_separation(data: ModelData) -> None:
             if top <= min(ratings[k].min() for k in order[cut:]):
                 low = ", ".join(levels[k] for k in sorted(order[:cut]))
                 raise InputError(
-                    f"no rating at {name}={low} lies above any other of {name}: the ratings are separated, and "
+                    f"no rating at {name}={low} lies above any other of {name}: they are separated, and "
                     "an ordinal model has no finite estimate; use analysis mixed, or leave the factor out"
                 )
