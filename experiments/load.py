@@ -19,7 +19,7 @@ FOLDER = Path(__file__).parent
 _PLACE = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
 SHIPPED = ("exp1", "exp2", "exp3")
 DEMOS = (
-    *("pairs-demo", "sliders-demo", "threshold-demo", "checks-demo"),
+    *("pairs-demo", "sliders-demo", "threshold-demo", "checks-demo", "faces-demo"),
     *("timing", "timing-pairs", "timing-continuous"),
 )
 """Demonstrations of the other kinds of trial and of sliders; each is found by its file's name or its own."""

@@ -57,7 +57,9 @@ def _held_still(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
     low, high = frames.min(axis=0), frames.max(axis=0)
     first = frames[0]
     moves = (np.maximum(high - first, first - low) > STILL_CODES).any(axis=-1)
-    return np.where(moves[None, ..., None], frames, first)
+    for frame in frames[1:]:
+        np.copyto(frame, first, where=~moves[..., None])
+    return frames
 
 
 def _rgb(frame: Any) -> NDArray[np.uint8]:
