@@ -33,6 +33,8 @@ from server.settings import Settings
 from server.studies import endpoints as studies
 from server.studies import life_endpoints as life_cycle
 from server.studies import link_endpoints as links
+from server.workspaces import endpoints as workspaces
+from server.workspaces import grant_endpoints as grants
 
 
 def _routers() -> tuple[APIRouter, ...]:
@@ -46,6 +48,8 @@ def _routers() -> tuple[APIRouter, ...]:
         views.router,
         accounts.router,
         people.router,
+        workspaces.router,
+        grants.router,
         studies.router,
         life_cycle.router,
         links.router,

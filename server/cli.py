@@ -24,6 +24,7 @@ app = typer.Typer(
 def _gather() -> None:
     from server import cli_database, cli_run
     from server.accounts import cli as accounts
+    from server.audit import cli as audit
     from server.capsules import cli as capsules
     from server.export import cli as export
     from server.methods import cli as methods
@@ -31,6 +32,7 @@ def _gather() -> None:
     from server.seals import cli as seals
     from server.simulation import cli as simulation
     from server.studies import cli as studies
+    from server.workspaces import cli as workspaces
 
     for group in (
         cli_run,
@@ -42,6 +44,8 @@ def _gather() -> None:
         methods,
         simulation,
         accounts,
+        audit,
+        workspaces,
         operations,
     ):
         group.register(app)

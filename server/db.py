@@ -2,7 +2,7 @@
 
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,8 @@ from experiments.errors import InputError
 from server.settings import Settings
 
 DRIVERS = ("sqlite", "sqlite+pysqlite", "postgresql+psycopg")
+SIGNING_KEY, SYSLOG = "signing key", "syslog"
+"""What sessions that write carry: a function that gives the secret key, and where the audit log goes."""
 BUSY_TIMEOUT_S = 30
 """How long a command waits for a turn to write."""
 REQUEST_BUSY_S = 4
@@ -48,10 +50,18 @@ class Database:
     One request uses one of them, and it ends before the answer is sent: what is acknowledged is committed.
     """
 
-    def __init__(self, url: str, *, pool: int = 20, busy_s: float = BUSY_TIMEOUT_S) -> None:
+    def __init__(
+        self,
+        url: str,
+        *,
+        pool: int = 20,
+        busy_s: float = BUSY_TIMEOUT_S,
+        carried: Mapping[str, Any] | None = None,
+    ) -> None:
         self.url = checked_url(url)
         self.is_sqlite = self.url.get_backend_name() == "sqlite"
         self.engine = _sqlite_engine(url, pool, busy_s) if self.is_sqlite else _postgres_engine(url, pool)
+        self._carried = dict(carried or {})
         self._write_engine = self.engine.execution_options(immediate=True)
         # SQLite lets one writer in and makes the others poll; queueing them here keeps the wait short.
         self._writer = _Turns(busy_s) if self.is_sqlite else nullcontext()
@@ -73,7 +83,7 @@ class Database:
     @contextmanager
     def write(self) -> Iterator[Session]:
         """A session committed at the end, rolled back where an exception leaves the block."""
-        with self._writer, Session(self._write_engine, expire_on_commit=False) as session:
+        with self._writer, Session(self._write_engine, expire_on_commit=False, info=self._carried) as session:
             yield session
             session.commit()
 
@@ -136,7 +146,13 @@ def open_database(settings: Settings, busy_s: float = BUSY_TIMEOUT_S) -> Databas
     url = checked_url(settings.resolved_database_url)
     if url.get_backend_name() == "sqlite" and url.database:
         Path(url.database).parent.mkdir(parents=True, exist_ok=True)
-    return Database(settings.resolved_database_url, pool=settings.database_pool, busy_s=busy_s)
+    return Database(
+        settings.resolved_database_url,
+        pool=settings.database_pool,
+        busy_s=busy_s,
+        # The key is read when it is needed: a restore brings it.
+        carried={SIGNING_KEY: lambda: settings.key, SYSLOG: settings.audit_syslog},
+    )
 
 
 def _postgres_engine(url: str, pool: int) -> Engine:

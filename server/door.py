@@ -13,11 +13,12 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.accounts.identity import EXPERIMENTER, identify
+from server.accounts.identity import identify
 from server.context import Services
 from server.errors import ApiError, error_response
 from server.settings import Settings
 from server.text import body_problem
+from server.workspaces.access import recognise_uploader
 
 ANONYMOUS_BYTES = 64 * 1024
 """Of a JSON body whose sender is not known."""
@@ -122,7 +123,7 @@ class Door:
 
     async def _upload(self, scope: Scope, receive: Receive) -> Receive:
         """Recognise the sender first; then let the body pass, counted and timed."""
-        await run_in_threadpool(EXPERIMENTER, Request(scope), _services(scope), None, None)
+        await run_in_threadpool(recognise_uploader, Request(scope), _services(scope))
         if _declared(scope) > self.upload_bytes:
             raise too_large(self.upload_bytes)
         return _counted(receive, self.upload_bytes)

@@ -54,6 +54,10 @@ class Settings(BaseSettings):
     run_starts_per_minute: int = Field(
         default=3000, ge=1, description="Runs that may be started by one link a minute, per worker."
     )
+    audit_syslog: str = Field(
+        default="",
+        description="Syslog that gets the audit log too, without details: /dev/log, or host:port (UDP).",
+    )
     evidence: Literal["refuse", "record"] = Field(
         default="refuse",
         description="Answers that cannot have been given as they say: refuse them, or record and judge.",

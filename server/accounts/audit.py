@@ -1,11 +1,12 @@
-"""The audit log: one row for every change an experimenter makes."""
+"""The audit log: one row for every change an experimenter makes, and for every look at single persons."""
 
 from typing import Any, Literal
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from server.accounts.identity import Identity
+from server.audit.sealing import join_at_commit
+from server.clock import now
 from server.models import AuditEntry
 
 NOBODY: Literal["nobody"] = "nobody"
@@ -25,21 +26,14 @@ def record(
 
     who: None for the command line.
     """
-    session.add(
-        AuditEntry(
-            account_id=who.account_id if isinstance(who, Identity) else None,
-            actor=who.name if isinstance(who, Identity) else who or "command line",
-            action=action,
-            target_kind=kind,
-            target=target[:200],
-            details=details,
-        )
+    entry = AuditEntry(
+        at=now(),
+        account_id=who.account_id if isinstance(who, Identity) else None,
+        actor=who.name if isinstance(who, Identity) else who or "command line",
+        action=action,
+        target_kind=kind,
+        target=target[:200],
+        details=details,
     )
-
-
-def latest(session: Session, before: int | None, limit: int) -> list[AuditEntry]:
-    """The latest entries with a number below `before`, newest first."""
-    query = select(AuditEntry).order_by(AuditEntry.id.desc()).limit(limit)
-    if before is not None:
-        query = query.where(AuditEntry.id < before)
-    return list(session.scalars(query))
+    session.add(entry)
+    join_at_commit(session, entry)

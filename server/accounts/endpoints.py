@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Cookie, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy import select
+from sqlalchemy.orm import Session
 
 from server.accounts import second_factor, service
 from server.accounts.audit import record
@@ -18,6 +19,7 @@ from server.accounts.schemas import (
     ConfirmPassword,
     InvitationState,
     Me,
+    MyWorkspace,
     NewAccount,
     NewToken,
     NewTokenOut,
@@ -33,6 +35,7 @@ from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.models import Account, AdminSession, ApiToken
 from server.tokens import hash_token, new_token
+from server.workspaces.repository import workspaces_of
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
 DEVICE_DAYS = 365
@@ -83,8 +86,22 @@ def get_session(request: Request, services: ServicesDep) -> Me:
     except NotSignedIn:
         identity = None
     with services.database.read() as session:
-        account = account_out(account_of(session, identity)) if identity else None
-        return Me(account=account, accounts_exist=service.accounts_exist(session))
+        if identity is None:
+            return Me(account=None, accounts_exist=service.accounts_exist(session))
+        return _me(session, account_of(session, identity), second_factor=identity.second_factor)
+
+
+def _me(session: Session, account: Account, *, second_factor: bool) -> Me:
+    belongs = [
+        MyWorkspace(
+            name=workspace.name,
+            title=workspace.title,
+            role=role,
+            second_factor_needed=workspace.second_factor_required and not second_factor,
+        )
+        for workspace, role in workspaces_of(session, account.id)
+    ]
+    return Me(account=account_out(account), workspaces=belongs, accounts_exist=True)
 
 
 @router.post("/session")
@@ -142,7 +159,9 @@ def address_of(request: Request) -> str:
 def _just_signed_in(services: Services, token: str) -> Me:
     with services.database.read() as session:
         found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(token)))
-        return Me(account=account_out(found.account) if found else None, accounts_exist=True)
+        if found is None:
+            return Me(account=None, accounts_exist=True)
+        return _me(session, found.account, second_factor=found.second_factor)
 
 
 @router.delete("/session", status_code=204)

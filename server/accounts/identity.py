@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
@@ -39,18 +39,30 @@ class NotAllowed(ApiError):
 
 @dataclass(frozen=True)
 class Identity:
-    """The account behind a request; `session_id` for a browser, `scopes` for a token."""
+    """The account behind a request; `session_id` for a browser, `scopes` for a token.
+
+    role: on the server; what may be done with a study is asked by `server.studies.lookup.find_study`.
+    second_factor: the session began with one, or the token's account has one.
+    """
 
     account_id: int
     name: str
     role: str
     session_id: int | None = None
     scopes: frozenset[str] | None = None
+    second_factor: bool = False
 
     @property
     def sees_persons(self) -> bool:
         """True for browsers, and for tokens with the scope `personal`."""
         return self.scopes is None or "personal" in self.scopes
+
+
+class Operator:
+    """Whoever has the machine: the command line and the server's own work. Every study is open to her."""
+
+
+OPERATOR: Final = Operator()
 
 
 def check_origin(request: Request, services: Services) -> None:
@@ -84,7 +96,14 @@ def _by_cookie(services: Services, cookie: str) -> Identity:
         found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(cookie)))
         if found is None or found.revoked_at or found.expires_at <= now() or found.account.disabled_at:
             raise NotSignedIn("Your session has ended; please sign in again.")
-        identity = Identity(found.account_id, found.account.name, found.account.role, session_id=found.id)
+        account = found.account
+        identity = Identity(
+            account.id,
+            account.name,
+            account.role,
+            session_id=found.id,
+            second_factor=found.second_factor,
+        )
         stale = now() - found.last_seen_at > _SEEN_EVERY
     if stale:
         with services.database.write() as session:
@@ -100,7 +119,13 @@ def _by_token(services: Services, token: str) -> Identity:
         if found is None or found.revoked_at or expired or found.account.disabled_at:
             raise NotSignedIn("This API token is unknown, revoked or expired; make a new one.")
         account = found.account
-        identity = Identity(account.id, account.name, account.role, scopes=frozenset(found.scopes))
+        identity = Identity(
+            account.id,
+            account.name,
+            account.role,
+            scopes=frozenset(found.scopes),
+            second_factor=account.totp_confirmed_at is not None,
+        )
         stale = found.last_used_at is None or now() - found.last_used_at > _SEEN_EVERY
         token_id = found.id
     if stale:
@@ -111,7 +136,7 @@ def _by_token(services: Services, token: str) -> Identity:
 
 
 class _Access:
-    """A dependency that lets in accounts of at least `role`, and tokens that carry `scope` as well."""
+    """A dependency: lets in accounts of at least `role` on the server; tokens must carry `scope` as well."""
 
     def __init__(self, role: Role, scope: Scope | None) -> None:
         self.role, self.scope = role, scope
@@ -125,7 +150,7 @@ class _Access:
     ) -> Identity:
         identity = identify(request, services)
         if ROLES.index(identity.role) < ROLES.index(self.role):
-            raise NotAllowed(f"This needs the role {self.role}; your account is a {identity.role}.")
+            raise NotAllowed(f"This needs the role {self.role} on this server; yours is {identity.role}.")
         if identity.scopes is not None:
             if self.scope is None:
                 raise NotAllowed("This cannot be done with an API token; sign in in a browser.")
@@ -134,19 +159,22 @@ class _Access:
         return identity
 
 
+# Whoever is signed in, by what a token must carry. What she may do with a study the study's query decides.
 Viewer = Annotated[Identity, Depends(_Access("viewer", "read"))]
-"""May look at everything but accounts."""
+"""May look."""
 Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]
 """May download data."""
 PersonalReader = Annotated[Identity, Depends(_Access("viewer", "personal"))]
 """May look at single persons: their answers, recruiters' ids and devices. Scope `read` alone does not do."""
-EXPERIMENTER = _Access("experimenter", "write")
-Experimenter = Annotated[Identity, Depends(EXPERIMENTER)]
-"""May change studies."""
-Owner = Annotated[Identity, Depends(_Access("owner", None))]
-"""May change accounts."""
+WRITER = _Access("viewer", "write")
+Writer = Annotated[Identity, Depends(WRITER)]
+"""May change things."""
 Myself = Annotated[Identity, Depends(_Access("viewer", None))]
-"""A signed-in browser, for changes to one's own account."""
+"""A signed-in browser: one's own account, and what no token opens."""
+Founder = Annotated[Identity, Depends(_Access("experimenter", None))]
+"""A signed-in browser of one who may make workspaces."""
+Owner = Annotated[Identity, Depends(_Access("owner", None))]
+"""A signed-in browser of one who manages this server: accounts, workspaces, the audit log."""
 
 
 def account_of(session: Session, identity: Identity) -> Account:

@@ -16,6 +16,7 @@ from server.accounts.schemas import (
     NewInvitation,
     NewInvitationOut,
 )
+from server.audit import repository as audit_repository
 from server.clock import now
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
@@ -48,7 +49,9 @@ def list_invitations(services: ServicesDep, _who: Owner) -> list[InvitationOut]:
 @router.post("/invitations", status_code=201)
 def create_invitation(services: ServicesDep, who: Owner, body: NewInvitation) -> NewInvitationOut:
     """Invite somebody by a one-time link, shown this once."""
-    invitation, token = service.invite(services.database, body.role, body.label, who)
+    invitation, token = service.invite(
+        services.database, body.role, body.label, who, body.workspace, body.workspace_role
+    )
     shown = InvitationOut.model_validate(invitation)
     return NewInvitationOut(**shown.model_dump(), url=invitation_url(services.settings.public_url, token))
 
@@ -78,4 +81,4 @@ def list_audit(
 ) -> list[AuditOut]:
     """The audit log, newest first; `before` pages on."""
     with services.database.read() as session:
-        return [AuditOut.model_validate(row) for row in audit.latest(session, before, limit)]
+        return [AuditOut.model_validate(row) for row in audit_repository.latest(session, before, limit)]

@@ -52,9 +52,14 @@ class ConfirmPassword(_In):
 
 
 class NewInvitation(_In):
-    """Whom to invite, as what."""
+    """Whom to invite, as what on the server, and where the account will belong as what.
+
+    Without a workspace it is the default one, and without a role in it the role on the server.
+    """
 
     role: Role
+    workspace: Annotated[str, StringConstraints(max_length=60)] | None = None
+    workspace_role: Role | None = None
     label: Annotated[str, StringConstraints(strip_whitespace=True, max_length=200)] = ""
 
 
@@ -88,10 +93,22 @@ class AccountOut(_Out):
     created_at: datetime
 
 
+class MyWorkspace(BaseModel):
+    """A workspace one belongs to, and as what."""
+
+    name: str
+    title: str
+    role: Role
+    second_factor_needed: bool = Field(
+        description="Its studies stay closed until the account signs in with a second factor."
+    )
+
+
 class Me(BaseModel):
     """Who is signed in here; `account` is null where nobody is."""
 
     account: AccountOut | None
+    workspaces: list[MyWorkspace] = Field(default=[], description="Where the account belongs.")
     accounts_exist: bool = Field(description="False until the first owner has used the one-time link.")
 
 

@@ -16,8 +16,19 @@ from server.clock import now
 from server.context import Services
 from server.db import Database
 from server.errors import ApiError, Conflict, NotFound
-from server.models import ROLES, Account, AdminSession, ApiToken, Invitation, Role
+from server.models import (
+    DEFAULT_WORKSPACE,
+    ROLES,
+    Account,
+    AdminSession,
+    ApiToken,
+    Invitation,
+    Role,
+    Workspace,
+)
 from server.tokens import hash_token, new_token
+from server.workspaces.repository import default_workspace, set_member
+from server.workspaces.service import Place, find_workspace
 
 INVITATION_DAYS = 7
 INVITATION_USED = Conflict("This invitation was used or has expired; ask for a new one.")
@@ -130,8 +141,13 @@ def create_account(session: Session, name: str, password: str, role: Role) -> Ac
     return add_account(session, name, hash_password(password, name), role)
 
 
-def add_account(session: Session, name: str, password_hash: str, role: Role) -> Account:
-    """Add an account whose password was hashed before; Conflict where the name is taken."""
+def add_account(
+    session: Session, name: str, password_hash: str, role: Role, place: Place | None = None
+) -> Account:
+    """Add an account whose password was hashed before; Conflict where the name is taken.
+
+    place: where it belongs, and as what; the default workspace, in the same role, where None.
+    """
     if _by_name(session, name) is not None:
         raise Conflict(f"There is already an account called '{name}'; choose another name.")
     account = Account(name=name, password_hash=password_hash, role=role)
@@ -140,24 +156,41 @@ def add_account(session: Session, name: str, password_hash: str, role: Role) -> 
         session.flush()
     except IntegrityError as error:  # somebody took it at this very moment
         raise Conflict(f"There is already an account called '{name}'; choose another name.") from error
-    record(session, identity_of(account), "account created", "account", name, role=role)
+    place = place or Place(default_workspace(session), role)
+    set_member(session, place.workspace, account, place.role)
+    record(
+        session, identity_of(account), "account created", "account", name, role=role,
+        workspace=place.workspace.name, workspace_role=place.role,
+    )  # fmt: skip
     return account
 
 
-def invite(database: Database, role: Role, label: str, who: Identity | None) -> tuple[Invitation, str]:
-    """Make a one-time link's token; only its hash is kept."""
+def invite(
+    database: Database,
+    role: Role,
+    label: str,
+    who: Identity | None,
+    workspace: str | None = None,
+    workspace_role: Role | None = None,
+) -> tuple[Invitation, str]:
+    """Make a one-time link's token; only its hash is kept. For the arguments see `Invitation`."""
     token = new_token()
     with database.write() as session:
+        belongs = find_workspace(session, workspace) if workspace is not None else None
         invitation = Invitation(
             token_hash=hash_token(token),
             role=role,
+            workspace_id=belongs.id if belongs else None,
+            workspace_role=workspace_role,
             label=label,
             created_by=who.account_id if who else None,
             expires_at=now() + timedelta(days=INVITATION_DAYS),
         )
         session.add(invitation)
         session.flush()
-        record(session, who, "invited", "invitation", label, role=role)
+        record(
+            session, who, "invited", "invitation", label, role=role, workspace=workspace or DEFAULT_WORKSPACE
+        )
     return invitation, token
 
 
@@ -194,7 +227,12 @@ def accept_invitation(services: Services, token: str, name: str, password_hash: 
         )
         if cast(CursorResult[Any], session.execute(used)).rowcount != 1:
             raise INVITATION_USED
-        account = add_account(session, name, password_hash, known_role(invitation.role))
+        role = known_role(invitation.role)
+        belongs = session.get(Workspace, invitation.workspace_id) if invitation.workspace_id else None
+        place = Place(
+            belongs or default_workspace(session), known_role(invitation.workspace_role or invitation.role)
+        )
+        account = add_account(session, name, password_hash, role, place)
         return _open_session(services, session, account, user_agent)
 
 
@@ -279,6 +317,8 @@ def confirm_second_factor(services: Services, who: Identity, code: str) -> list[
         if step is None:
             raise WrongCredentials("That code does not fit; check the clock of your phone and try again.")
         account.totp_confirmed_at, account.totp_last_step = now(), step
+        if (current := session.get(AdminSession, who.session_id)) is not None:
+            current.second_factor = True
         account.recovery_code_hashes = [second_factor.hash_recovery_code(c) for c in codes]
         record(session, who, "second factor set up", "account", who.name)
     return codes
@@ -288,6 +328,8 @@ def remove_second_factor(services: Services, who: Identity) -> None:
     """Turn the second factor off again; the password was asked for."""
     with services.database.write() as session:
         _without_second_factor(account_of(session, who))
+        for row in open_sessions(session, who):
+            row.second_factor = False
         record(session, who, "second factor removed", "account", who.name)
 
 

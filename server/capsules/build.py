@@ -23,6 +23,7 @@ from experiments.files import whole_file
 from experiments.json import json_text
 from experiments.manifest import Manifest
 from experiments.software import present_software
+from server.accounts.identity import OPERATOR
 from server.capsules.crate import CRATE_FILE, crate_metadata
 from server.clock import now
 from server.context import Services
@@ -73,7 +74,7 @@ def build_capsule(
         work.mkdir()
         progress(0.05, "exporting")
         with services.database.snapshot() as session:
-            study = find_study(session, name)
+            study = find_study(session, name, OPERATOR, "view")
             version = active_version(session, study)
             source = _write_study(session, study, version, folder, made, wanted)
             experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)

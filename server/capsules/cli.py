@@ -8,6 +8,7 @@ from rich.console import Console
 
 from experiments.errors import InputError
 from server.accounts.audit import record
+from server.accounts.identity import OPERATOR
 from server.capsules.build import CapsuleOrigin, Wanted, build_capsule
 from server.cli_common import migrated_services, out
 from server.studies.lookup import active_definition, find_study
@@ -45,7 +46,7 @@ def capsule(
         raise InputError(f"{out_file}: the folder {out_file.parent} does not exist; make it first")
     with migrated_services() as services, Console(stderr=True).status("capsule") as status:
         with services.database.write() as session:
-            about = active_definition(session, find_study(session, study)).dataset
+            about = active_definition(session, find_study(session, study, OPERATOR, "view")).dataset
             record(session, None, "data downloaded", "study", study, what="capsule", origin=origin)
         made = build_capsule(
             services,

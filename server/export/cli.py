@@ -12,6 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from server.accounts.audit import record
+from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
 from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed
 from server.export.origins import ExportOrigin
@@ -77,10 +78,11 @@ def export(
     if (bom or guard) and form not in CSV_FORMATS:
         raise InputError(f"--bom and --guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
     with migrated_services() as services, services.database.snapshot() as session:
-        if form == "identities":
+        found = find_study(session, study, OPERATOR, "view")
+        if form != "codebook":
+            action = "identities downloaded" if form == "identities" else "data downloaded"
             with services.database.write() as noted:
-                record(noted, None, "identities downloaded", "study", study, what=form)
-        found = find_study(session, study)
+                record(noted, None, action, "study", study, what=form, origin=origin)
         try:
             size = _write(out_file, proofed(FORMATS[form](session, found, origin), form, bom, guard))
             if form == "csv" and scripts and str(out_file) != "-":

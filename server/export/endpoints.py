@@ -12,7 +12,7 @@ from fastapi.responses import FileResponse, StreamingResponse
 from starlette.background import BackgroundTask
 
 from server.accounts.audit import record
-from server.accounts.identity import Exporter, Identity, Owner, Viewer
+from server.accounts.identity import Exporter, Identity, Myself, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Conflict
 from server.export.converted import convert, write_table
@@ -20,6 +20,7 @@ from server.export.formats import FORMATS, Format, proofed, row_count
 from server.export.origins import ExportOrigin
 from server.export.scripts import ScriptLanguage, script
 from server.export.tables import answers_table, wide_table
+from server.models import Right
 from server.studies.lookup import active_definition, find_study
 from server.text import encoded
 
@@ -42,11 +43,13 @@ def _stream(
     excel: bool = False,
 ) -> StreamingResponse:
     action = "identities downloaded" if form == "identities" else "data downloaded"
+    right: Right = "own" if form == "identities" else "export"
     with services.database.write() as session:
-        find_study(session, name)  # an unknown study is refused before the stream begins
+        # An unknown study, and one without the right, is refused before the stream begins.
+        find_study(session, name, who, right)
         record(session, who, action, "study", name, what=form, origin=origin)
 
-    pieces = _pieces(services, name, form, origin, excel)
+    pieces = _pieces(services, who, name, form, origin, excel)
     whose = "" if origin == "participant" or form == "identities" else f"{origin}-"
     # The first piece is the number of rows; taking it begins the snapshot that the rest is read from.
     headers = {
@@ -57,11 +60,11 @@ def _stream(
 
 
 def _pieces(
-    services: Services, name: str, form: Format, origin: ExportOrigin, excel: bool
+    services: Services, who: Identity, name: str, form: Format, origin: ExportOrigin, excel: bool
 ) -> Iterator[bytes]:
     """The number of rows, then the export; what goes wrong ends the connection before the answer's end."""
     with services.database.snapshot() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, who, "view")
         yield str(row_count(form, session, study, origin)).encode()
         yield from proofed(FORMATS[form](session, study, origin), form, bom=excel, guard=excel)
 
@@ -108,11 +111,13 @@ def download_runs(
 
 
 @router.get("/analysis.{language}", response_class=Response)
-def download_script(services: ServicesDep, _who: Viewer, study: str, language: ScriptLanguage) -> Response:
+def download_script(services: ServicesDep, who: Viewer, study: str, language: ScriptLanguage) -> Response:
     """A script that analyses the long CSV, saved beside it under its own name: for R, or for Python."""
     with services.database.read() as session:
         text = script(
-            active_definition(session, find_study(session, study)), language, f"{study}-ratings.csv"
+            active_definition(session, find_study(session, study, who, "view")),
+            language,
+            f"{study}-ratings.csv",
         )
     headers = {"content-disposition": f'attachment; filename="{study}.{language}"'}
     return Response(encoded(text), media_type="text/plain; charset=utf-8", headers=headers)
@@ -135,16 +140,16 @@ def download_psych_ds(
 
 
 @router.get("/identities.csv", response_class=StreamingResponse)
-def download_identities(services: ServicesDep, who: Owner, study: str) -> StreamingResponse:
-    """Recruiters' ids beside the pseudonyms, one row a visit; for owners, and noted in the audit log."""
+def download_identities(services: ServicesDep, who: Myself, study: str) -> StreamingResponse:
+    """Recruiters' ids beside the pseudonyms, one row a visit; for owners of the study, and audited."""
     return _stream(services, who, study, "identities", "all", CSV_TYPE, "identities.csv")
 
 
 @router.get("/codebook.md", response_class=Response)
-def download_codebook(services: ServicesDep, _who: Viewer, study: str) -> Response:
+def download_codebook(services: ServicesDep, who: Viewer, study: str) -> Response:
     """What every column means."""
     with services.database.read() as session:
-        text = b"".join(FORMATS["codebook"](session, find_study(session, study), "all"))
+        text = b"".join(FORMATS["codebook"](session, find_study(session, study, who, "view"), "all"))
     headers = {"content-disposition": f'attachment; filename="{study}-codebook.md"'}
     return Response(text, media_type="text/markdown; charset=utf-8", headers=headers)
 
@@ -154,11 +159,10 @@ def _write_whole(
 ) -> int:
     """Write the table of `form` from one snapshot, which ends before the conversion; return its rows."""
     with services.database.write() as session:
-        record(
-            session, who, "data downloaded", "study", find_study(session, name).name, what=form, origin=origin
-        )
+        known = find_study(session, name, who, "export")
+        record(session, who, "data downloaded", "study", known.name, what=form, origin=origin)
     with services.database.snapshot() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, who, "view")
         rows = row_count(form, session, study, origin)
         table_of = wide_table if form.endswith("-wide") else answers_table
         write_table(table_of(session, study, origin), folder)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from experiments.errors import InputError
+from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services
 from server.methods import service
 from server.studies.lookup import find_study
@@ -57,6 +58,8 @@ def methods(
             f"expected {service.RESULTS} in {report}, found none; run `analysis run --out` first"
         )
     with migrated_services() as services, services.database.read() as session:
-        found = service.methods_of(session, find_study(session, study), origin.value, series, results)
+        found = service.methods_of(
+            session, find_study(session, study, OPERATOR, "view"), origin.value, series, results
+        )
     written = {Form.TEXT: found.text, Form.LATEX: found.latex, Form.JSON: found.json}[form]()
     typer.echo(written, nl=False)

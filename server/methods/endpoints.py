@@ -36,14 +36,14 @@ class MethodsOut(BaseModel):
 @router.get("")
 def get_methods(
     services: ServicesDep,
-    _who: Viewer,
+    who: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
     series: int | None = None,
 ) -> MethodsOut:
     """Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts."""
     with services.database.read() as session:
-        found = service.methods_of(session, find_study(session, study), origin, series)
+        found = service.methods_of(session, find_study(session, study, who, "view"), origin, series)
     listed = [MethodsNumber.model_validate(vars(number)) for number in found.numbers.values()]
     return MethodsOut(
         origin=origin, series=found.series, paragraph=found.plain(), latex=found.latex(), numbers=listed
@@ -53,12 +53,12 @@ def get_methods(
 @router.get("/methods.txt", response_class=Response)
 def get_methods_text(
     services: ServicesDep,
-    _who: Viewer,
+    who: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
     series: int | None = None,
 ) -> Response:
     """The paragraph as plain text, with the query of each number below it."""
     with services.database.read() as session:
-        found = service.methods_of(session, find_study(session, study), origin, series)
+        found = service.methods_of(session, find_study(session, study, who, "view"), origin, series)
     return Response(found.text(), media_type="text/plain; charset=utf-8")

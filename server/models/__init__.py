@@ -30,9 +30,19 @@ from server.models.runs import (
 from server.models.series import SeriesAnswer, SeriesOffer, SeriesTrial
 from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
 from server.models.tallies import RunTally
+from server.models.workspaces import (
+    DEFAULT_WORKSPACE,
+    RIGHTS,
+    Right,
+    StudyGrant,
+    Workspace,
+    WorkspaceMember,
+)
 
 __all__ = [
+    "DEFAULT_WORKSPACE",
     "NO_SLOT",
+    "RIGHTS",
     "ROLES",
     "RUN_STATUSES",
     "STAGES",
@@ -51,6 +61,7 @@ __all__ = [
     "Link",
     "Rating",
     "RecruiterIdentity",
+    "Right",
     "Role",
     "RunEvent",
     "RunTally",
@@ -58,6 +69,7 @@ __all__ = [
     "SeriesOffer",
     "SeriesTrial",
     "Study",
+    "StudyGrant",
     "StudyRun",
     "StudyVersion",
     "TrialClip",
@@ -65,4 +77,6 @@ __all__ = [
     "VersionClip",
     "View",
     "ViewClip",
+    "Workspace",
+    "WorkspaceMember",
 ]

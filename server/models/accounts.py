@@ -11,11 +11,15 @@ from server.models.base import Base, one_of
 
 Role = Literal["viewer", "experimenter", "owner"]
 ROLES: tuple[Role, ...] = get_args(Role)
-"""Each may what those before it may, and more."""
+"""Each may what those before it may, and more; on the server (`Account.role`) and in a workspace alike."""
 
 
 class Account(Base):
-    """A person who runs studies. Passwords are argon2 hashes; recovery codes are hashed too."""
+    """A person who runs studies. Passwords are argon2 hashes; recovery codes are hashed too.
+
+    role: on the server itself. Owners manage accounts and workspaces and read the audit log, experimenters
+    may make workspaces, viewers neither. What somebody may do with studies is the workspaces' to say.
+    """
 
     __tablename__ = "accounts"
     __table_args__ = (one_of("role", *ROLES),)
@@ -34,7 +38,11 @@ class Account(Base):
 
 
 class Invitation(Base):
-    """A one-time link to create an account, the first owner's included; only the token's hash is stored."""
+    """A one-time link to create an account, the first owner's included; only the token's hash is stored.
+
+    role: on the server. workspace_id, workspace_role: where the account will belong, and as what; the default
+    workspace, and the same role, where not given.
+    """
 
     __tablename__ = "invitations"
     __table_args__ = (one_of("role", *ROLES),)
@@ -47,6 +55,8 @@ class Invitation(Base):
     created_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     expires_at: Mapped[datetime]
     used_at: Mapped[datetime | None]
+    workspace_id: Mapped[int | None] = mapped_column(ForeignKey("workspaces.id", ondelete="CASCADE"))
+    workspace_role: Mapped[str | None] = mapped_column(String(20))
 
 
 class AdminSession(Base):
@@ -86,10 +96,17 @@ class ApiToken(Base):
 
 
 class AuditEntry(Base):
-    """Who did what and when; rows are only ever added."""
+    """Who did what and when; rows are only ever added, and chained by hashes (`server.audit.chain`).
+
+    position: in the chain; None for rows from before there was one. details_salt: None where the details were
+    erased with a person.
+    """
 
     __tablename__ = "audit_entries"
-    __table_args__ = (Index("ix_audit_entries_target_kind_target", "target_kind", "target"),)
+    __table_args__ = (
+        Index("ix_audit_entries_target_kind_target", "target_kind", "target"),
+        Index("ix_audit_entries_position", "position", unique=True),
+    )
 
     id: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime] = mapped_column(default=now, index=True)
@@ -99,6 +116,10 @@ class AuditEntry(Base):
     target_kind: Mapped[str] = mapped_column(String(30), default="")
     target: Mapped[str] = mapped_column(String(200), default="")
     details: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    position: Mapped[int | None]
+    details_salt: Mapped[str | None] = mapped_column(String(32))
+    details_digest: Mapped[str | None] = mapped_column(String(64))
+    chain_hash: Mapped[str | None] = mapped_column(String(64))
 
 
 class Job(Base):

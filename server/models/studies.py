@@ -19,6 +19,7 @@ class Study(Base):
     editing at once the second is told. recruiter: see `server.participants.recruiter`.
     archived_at: since when it is out of the list of studies; it can be read, and not changed.
     pseudonym_key: what the names of its participants are made with; it never leaves the database.
+    workspace_id: the laboratory it belongs to; a study of none is open to nobody but the command line.
     """
 
     __tablename__ = "studies"
@@ -39,6 +40,7 @@ class Study(Base):
     closed_at: Mapped[datetime | None]
     archived_at: Mapped[datetime | None]
     pseudonym_key: Mapped[str] = mapped_column(String(64), default=new_pseudonym_key)
+    workspace_id: Mapped[int | None] = mapped_column(ForeignKey("workspaces.id"), index=True)
 
     versions: Mapped[list["StudyVersion"]] = relationship(
         back_populates="study", order_by="StudyVersion.number", cascade="all, delete-orphan"

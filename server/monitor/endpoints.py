@@ -8,13 +8,14 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
-from server.accounts.identity import Identity, NotSignedIn, Viewer, identify
+from server.accounts.identity import Identity, NotAllowed, NotSignedIn, Viewer, identify
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
 from server.monitor.schemas import MonitorSnapshot
 from server.participants.schemas import Origin
-from server.studies.lookup import active_definition, find_study
+from server.studies.lookup import active_definition, find_study, may_see_persons
+from server.workspaces.rights import SecondFactorNeeded
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
 EVERY_S = 2.0
@@ -26,9 +27,10 @@ RETRY_MS = 1000
 
 def _snapshot(services: Services, name: str, who: Identity, origin: Origin | None) -> MonitorSnapshot:
     with services.database.read() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, who, "view")
+        persons = who.sees_persons and may_see_persons(session, study, who)
         shown = service.snapshot(session, study, active_definition(session, study), origin)
-    if who.sees_persons:
+    if persons:
         return shown
     nameless = [run.model_copy(update={"participant": run.run}) for run in shown.runs]
     return shown.model_copy(update={"runs": nameless})
@@ -80,9 +82,9 @@ def stream_monitor(
             if not await _waited(services) or await request.is_disconnected():
                 return
             try:
-                await run_in_threadpool(identify, request, services)
-                current = await run_in_threadpool(_snapshot, services, study, who, origin)
-            except (NotSignedIn, NotFound):  # signed out, or the study was deleted meanwhile
+                anew = await run_in_threadpool(identify, request, services)
+                current = await run_in_threadpool(_snapshot, services, study, anew, origin)
+            except (NotSignedIn, NotFound, NotAllowed, SecondFactorNeeded):  # or the study was deleted
                 return
 
     return StreamingResponse(events(), media_type="text/event-stream", headers={"x-accel-buffering": "no"})

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from experiments.json import json_text
 from experiments.manifest import MANIFEST_NAME
 from server.accounts.audit import record
-from server.accounts.identity import Identity
+from server.accounts.identity import OPERATOR, Identity
 from server.clock import now
 from server.context import Services
 from server.errors import Conflict, NotFound
@@ -35,7 +35,7 @@ _one_at_a_time = threading.Lock()
 def start(services: Services, name: str, wanted: NewReport, who: Identity) -> ReportOut:
     """Queue a report and begin it in the background; Conflict where one of this study is under way."""
     with services.database.write() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, who, "run")
         for job in repository.latest_reports(session, study):
             if job.status in ("queued", "running") and not _abandoned(job):
                 raise Conflict("A report of this study is being built already; wait for it.")
@@ -60,11 +60,10 @@ def _abandoned(job: Job) -> bool:
     return now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
 
 
-def reports(services: Services, session: Session, name: str) -> list[ReportOut]:
+def reports(services: Services, session: Session, name: str, who: Identity) -> list[ReportOut]:
     """The latest reports of a study."""
-    return [
-        report_out(services, job) for job in repository.latest_reports(session, find_study(session, name))
-    ]
+    study = find_study(session, name, who, "view")
+    return [report_out(services, job) for job in repository.latest_reports(session, study)]
 
 
 def report_out(services: Services, job: Job) -> ReportOut:
@@ -97,9 +96,11 @@ def report_folder(services: Services, public_id: str) -> Path:
     return services.settings.data_folder / "reports" / public_id
 
 
-def report_file(services: Services, session: Session, name: str, public_id: str, file: str) -> Path:
+def report_file(
+    services: Services, session: Session, name: str, who: Identity, public_id: str, file: str
+) -> Path:
     """One file of a finished report; NotFound where it is not one of its files."""
-    study = find_study(session, name)
+    study = find_study(session, name, who, "view")
     job = repository.find_report(session, study, public_id)
     if job is None or file not in report_out(services, job).files:
         raise NotFound("There is no such report, or it has no such file.")
@@ -130,7 +131,7 @@ def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> i
     """Write the ratings, the runs and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
     with services.database.read() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, OPERATOR, "view")
         version = version_of_series(session, study, wanted.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
         with (inputs / "answers.csv").open("wb") as stream:
@@ -160,7 +161,7 @@ def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
 
 def _add_methods(services: Services, name: str, folder: Path, wanted: NewReport, series: int) -> None:
     with services.database.read() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, OPERATOR, "view")
         found = methods_of(session, study, wanted.origin, series, read_results(folder))
     write(folder, found)
 

@@ -27,7 +27,7 @@ ByKind = Annotated[AnyResults, Field(discriminator="kind")]
 )
 def get_results(
     services: ServicesDep,
-    _who: Viewer,
+    who: Viewer,
     study: str,
     origin: Origin = "participant",
     series: int | None = None,
@@ -43,10 +43,10 @@ def get_results(
 
     def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
-            return counting.counted(session, find_study(session, study), origin, series, scale)
+            return counting.counted(session, find_study(session, study, who, "view"), origin, series, scale)
 
     with services.database.read() as session:
-        found = find_study(session, study)
+        found = find_study(session, study, who, "view")
         pool, revision = counting.pool_and_revision(session, found, origin, series, scale)
     counted = services.results.get(pool, revision, count)
     headers = {"etag": counted.etag, "cache-control": "private, no-cache"}

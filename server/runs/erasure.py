@@ -8,9 +8,10 @@ from sqlalchemy.orm import Session
 from experiments.assignment.grouping import deciding
 from server.accounts.audit import record
 from server.accounts.identity import Identity
+from server.audit.repository import entries_on_run
 from server.clock import now
 from server.errors import Conflict, Invalid
-from server.models import NO_SLOT, AuditEntry, Study, StudyRun
+from server.models import NO_SLOT, Study, StudyRun
 from server.operations import erasures
 from server.runs import repository
 from server.runs.schemas import Erased, HeldReport
@@ -52,6 +53,7 @@ def replay(session: Session, settings: Settings) -> int:
         run = session.scalar(select(StudyRun).where(StudyRun.public_id == public_id))
         if run is not None and run.erased_at is None:
             forget(session, run)
+            record(session, None, "run erased", "run", public_id, again=True)
             erased += 1
     return erased
 
@@ -78,7 +80,6 @@ def forget(session: Session, run: StudyRun) -> int:
 
 def _forget_in_audit(session: Session, public_id: str) -> None:
     """Take from the audit log what was written about a person; that something was done stays."""
-    query = select(AuditEntry).where(AuditEntry.target_kind == "run", AuditEntry.target == public_id)
-    for entry in session.scalars(query):
+    for entry in entries_on_run(session, public_id):
         if "reason" in entry.details:
-            entry.details = {**entry.details, "reason": "erased"}
+            entry.details, entry.details_salt = {**entry.details, "reason": "erased"}, None

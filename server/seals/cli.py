@@ -8,6 +8,7 @@ import typer
 
 from experiments.errors import InputError
 from experiments.files import whole_text
+from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
 from server.seals.page import page
 from server.seals.service import seal_of, seal_plan
@@ -38,7 +39,7 @@ def seal(
     """
     found = _power(power)
     with migrated_services() as services, services.database.write() as session:
-        known = find_study(session, study)
+        known = find_study(session, study, OPERATOR, "view")
         sealed = seal_of(session, known) or seal_plan(session, known, None, found)
     if found is not None and sealed.power != found:
         raise InputError(

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from experiments.seal import Seal
-from server.accounts.identity import Experimenter, Viewer
+from server.accounts.identity import Identity, Viewer, Writer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.seals.page import page
@@ -37,10 +37,10 @@ class SealOut(BaseModel):
 
 
 @router.get("")
-def get_seal(services: ServicesDep, _who: Viewer, study: str) -> SealOut:
+def get_seal(services: ServicesDep, who: Viewer, study: str) -> SealOut:
     """Whether there is a sealed plan."""
     with services.database.read() as session:
-        known = find_study(session, study)
+        known = find_study(session, study, who, "view")
         seal = seal_of(session, known)
         people = people_begun(session, known)
     if seal is None:
@@ -55,27 +55,27 @@ def get_seal(services: ServicesDep, _who: Viewer, study: str) -> SealOut:
 
 
 @router.post("", status_code=201)
-def seal_study(services: ServicesDep, who: Experimenter, study: str, body: NewSeal) -> SealOut:
+def seal_study(services: ServicesDep, who: Writer, study: str, body: NewSeal) -> SealOut:
     """Seal design, exclusions, analysis plan and power, once, before the first participant."""
     with services.database.write() as session:
-        seal_plan(session, find_study(session, study), who, body.power)
+        seal_plan(session, find_study(session, study, who, "edit"), who, body.power)
     return get_seal(services, who, study)
 
 
 @router.get("/plan.{ending}", response_class=Response)
 def download_seal(
-    services: ServicesDep, _who: Viewer, study: str, ending: Literal["json", "html"]
+    services: ServicesDep, who: Viewer, study: str, ending: Literal["json", "html"]
 ) -> Response:
     """The sealed file, or a page of it that prints well."""
-    seal = _sealed(services, study)
+    seal = _sealed(services, study, who)
     text, kind = (seal.text(), "application/json") if ending == "json" else (page(seal), "text/html")
     headers = {"content-disposition": f'attachment; filename="{study}-seal.{ending}"'}
     return Response(encoded(text), media_type=f"{kind}; charset=utf-8", headers=headers)
 
 
-def _sealed(services: Services, study: str) -> Seal:
+def _sealed(services: Services, study: str, who: Identity) -> Seal:
     with services.database.read() as session:
-        seal = seal_of(session, find_study(session, study))
+        seal = seal_of(session, find_study(session, study, who, "view"))
     if seal is None:
         raise NotFound(f"The plan of '{study}' is not sealed.")
     return seal

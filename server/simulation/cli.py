@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from experiments.errors import InputError
 from experiments.trials.threshold.declaration import Threshold
+from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.cli_common import migrated_services, out
 from server.context import Services
@@ -125,7 +126,7 @@ def _as(
 def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Callable[[int, int], Rater]]:
     """A link whose runs are simulated, and the maker of raters, who know the levels of each clip."""
     with services.database.write() as session:
-        study = find_study(session, name)
+        study = find_study(session, name, OPERATOR, "view")
         version = active_version(session, study)
         rows = clips_of_design(session, version)
         blinks: dict[str, list[float]] = {row.clip_sha256: row.blinks_s or [] for row in rows}

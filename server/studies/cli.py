@@ -13,6 +13,7 @@ from experiments.load import locate
 from experiments.manifest import Manifest, read_manifest
 from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
+from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
 from server.clock import now
 from server.context import Services
@@ -128,7 +129,7 @@ def set_status(
     if status not in STATUSES:
         raise InputError(f"no status '{status}'{did_you_mean(status, STATUSES)}")
     with migrated_services() as services, services.database.write() as session:
-        found = find_study(session, study)
+        found = find_study(session, study, OPERATOR, "view")
         _set_status(session, found, status)
         out.print(f"study {found.name}: {found.status}")
 
@@ -179,7 +180,7 @@ def create(
         settings = services.settings
         rows = prepared_links(settings.key, options, numbered_labels(label, count) if count > 1 else [label])
         with services.database.write() as session:
-            found = find_study(session, study)
+            found = find_study(session, study, OPERATOR, "view")
             make_links(session, found, KINDS[kind], group, rows)
             record(session, None, "links created", "study", found.name, kind=kind, count=count)
     for row in rows:
@@ -195,5 +196,5 @@ def list_links(study: Annotated[str, typer.Argument(help="Name of the study.")])
     """
     with migrated_services() as services, services.database.read() as session:
         key, public_url = services.settings.key, services.settings.public_url
-        for link in links_of(session, find_study(session, study)):
+        for link in links_of(session, find_study(session, study, OPERATOR, "view")):
             out.print(f"{link.kind},{link.label},{link_url(public_url, key, link.public_id)}")

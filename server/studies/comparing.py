@@ -7,6 +7,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments.schema.difference import Change, changes_what_is_measured, difference
+from server.accounts.identity import Identity
 from server.models import StudyVersion
 from server.studies.life_repository import clips_of, version_numbered
 from server.studies.life_schemas import ClipDifference, ComparedVersion, Comparison, KeyDifference, Piece
@@ -19,9 +20,12 @@ Clips = dict[tuple[str, int], tuple[str, str]]
 """(cell, exemplar) -> (SHA-256, file name)."""
 
 
-def compare(session: Session, old: tuple[str, int], new: tuple[str, int]) -> Comparison:
+def compare(session: Session, old: tuple[str, int], new: tuple[str, int], who: Identity) -> Comparison:
     """What differs between two versions, each given by its study's name and its number."""
-    before, after = (version_numbered(session, find_study(session, name), n) for name, n in (old, new))
+    before, after = (
+        version_numbered(session, find_study(session, name, who, "view"), number)
+        for name, number in (old, new)
+    )
     changes = difference(definition_of(before), definition_of(after))
     old_clips, new_clips = clips_of(session, before), clips_of(session, after)
     clips = list(_clips(old_clips, new_clips))

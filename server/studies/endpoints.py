@@ -6,7 +6,7 @@ from fastapi import APIRouter, UploadFile
 from fastapi.params import File
 from fastapi.responses import PlainTextResponse
 
-from server.accounts.identity import Experimenter, Viewer
+from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.studies import service, uploads
@@ -26,6 +26,7 @@ from server.studies.schemas import (
     StudySummary,
     UploadOut,
 )
+from server.workspaces.access import Uploader
 
 router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPONSES)
 
@@ -50,10 +51,10 @@ def edit_definition(_who: Viewer, body: EditDefinition) -> EditedDefinition:
 
 @router.post("/uploads", status_code=201)
 def upload_clips(
-    services: ServicesDep, _who: Experimenter, files: Annotated[list[UploadFile], File()]
+    services: ServicesDep, who: Uploader, files: Annotated[list[UploadFile], File()]
 ) -> UploadOut:
     """Upload clips: films, a CSV table, or a zip of them. They wait a day to become a study."""
-    identifier, place = uploads.new_upload(services.settings.upload_folder)
+    identifier, place = uploads.new_upload(services.settings.upload_folder, who.account_id)
     try:
         for file in files:
             uploads.receive(place, file.filename or "", file.file, services.settings.max_upload_bytes)
@@ -64,56 +65,56 @@ def upload_clips(
 
 
 @router.get("/studies")
-def list_studies(services: ServicesDep, _who: Viewer) -> list[StudySummary]:
-    """Every study, the latest first."""
+def list_studies(services: ServicesDep, who: Viewer) -> list[StudySummary]:
+    """The studies that are open to the account, the latest first."""
     with services.database.read() as session:
-        return service.summaries(session)
+        return service.summaries(session, who)
 
 
 @router.post("/studies", status_code=201)
-def create_study(services: ServicesDep, who: Experimenter, body: NewStudy) -> StudyDetail:
+def create_study(services: ServicesDep, who: Uploader, body: NewStudy) -> StudyDetail:
     """Create a draft from a shipped experiment, a definition, or uploaded clips."""
     name = service.create(services, body, who)
     return get_study(services, who, name)
 
 
 @router.get("/studies/{study}")
-def get_study(services: ServicesDep, _who: Viewer, study: str) -> StudyDetail:
+def get_study(services: ServicesDep, who: Viewer, study: str) -> StudyDetail:
     """One study with its declaration."""
     with services.database.read() as session:
-        return service.detail(session, study)
+        return service.detail(session, study, who)
 
 
 @router.delete("/studies/{study}", status_code=204)
-def delete_study(services: ServicesDep, who: Experimenter, study: str) -> None:
+def delete_study(services: ServicesDep, who: Writer, study: str) -> None:
     """Delete a draft that nobody has taken part in."""
     with services.database.write() as session:
         service.delete(session, study, who)
 
 
 @router.post("/studies/{study}/versions", status_code=201)
-def add_version(services: ServicesDep, who: Experimenter, study: str, body: NewVersion) -> StudyDetail:
+def add_version(services: ServicesDep, who: Writer, study: str, body: NewVersion) -> StudyDetail:
     """Store a changed definition as a new version; runs keep the version they began with."""
     service.add_definition(services, study, body, who)
     return get_study(services, who, study)
 
 
 @router.post("/studies/{study}/versions/check")
-def judge_version(services: ServicesDep, _who: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
+def judge_version(services: ServicesDep, who: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
     """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
     with services.database.read() as session:
-        return service.judge_edit(session, study, body.toml)
+        return service.judge_edit(session, study, body.toml, who)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)
-def get_version(services: ServicesDep, _who: Viewer, study: str, number: int) -> str:
+def get_version(services: ServicesDep, who: Viewer, study: str, number: int) -> str:
     """The TOML of one version."""
     with services.database.read() as session:
-        return service.version_text(session, study, number)
+        return service.version_text(session, study, number, who)
 
 
 @router.put("/studies/{study}/status")
-def change_status(services: ServicesDep, who: Experimenter, study: str, body: ChangeStatus) -> StudyDetail:
+def change_status(services: ServicesDep, who: Writer, study: str, body: ChangeStatus) -> StudyDetail:
     """draft -> pilot -> live -> closed."""
     with services.database.write() as session:
         service.change_status(session, study, body.revision, body.status, who)
@@ -121,9 +122,7 @@ def change_status(services: ServicesDep, who: Experimenter, study: str, body: Ch
 
 
 @router.put("/studies/{study}/settings")
-def change_settings(
-    services: ServicesDep, who: Experimenter, study: str, body: ChangeSettings
-) -> StudyDetail:
+def change_settings(services: ServicesDep, who: Writer, study: str, body: ChangeSettings) -> StudyDetail:
     """Pause, quota and recruiter."""
     with services.database.write() as session:
         service.change_settings(session, study, body, who)
@@ -131,7 +130,7 @@ def change_settings(
 
 
 @router.get("/studies/{study}/clips")
-def list_clips(services: ServicesDep, _who: Viewer, study: str) -> list[ClipOut]:
+def list_clips(services: ServicesDep, who: Viewer, study: str) -> list[ClipOut]:
     """Every clip of the active version with the closure curve it shows."""
     with services.database.read() as session:
-        return service.clips(session, study)
+        return service.clips(session, study, who)

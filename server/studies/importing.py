@@ -15,10 +15,11 @@ from experiments.schema.upgrades import FORMAT
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.errors import Conflict
-from server.models import Clip, Study, StudyVersion, VersionClip
+from server.models import Clip, Study, StudyVersion, VersionClip, Workspace
 from server.storage.clips import ClipStore
 from server.studies import repository
 from server.studies.series import series_for
+from server.workspaces.repository import default_workspace
 
 
 def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
@@ -66,12 +67,22 @@ def store_clips(store: ClipStore, manifest: Manifest, folder: Path) -> int:
     return added
 
 
-def create_study(session: Session, name: str, experiment: Experiment, who: Identity | None) -> Study:
-    """A new draft; Conflict where the name is taken."""
+def create_study(
+    session: Session,
+    name: str,
+    experiment: Experiment,
+    who: Identity | None,
+    workspace: Workspace | None = None,
+) -> Study:
+    """A new draft, in the default workspace where none is given; Conflict where the name is taken."""
     if repository.study_called(session, name) is not None:
-        raise Conflict(f"There is already a study called '{name}'; choose another name.")
+        raise Conflict(f"There is already a study called '{name}' on this server; choose another name.")
     study = Study(
-        name=name, title=experiment.title, active_version=0, created_by=who.account_id if who else None
+        name=name,
+        title=experiment.title,
+        active_version=0,
+        created_by=who.account_id if who else None,
+        workspace_id=(workspace or default_workspace(session)).id,
     )
     session.add(study)
     session.flush()

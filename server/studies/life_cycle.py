@@ -12,6 +12,7 @@ from server.studies.life_repository import version_numbered
 from server.studies.life_schemas import ArchiveStudy, CloneStudy
 from server.studies.lookup import definition_of, find_study
 from server.studies.service import for_edit
+from server.workspaces.service import place_of_copy
 
 
 def clone(session: Session, name: str, wanted: CloneStudy, who: Identity) -> None:
@@ -19,9 +20,11 @@ def clone(session: Session, name: str, wanted: CloneStudy, who: Identity) -> Non
 
     Links, quota and recruiter stay behind too: completion codes belong to one study.
     """
-    source = find_study(session, name)
+    source = find_study(session, name, who, "edit")
     version = version_numbered(session, source, wanted.version or source.active_version)
-    copy = create_study(session, wanted.name, definition_of(version), who)
+    copy = create_study(
+        session, wanted.name, definition_of(version), who, place_of_copy(session, source, who)
+    )
     note = f"copied from {source.name}, version {version.number}"
     manifest = Manifest.model_validate(version.manifest)
     add_version(session, copy, version.definition_toml, definition_of(version), manifest, who, note)
@@ -30,7 +33,7 @@ def clone(session: Session, name: str, wanted: CloneStudy, who: Identity) -> Non
 
 def archive(session: Session, name: str, wanted: ArchiveStudy, who: Identity) -> None:
     """Into the archive or out of it; Conflict while people can take part."""
-    study = for_edit(session, name, wanted.revision, archived=True)
+    study = for_edit(session, name, wanted.revision, who, "run", archived=True)
     if wanted.archived == (study.archived_at is not None):
         return
     if wanted.archived and study.status in ("pilot", "live"):

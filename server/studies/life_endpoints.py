@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server.accounts.identity import Experimenter, Viewer
+from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.studies import comparing, life_cycle, service
@@ -17,27 +17,27 @@ VersionNumber = Annotated[int, Query(ge=1, le=2**31 - 1)]
 
 
 @router.post("/copies", status_code=201)
-def clone_study(services: ServicesDep, who: Experimenter, study: str, body: CloneStudy) -> StudyDetail:
+def clone_study(services: ServicesDep, who: Writer, study: str, body: CloneStudy) -> StudyDetail:
     """Copy a version's declaration and clips into a new draft; links, quota and recruiter are not copied."""
     with services.database.write() as session:
         life_cycle.clone(session, study, body, who)
     with services.database.read() as session:
-        return service.detail(session, body.name)
+        return service.detail(session, body.name, who)
 
 
 @router.put("/archive")
-def archive_study(services: ServicesDep, who: Experimenter, study: str, body: ArchiveStudy) -> StudyDetail:
+def archive_study(services: ServicesDep, who: Writer, study: str, body: ArchiveStudy) -> StudyDetail:
     """Put a draft or closed study into the archive, where it can be read but not changed, or take it out."""
     with services.database.write() as session:
         life_cycle.archive(session, study, body, who)
     with services.database.read() as session:
-        return service.detail(session, study)
+        return service.detail(session, study, who)
 
 
 @router.get("/comparison")
 def compare_versions(
     services: ServicesDep,
-    _who: Viewer,
+    who: Viewer,
     study: str,
     old: VersionNumber,
     new: VersionNumber,
@@ -45,4 +45,4 @@ def compare_versions(
 ) -> Comparison:
     """What differs between two versions: keys of the declaration, word by word, and clips."""
     with services.database.read() as session:
-        return comparing.compare(session, (other or study, old), (study, new))
+        return comparing.compare(session, (other or study, old), (study, new), who)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 
 from server.accounts.audit import record
-from server.accounts.identity import Experimenter
+from server.accounts.identity import Writer
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
@@ -43,11 +43,11 @@ def _link_out(services: Services, row: Link | dict[str, Any], runs: int = 0, com
 
 @router.get("")
 def list_links(
-    services: ServicesDep, _who: Experimenter, study: str, after: str | None = None, limit: Limit = 100
+    services: ServicesDep, who: Writer, study: str, after: str | None = None, limit: Limit = 100
 ) -> LinkPage:
     """The links of a study in the order they were made, a page at a time: go on with `after` = `next`."""
     with services.database.read() as session:
-        found = find_study(session, study)
+        found = find_study(session, study, who, "run")
         page = page_of_links(session, found, after, limit)
         return LinkPage(
             links=[_link_out(services, link, *runs) for link, runs in page.links],
@@ -57,7 +57,7 @@ def list_links(
 
 
 @router.post("", status_code=201)
-def create_links(services: ServicesDep, who: Experimenter, study: str, body: NewLinks) -> list[LinkOut]:
+def create_links(services: ServicesDep, who: Writer, study: str, body: NewLinks) -> list[LinkOut]:
     """Make a general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
     labels = [body.label]
     if body.kind == "personal":
@@ -72,31 +72,33 @@ def create_links(services: ServicesDep, who: Experimenter, study: str, body: New
     )
     rows = prepared_links(services.settings.key, options, labels)
     with services.database.write() as session:
-        found = find_study(session, study)
+        found = find_study(session, study, who, "run")
         make_links(session, found, body.kind, body.group, rows)
         record(session, who, "links made", "study", study, links=body.kind, number=len(rows))
     return [_link_out(services, row) for row in rows]
 
 
 @router.get("/personal.csv", response_class=Response)
-def download_personal_links(services: ServicesDep, _who: Experimenter, study: str) -> Response:
+def download_personal_links(services: ServicesDep, who: Writer, study: str) -> Response:
     """The personal links as CSV: label, link, runs, complete, group."""
     stream = io.StringIO()
     writer = csv.writer(stream)
     writer.writerow(["label", "url", "runs", "complete", "group"])
     with services.database.read() as session:
-        found = find_study(session, study)
+        found = find_study(session, study, who, "run")
         for link, runs, complete in links_with_runs(session, found, LINKS_READ_AT_ONCE, "personal"):
             url = link_url(services.settings.public_url, services.settings.key, link.public_id)
             writer.writerow([link.label, url, runs, complete, link.group_name])
+    with services.database.write() as session:
+        record(session, who, "personal links downloaded", "study", study)
     headers = {"content-disposition": f'attachment; filename="{study}-links.csv"'}
     return Response(stream.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)
 
 
 @router.delete("/{link}", status_code=204)
-def revoke_link(services: ServicesDep, who: Experimenter, study: str, link: str) -> None:
+def revoke_link(services: ServicesDep, who: Writer, study: str, link: str) -> None:
     """Withdraw a link; runs that began with it go on."""
     with services.database.write() as session:
-        found = find_study(session, study)
+        found = find_study(session, study, who, "run")
         withdrawn = withdraw(session, found, link)
         record(session, who, "link withdrawn", "study", study, label=withdrawn.label)

@@ -5,18 +5,51 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
+from server.accounts.identity import Identity, NotAllowed, Operator
 from server.errors import NotFound
-from server.models import Study, StudyVersion
+from server.models import RIGHTS, Right, Study, StudyVersion
 from server.studies import repository
+from server.workspaces import repository as workspaces
+from server.workspaces.rights import SecondFactorNeeded
 
 
-def find_study(session: Session, name: str) -> Study:
-    """The study called `name`; NotFound, with the nearest name, where there is none."""
-    study = repository.study_called(session, name)
+def find_study(session: Session, name: str, who: Identity | Operator, right: Right) -> Study:
+    """The study called `name`, for one who has this right on it: the one way from a name to a study.
+
+    Raises
+    ------
+    NotFound
+        There is none, or none that she may see; both are answered alike, with the nearest name she may see.
+    NotAllowed
+        She may see it, but lacks the right.
+    SecondFactorNeeded
+        Its workspace asks for a second factor, and she signed in without one.
+    """
+    study = workspaces.study_seen_by(session, name, who)
     if study is None:
-        nearest = did_you_mean(name, repository.study_names(session))
-        raise NotFound(f"There is no study '{name[:60]}'{nearest}")
+        names = workspaces.study_names_seen_by(session, who)
+        raise NotFound(f"There is no study '{name[:60]}'{did_you_mean(name, names)}")
+    if isinstance(who, Identity):
+        _check(session, study, who, right)
     return study
+
+
+def _check(session: Session, study: Study, who: Identity, right: Right) -> None:
+    rights = workspaces.rights_on(session, [study], who)[study.id]
+    if right not in rights:
+        held = " and ".join(one for one in RIGHTS if one in rights)
+        raise NotAllowed(f"This needs the right '{right}' on the study '{study.name}'; you have {held}.")
+    workspace = workspaces.workspace_of(session, study)
+    if workspace is not None and workspace.second_factor_required and not who.second_factor:
+        raise SecondFactorNeeded(
+            f"The workspace '{workspace.title}' asks for a second factor; set one up under My account, "
+            "or sign in again with it."
+        )
+
+
+def may_see_persons(session: Session, study: Study, who: Identity) -> bool:
+    """True where the answers and names of single persons are hers to see."""
+    return "export" in workspaces.rights_on(session, [study], who)[study.id]
 
 
 def active_version(session: Session, study: Study) -> StudyVersion:

@@ -1,7 +1,6 @@
 """Studies, their versions and clips, and how many runs each has."""
 
 from collections import Counter
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, case, func, select
@@ -26,11 +25,6 @@ class SeriesRuns(NamedTuple):
 def study_called(session: Session, name: str) -> Study | None:
     """The study of this name."""
     return session.scalar(select(Study).where(Study.name == name))
-
-
-def study_names(session: Session) -> Sequence[str]:
-    """The names of all studies."""
-    return session.scalars(select(Study.name)).all()
 
 
 def all_studies(session: Session) -> list[Study]:

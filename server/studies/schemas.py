@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from experiments.definition import Experiment
+from server.models import Right
 from server.participants.recruiter import Recruiter
 
 StudyName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
@@ -143,6 +144,9 @@ class NewStudy(_In):
     upload: str | None = None
     levels: LevelsTable | LevelsPattern | None = None
     own_clips: OwnClips | None = None
+    workspace: Annotated[str, StringConstraints(max_length=60)] | None = Field(
+        default=None, description="Needed where the account may make studies in several workspaces."
+    )
 
 
 class NewVersion(_In):
@@ -246,6 +250,8 @@ class StudySummary(BaseModel):
     active: int
     created_at: datetime
     archived_at: datetime | None
+    workspace: str = Field(description="Name of the workspace it belongs to.")
+    rights: list[Right] = Field(description="What the account that asks may do with it.")
 
 
 class StudyDetail(BaseModel):

@@ -20,7 +20,7 @@ from server.accounts.identity import Identity
 from server.clock import now
 from server.context import Services
 from server.errors import Conflict, Invalid, NotFound
-from server.models import Study, StudyVersion, VersionClip
+from server.models import Right, Study, StudyVersion, VersionClip
 from server.studies import own_clips, repository
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
 from server.studies.lookup import active_version, find_study
@@ -49,6 +49,8 @@ from server.studies.schemas import (
 from server.studies.series import judged, series_of
 from server.studies.toml_edit import with_data
 from server.studies.uploads import FILMS, upload_folder
+from server.workspaces.repository import studies_opened_to
+from server.workspaces.service import Standing, standing_of, workspace_for
 
 ALLOWED = {
     "draft": ("pilot", "live"),
@@ -115,9 +117,9 @@ def edit(wanted: EditDefinition) -> EditedDefinition:
     return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)
 
 
-def judge_edit(session: Session, name: str, text: str) -> JudgedEdit:
+def judge_edit(session: Session, name: str, text: str, who: Identity) -> JudgedEdit:
     """What saving this definition would do to stored answers; DefinitionError where it cannot be used."""
-    return judged(session, find_study(session, name), planned_experiment(text))
+    return judged(session, find_study(session, name, who, "view"), planned_experiment(text))
 
 
 def shipped(services: Services) -> list[ShippedExperiment]:
@@ -135,17 +137,21 @@ def shipped(services: Services) -> list[ShippedExperiment]:
 
 def create(services: Services, wanted: NewStudy, who: Identity) -> str:
     """Create a draft study; everything is checked and every clip stored before the database changes."""
-    text, experiment, manifest, folder = _materials(services, wanted)
+    with services.database.read() as session:
+        workspace_for(session, who, wanted.workspace)  # refused before anything is stored
+    text, experiment, manifest, folder = _materials(services, wanted, who)
     check_against_design(experiment, manifest)
     store_clips(services.clips, manifest, folder)
     with services.database.write() as session:
-        study = create_study(session, wanted.name, experiment, who)
+        study = create_study(
+            session, wanted.name, experiment, who, workspace_for(session, who, wanted.workspace)
+        )
         add_version(session, study, text, experiment, manifest, who, note="created")
         study.revision = 1
     return wanted.name
 
 
-def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, Manifest, Path]:
+def _materials(services: Services, wanted: NewStudy, who: Identity) -> tuple[str, Experiment, Manifest, Path]:
     if wanted.shipped is not None:
         if wanted.shipped not in (known := (*SHIPPED, *DEMOS)):
             near = did_you_mean(wanted.shipped, known)
@@ -155,7 +161,7 @@ def _materials(services: Services, wanted: NewStudy) -> tuple[str, Experiment, M
         return text, planned_experiment(text), read_manifest(folder), folder
     if wanted.upload is None:
         raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
-    folder = upload_folder(services.settings.upload_folder, wanted.upload)
+    folder = upload_folder(services.settings.upload_folder, wanted.upload, who.account_id)
     if (folder / MANIFEST_NAME).is_file():
         if wanted.toml is None:
             raise Invalid(
@@ -186,9 +192,11 @@ def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
     return levels_from_names(levels.pattern, files)
 
 
-def for_edit(session: Session, name: str, revision: int, *, archived: bool = False) -> Study:
+def for_edit(
+    session: Session, name: str, revision: int, who: Identity, right: Right, *, archived: bool = False
+) -> Study:
     """The study to change; Conflict where somebody changed it since, or where it is in the archive."""
-    study = find_study(session, name)
+    study = find_study(session, name, who, right)
     if study.revision != revision:
         raise EditedMeanwhile(
             f"Somebody else changed this study meanwhile (revision {study.revision}, yours was {revision}); "
@@ -204,10 +212,12 @@ def for_edit(session: Session, name: str, revision: int, *, archived: bool = Fal
 
 def add_definition(services: Services, name: str, wanted: NewVersion, who: Identity) -> None:
     """Store a changed definition as a new version, with the clips there are and those of an upload."""
+    with services.database.read() as session:
+        find_study(session, name, who, "edit")  # refused before a clip is stored
     experiment = planned_experiment(wanted.toml)
-    added = _added_clips(services, wanted, experiment)
+    added = _added_clips(services, wanted, experiment, who)
     with services.database.write() as session:
-        study = for_edit(session, name, wanted.revision)
+        study = for_edit(session, name, wanted.revision, who, "edit")
         manifest = Manifest.model_validate(active_version(session, study).manifest)
         if added is not None:
             own_clips.check_declared(added, experiment)
@@ -216,11 +226,13 @@ def add_definition(services: Services, name: str, wanted: NewVersion, who: Ident
         add_version(session, study, wanted.toml, experiment, manifest, who, wanted.note)
 
 
-def _added_clips(services: Services, wanted: NewVersion, experiment: Experiment) -> Manifest | None:
+def _added_clips(
+    services: Services, wanted: NewVersion, experiment: Experiment, who: Identity
+) -> Manifest | None:
     """The manifest of uploaded clips, their bytes in the store; None where none were uploaded."""
     if wanted.upload is None:
         return None
-    folder = upload_folder(services.settings.upload_folder, wanted.upload)
+    folder = upload_folder(services.settings.upload_folder, wanted.upload, who.account_id)
     if (folder / MANIFEST_NAME).is_file():
         manifest = read_manifest(folder)
     else:
@@ -231,7 +243,7 @@ def _added_clips(services: Services, wanted: NewVersion, experiment: Experiment)
 
 def change_status(session: Session, name: str, revision: int, status: str, who: Identity) -> None:
     """draft -> pilot -> live -> closed, and the ways back that lose nothing."""
-    study = for_edit(session, name, revision)
+    study = for_edit(session, name, revision, who, "run")
     if status == study.status:
         return
     if status not in ALLOWED[study.status]:
@@ -248,7 +260,7 @@ def change_status(session: Session, name: str, revision: int, status: str, who: 
 
 def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Identity) -> None:
     """Pause or go on, set the quota, name the recruiter."""
-    study = for_edit(session, name, wanted.revision)
+    study = for_edit(session, name, wanted.revision, who, "run")
     study.paused, study.quota = wanted.paused, wanted.quota
     study.recruiter = wanted.recruiter.model_dump() if wanted.recruiter else None
     study.revision += 1
@@ -260,20 +272,21 @@ def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Id
 
 def delete(session: Session, name: str, who: Identity) -> None:
     """Delete a draft that nobody has taken part in."""
-    study = find_study(session, name)
+    study = find_study(session, name, who, "edit")
     if study.status != "draft" or repository.run_count(session, study):
         raise Conflict("Only a draft without runs can be deleted; close this study instead.")
     repository.delete_study(session, study)
     record(session, who, "study deleted", "study", name)
 
 
-def summaries(session: Session) -> list[StudySummary]:
-    """Every study, the latest first."""
-    counts = repository.shown_runs_by_status(session)
-    return [summary(study, counts) for study in reversed(repository.all_studies(session))]
+def summaries(session: Session, who: Identity) -> list[StudySummary]:
+    """The studies that are open to her, the latest first."""
+    studies = studies_opened_to(session, who)
+    counts, standing = repository.shown_runs_by_status(session), standing_of(session, studies, who)
+    return [summary(study, counts, standing[study.id]) for study in studies]
 
 
-def summary(study: Study, counts: repository.StatusCounts) -> StudySummary:
+def summary(study: Study, counts: repository.StatusCounts, standing: Standing) -> StudySummary:
     """One line of the list of studies."""
     return StudySummary.model_validate(
         {
@@ -288,17 +301,21 @@ def summary(study: Study, counts: repository.StatusCounts) -> StudySummary:
             "active": counts[study.id, "active"],
             "created_at": study.created_at,
             "archived_at": study.archived_at,
+            "workspace": standing.workspace,
+            "rights": standing.rights,
         }
     )
 
 
-def detail(session: Session, name: str) -> StudyDetail:
+def detail(session: Session, name: str, who: Identity) -> StudyDetail:
     """A study with its declaration and versions."""
-    study = find_study(session, name)
+    study = find_study(session, name, who, "view")
     version = active_version(session, study)
     experiment = load_stored(version.definition)
     return StudyDetail(
-        summary=summary(study, repository.shown_runs_by_status(session)),
+        summary=summary(
+            study, repository.shown_runs_by_status(session), standing_of(session, [study], who)[study.id]
+        ),
         design=design_out(experiment),
         definition=experiment,
         toml=version.definition_toml,
@@ -313,18 +330,18 @@ def _version_out(version: StudyVersion, runs: int) -> VersionOut:
     return VersionOut.model_validate(version).model_copy(update={"runs": runs})
 
 
-def version_text(session: Session, name: str, number: int) -> str:
+def version_text(session: Session, name: str, number: int, who: Identity) -> str:
     """The TOML of one version."""
-    study = find_study(session, name)
+    study = find_study(session, name, who, "view")
     for version in study.versions:
         if version.number == number:
             return version.definition_toml
     raise NotFound(f"Study '{name}' has no version {number}.")
 
 
-def clips(session: Session, name: str) -> list[ClipOut]:
+def clips(session: Session, name: str, who: Identity) -> list[ClipOut]:
     """Every clip of the active version with the closure curve it shows."""
-    version = active_version(session, find_study(session, name))
+    version = active_version(session, find_study(session, name, who, "view"))
     curves = {clip["sha256"]: clip.get("closure", []) for clip in version.manifest["clips"]}
     rows = repository.clips_of_design(session, version)
     return [_clip_out(row, curves[row.clip_sha256]) for row in rows]

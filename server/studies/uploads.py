@@ -22,6 +22,8 @@ MAX_RATIO = 200
 FILMS = (".mp4", ".m4v", ".mov", ".webm")
 TABLES = (".csv", ".json")
 CHUNK_BYTES = 1 << 20
+_WHOSE = ".account"
+"""File of an upload's folder with the number of the account that sent it."""
 NAME = re.compile(r"\w[^\x00-\x1f\x7f]*")
 
 
@@ -32,12 +34,13 @@ class UploadTooLarge(ApiError):
     code = "too_large"
 
 
-def new_upload(folder: Path) -> tuple[str, Path]:
-    """Make the folder of a new upload, and remove uploads older than a day."""
+def new_upload(folder: Path, account: int) -> tuple[str, Path]:
+    """Make the folder of an account's new upload, and remove uploads older than a day."""
     _sweep(folder)
     identifier = secrets.token_hex(16)
     place = folder / identifier
     place.mkdir(parents=True, mode=0o700)
+    (place / _WHOSE).write_text(str(account), encoding="ascii")
     return identifier, place
 
 
@@ -52,10 +55,11 @@ def discard(place: Path) -> None:
     shutil.rmtree(place, ignore_errors=True)
 
 
-def upload_folder(folder: Path, identifier: str) -> Path:
-    """The folder of an upload; NotFound where there is none (identifiers are hexadecimal)."""
+def upload_folder(folder: Path, identifier: str, account: int) -> Path:
+    """The folder of an account's upload; NotFound where there is none (identifiers are hexadecimal)."""
     place = folder / identifier
-    if len(identifier) != 32 or not set(identifier) <= set("0123456789abcdef") or not place.is_dir():
+    known = len(identifier) == 32 and set(identifier) <= set("0123456789abcdef") and place.is_dir()
+    if not known or (place / _WHOSE).read_text(encoding="ascii") != str(account):
         raise NotFound("There is no such upload, or it is older than a day; please upload the clips again.")
     return place
 

@@ -36,15 +36,14 @@ def fresh_browser(client: TestClient, settings: Settings) -> TestClient:
     return TestClient(client.app, base_url=settings.public_url, raise_server_exceptions=False)
 
 
-def signed_in(client: TestClient, services: Services, role: Role) -> Admin:
+def signed_in(client: TestClient, services: Services, role: Role, name: str = "") -> Admin:
     """A new account of this role, signed in through a one-time link in a browser of its own."""
+    name = name or f"the {role}"
     client = fresh_browser(client, services.settings)
     _, token = service.invite(services.database, role, "", None)
-    made = client.post(
-        f"/api/admin/invitations/{token}/account", json={"name": f"the {role}", "password": PASSWORD}
-    )
+    made = client.post(f"/api/admin/invitations/{token}/account", json={"name": name, "password": PASSWORD})
     assert made.status_code == 201, made.text
-    return Admin(client, f"the {role}")
+    return Admin(client, name)
 
 
 @pytest.fixture

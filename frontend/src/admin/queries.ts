@@ -24,11 +24,15 @@ export const clipsQuery = (study: string) =>
     staleTime: 300_000,
   });
 
-const RANK = { viewer: 0, experimenter: 1, owner: 2 };
+/** Whether the signed-in account has this right on a study. */
+export function useMay(study: string, right: Schemas["StudySummary"]["rights"][number]): boolean {
+  return useQuery(studyQuery(study)).data?.summary.rights.includes(right) ?? false;
+}
 
-/** Whether the signed-in account has at least this role. */
-export function useMay(role: Schemas["AccountOut"]["role"]): boolean {
-  const { data } = useQuery(sessionQuery);
-  const mine = data?.account?.role;
-  return mine !== undefined && RANK[mine] >= RANK[role];
+export const workspacesQuery = queryOptions({ queryKey: ["workspaces"], queryFn: () => unwrap(api.GET("/api/admin/workspaces")) });
+
+/** The workspaces in which the signed-in account may make studies. */
+export function useOwnWorkspaces(): Schemas["MyWorkspace"][] {
+  const mine = useQuery(sessionQuery).data?.workspaces ?? [];
+  return mine.filter(({ role, second_factor_needed }) => role !== "viewer" && !second_factor_needed);
 }

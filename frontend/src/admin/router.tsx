@@ -32,6 +32,11 @@ const account = createRoute({
   component: lazyRouteComponent(() => import("./account/AccountPage"), "AccountPage"),
 });
 const people = createRoute({ ...page, path: "/people", component: lazyRouteComponent(() => import("./people/PeoplePage"), "PeoplePage") });
+const workspaces = createRoute({
+  ...page,
+  path: "/workspaces",
+  component: lazyRouteComponent(() => import("./people/WorkspacesPage"), "WorkspacesPage"),
+});
 const audit = createRoute({ ...page, path: "/audit", component: lazyRouteComponent(() => import("./people/AuditPage"), "AuditPage") });
 const figures = createRoute({
   ...page,
@@ -80,7 +85,7 @@ const tabs = [
 const tree = root.addChildren([
   signIn,
   invitation,
-  inside.addChildren([studies, create, account, people, audit, figures, labelling, blinkReview, study.addChildren(tabs)]),
+  inside.addChildren([studies, create, account, people, workspaces, audit, figures, labelling, blinkReview, study.addChildren(tabs)]),
 ]);
 
 export const router = createRouter({

@@ -684,6 +684,158 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/workspaces": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Workspaces
+         * @description The workspaces one belongs to; all of them for who manages the server.
+         */
+        get: operations["list_workspaces"];
+        put?: never;
+        /**
+         * Create Workspace
+         * @description Make a workspace and own it; gives the list with it.
+         */
+        post: operations["create_workspace"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/workspaces/{workspace}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Workspace
+         * @description Change the title, or whether a second factor is asked for.
+         */
+        put: operations["change_workspace"];
+        post?: never;
+        /**
+         * Delete Workspace
+         * @description Remove a workspace without studies.
+         */
+        delete: operations["delete_workspace"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/workspaces/{workspace}/members": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Members
+         * @description Who belongs to a workspace; for its owners.
+         */
+        get: operations["list_members"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/workspaces/{workspace}/members/{account}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Set Member
+         * @description Take an account into a workspace, or change its role there.
+         */
+        put: operations["set_member"];
+        post?: never;
+        /**
+         * Remove Member
+         * @description Take an account out of a workspace; rights granted on single studies stay.
+         */
+        delete: operations["remove_member"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/grants": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Grants
+         * @description The rights granted on a study.
+         */
+        get: operations["list_grants"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/grants/{account}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Set Grant
+         * @description Grant an account rights on a study, beside those it has by its role; an empty list takes them back.
+         */
+        put: operations["set_grant"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/admin/studies/{study}/workspace": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Move Study
+         * @description Put a study into another workspace in which one may make studies.
+         */
+        put: operations["move_study"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/experiments": {
         parameters: {
             query?: never;
@@ -773,7 +925,7 @@ export interface paths {
         };
         /**
          * List Studies
-         * @description Every study, the latest first.
+         * @description The studies that are open to the account, the latest first.
          */
         get: operations["list_studies"];
         put?: never;
@@ -1172,7 +1324,7 @@ export interface paths {
         };
         /**
          * Get Identity
-         * @description Who the participant is to the recruiter; for owners, and each look is in the audit log.
+         * @description Who the participant is to the recruiter; for owners of the study, and each look is in the audit log.
          */
         get: operations["get_identity"];
         put?: never;
@@ -1400,7 +1552,7 @@ export interface paths {
         };
         /**
          * Download Identities
-         * @description Recruiters' ids beside the pseudonyms, one row a visit; for owners, and noted in the audit log.
+         * @description Recruiters' ids beside the pseudonyms, one row a visit; for owners of the study, and audited.
          */
         get: operations["download_identities"];
         put?: never;
@@ -2085,6 +2237,16 @@ export interface components {
              * @enum {string}
              */
             status: "draft" | "pilot" | "live" | "closed";
+        };
+        /**
+         * ChangeWorkspace
+         * @description What an owner may change of a workspace.
+         */
+        ChangeWorkspace: {
+            /** Title */
+            title: string;
+            /** Second Factor Required */
+            second_factor_required: boolean;
         };
         /**
          * CheckAnswer
@@ -3485,6 +3647,16 @@ export interface components {
             inter_ocular_mm: number;
         };
         /**
+         * GrantOut
+         * @description Rights on a study that were granted to an account, beside those of its role in the workspace.
+         */
+        GrantOut: {
+            /** Account */
+            account: string;
+            /** Rights */
+            rights: ("view" | "run" | "edit" | "export" | "own")[];
+        };
+        /**
          * GroupCount
          * @description How many took part in one group.
          */
@@ -3948,6 +4120,12 @@ export interface components {
         Me: {
             account: components["schemas"]["AccountOut"] | null;
             /**
+             * Workspaces
+             * @description Where the account belongs.
+             * @default []
+             */
+            workspaces?: components["schemas"]["MyWorkspace"][];
+            /**
              * Accounts Exist
              * @description False until the first owner has used the one-time link.
              */
@@ -3971,6 +4149,23 @@ export interface components {
             se_within: number | null;
             /** Participants */
             participants: number;
+        };
+        /**
+         * MemberOut
+         * @description Somebody who belongs to a workspace.
+         */
+        MemberOut: {
+            /** Account */
+            account: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "experimenter" | "owner";
+            /** Second Factor */
+            second_factor: boolean;
+            /** Disabled */
+            disabled: boolean;
         };
         /**
          * MethodsNumber
@@ -4184,6 +4379,14 @@ export interface components {
             wording: components["schemas"]["CheckWording"][];
         };
         /**
+         * MoveStudy
+         * @description Where a study shall belong.
+         */
+        MoveStudy: {
+            /** Workspace */
+            workspace: string;
+        };
+        /**
          * MultipleChoiceField
          * @description Any of several answers.
          */
@@ -4225,6 +4428,26 @@ export interface components {
             options: components["schemas"]["Option"][];
         };
         /**
+         * MyWorkspace
+         * @description A workspace one belongs to, and as what.
+         */
+        MyWorkspace: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "experimenter" | "owner";
+            /**
+             * Second Factor Needed
+             * @description Its studies stay closed until the account signs in with a second factor.
+             */
+            second_factor_needed: boolean;
+        };
+        /**
          * NewAccount
          * @description The account an invited person makes.
          */
@@ -4236,7 +4459,9 @@ export interface components {
         };
         /**
          * NewInvitation
-         * @description Whom to invite, as what.
+         * @description Whom to invite, as what on the server, and where the account will belong as what.
+         *
+         *     Without a workspace it is the default one, and without a role in it the role on the server.
          */
         NewInvitation: {
             /**
@@ -4244,6 +4469,10 @@ export interface components {
              * @enum {string}
              */
             role: "viewer" | "experimenter" | "owner";
+            /** Workspace */
+            workspace?: string | null;
+            /** Workspace Role */
+            workspace_role?: ("viewer" | "experimenter" | "owner") | null;
             /**
              * Label
              * @default
@@ -4365,6 +4594,11 @@ export interface components {
             /** Levels */
             levels?: components["schemas"]["LevelsTable"] | components["schemas"]["LevelsPattern"] | null;
             own_clips?: components["schemas"]["OwnClips"] | null;
+            /**
+             * Workspace
+             * @description Needed where the account may make studies in several workspaces.
+             */
+            workspace?: string | null;
         };
         /**
          * NewToken
@@ -4428,6 +4662,16 @@ export interface components {
             upload?: string | null;
             /** Levels */
             levels?: components["schemas"]["LevelsTable"] | components["schemas"]["LevelsPattern"] | null;
+        };
+        /**
+         * NewWorkspace
+         * @description A workspace: its name in addresses, and the title people read.
+         */
+        NewWorkspace: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
         };
         /**
          * NextTrials
@@ -6178,6 +6422,25 @@ export interface components {
             expires_at: string;
         };
         /**
+         * SetGrant
+         * @description The rights an account shall have on a study beside those of its role; an empty list takes them back.
+         */
+        SetGrant: {
+            /** Rights */
+            rights: ("view" | "run" | "edit" | "export" | "own")[];
+        };
+        /**
+         * SetMember
+         * @description The role somebody shall have in a workspace.
+         */
+        SetMember: {
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "experimenter" | "owner";
+        };
+        /**
          * ShippedExperiment
          * @description An experiment that comes with the program.
          */
@@ -6690,6 +6953,16 @@ export interface components {
             created_at: string;
             /** Archived At */
             archived_at: string | null;
+            /**
+             * Workspace
+             * @description Name of the workspace it belongs to.
+             */
+            workspace: string;
+            /**
+             * Rights
+             * @description What the account that asks may do with it.
+             */
+            rights: ("view" | "run" | "edit" | "export" | "own")[];
         };
         /**
          * TextField
@@ -7757,6 +8030,24 @@ export interface components {
             factor: string;
         };
         /**
+         * WorkspaceOut
+         * @description A workspace, and the role of the account that asks; null where it is no member.
+         */
+        WorkspaceOut: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
+            /** Second Factor Required */
+            second_factor_required: boolean;
+            /** Role */
+            role: ("viewer" | "experimenter" | "owner") | null;
+            /** Members */
+            members: number;
+            /** Studies */
+            studies: number;
+        };
+        /**
          * YesNo
          * @description One clip, and whether something was seen in it.
          */
@@ -7817,6 +8108,7 @@ export type ChangeOut = components['schemas']['ChangeOut'];
 export type ChangePassword = components['schemas']['ChangePassword'];
 export type ChangeSettings = components['schemas']['ChangeSettings'];
 export type ChangeStatus = components['schemas']['ChangeStatus'];
+export type ChangeWorkspace = components['schemas']['ChangeWorkspace'];
 export type CheckAnswer = components['schemas']['CheckAnswer'];
 export type CheckWording = components['schemas']['CheckWording'];
 export type Checked = components['schemas']['Checked'];
@@ -7869,6 +8161,7 @@ export type Form = components['schemas']['Form'];
 export type FormAnswers = components['schemas']['FormAnswers'];
 export type FunnelStep = components['schemas']['FunnelStep'];
 export type Gates = components['schemas']['Gates'];
+export type GrantOut = components['schemas']['GrantOut'];
 export type GroupCount = components['schemas']['GroupCount'];
 export type Groups = components['schemas']['Groups'];
 export type Health = components['schemas']['Health'];
@@ -7894,12 +8187,15 @@ export type LinkedStudy = components['schemas']['LinkedStudy'];
 export type Margin = components['schemas']['Margin'];
 export type Me = components['schemas']['Me'];
 export type Mean = components['schemas']['Mean'];
+export type MemberOut = components['schemas']['MemberOut'];
 export type MethodsNumber = components['schemas']['MethodsNumber'];
 export type MethodsOut = components['schemas']['MethodsOut'];
 export type MonitorSnapshot = components['schemas']['MonitorSnapshot'];
 export type MonitoredRun = components['schemas']['MonitoredRun'];
 export type MotionChecks = components['schemas']['MotionChecks'];
+export type MoveStudy = components['schemas']['MoveStudy'];
 export type MultipleChoiceField = components['schemas']['MultipleChoiceField'];
+export type MyWorkspace = components['schemas']['MyWorkspace'];
 export type NewAccount = components['schemas']['NewAccount'];
 export type NewInvitation = components['schemas']['NewInvitation'];
 export type NewInvitationOut = components['schemas']['NewInvitationOut'];
@@ -7910,6 +8206,7 @@ export type NewStudy = components['schemas']['NewStudy'];
 export type NewToken = components['schemas']['NewToken'];
 export type NewTokenOut = components['schemas']['NewTokenOut'];
 export type NewVersion = components['schemas']['NewVersion'];
+export type NewWorkspace = components['schemas']['NewWorkspace'];
 export type NextTrials = components['schemas']['NextTrials'];
 export type NumberField = components['schemas']['NumberField'];
 export type OneAfterTheOther = components['schemas']['OneAfterTheOther'];
@@ -7965,6 +8262,8 @@ export type SeriesPlace = components['schemas']['SeriesPlace'];
 export type SeriesResult = components['schemas']['SeriesResult'];
 export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
+export type SetGrant = components['schemas']['SetGrant'];
+export type SetMember = components['schemas']['SetMember'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
 export type ShownAnswer = components['schemas']['ShownAnswer'];
 export type ShownCheck = components['schemas']['ShownCheck'];
@@ -8023,6 +8322,7 @@ export type WarnSameAnswer = components['schemas']['WarnSameAnswer'];
 export type WarningShown = components['schemas']['WarningShown'];
 export type Warnings = components['schemas']['Warnings'];
 export type WithinFactor = components['schemas']['WithinFactor'];
+export type WorkspaceOut = components['schemas']['WorkspaceOut'];
 export type YesNo = components['schemas']['YesNo'];
 export type $defs = Record<string, never>;
 export interface operations {
@@ -9634,6 +9934,413 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["AuditOut"][];
                 };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_workspaces: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WorkspaceOut"][];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    create_workspace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewWorkspace"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WorkspaceOut"][];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    change_workspace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                workspace: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ChangeWorkspace"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    delete_workspace: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                workspace: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_members: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                workspace: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MemberOut"][];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    set_member: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                workspace: string;
+                account: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SetMember"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    remove_member: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                workspace: string;
+                account: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    list_grants: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GrantOut"][];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    set_grant: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+                account: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SetGrant"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    move_study: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                study: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MoveStudy"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The request's content is not acceptable */
             422: {

@@ -4,18 +4,18 @@ from fastapi.testclient import TestClient
 from server.context import Services
 from server.settings import Settings
 from tests.helpers.admins import Admin, fresh_browser, signed_in
-from tests.helpers.studies import StudyInDatabase
+from tests.helpers.studies import SHORT, StudyInDatabase
 
 CHANGES = [
-    ("POST", "/studies"),
-    ("DELETE", "/studies/short"),
-    ("POST", "/studies/short/versions"),
-    ("PUT", "/studies/short/status"),
-    ("PUT", "/studies/short/settings"),
-    ("POST", "/studies/short/links"),
-    ("PUT", "/studies/short/runs/x/exclusion"),
-    ("POST", "/studies/short/runs/x/erase"),
-    ("POST", "/studies/short/reports"),
+    ("POST", "/studies", {}),
+    ("DELETE", "/studies/short", None),
+    ("POST", "/studies/short/versions", {"revision": 1, "toml": SHORT}),
+    ("PUT", "/studies/short/status", {"revision": 1, "status": "live"}),
+    ("PUT", "/studies/short/settings", {"revision": 1, "paused": True, "quota": None, "recruiter": None}),
+    ("POST", "/studies/short/links", {"kind": "general"}),
+    ("PUT", "/studies/short/runs/x/exclusion", {"reason": "slept"}),
+    ("POST", "/studies/short/runs/x/erase", {"confirm": "x"}),
+    ("POST", "/studies/short/reports", {}),
 ]
 OWNERS = [("GET", "/accounts"), ("POST", "/invitations"), ("GET", "/audit"), ("PATCH", "/accounts/1")]
 
@@ -27,9 +27,11 @@ def by_token(client: TestClient, settings: Settings, admin: Admin, *scopes: str)
     return script
 
 
-@pytest.mark.parametrize(("method", "path"), CHANGES)
-def test_viewers_cannot_change(viewer: Admin, study: StudyInDatabase, method: str, path: str) -> None:
-    answer = viewer.send(method, path, {})
+@pytest.mark.parametrize(("method", "path", "body"), CHANGES)
+def test_viewers_cannot_change(
+    viewer: Admin, study: StudyInDatabase, method: str, path: str, body: dict[str, object] | None
+) -> None:
+    answer = viewer.send(method, path, body)
     assert (answer.status_code, answer.json()["error"]["code"]) == (403, "not_allowed")
 
 
@@ -38,7 +40,7 @@ def test_experimenters_cannot_manage_people(experimenter: Admin, method: str, pa
     assert experimenter.send(method, path, {}).status_code == 403
 
 
-@pytest.mark.parametrize(("method", "path"), [("GET", "/studies"), *CHANGES, *OWNERS])
+@pytest.mark.parametrize(("method", "path"), [("GET", "/studies"), *(one[:2] for one in CHANGES), *OWNERS])
 def test_nobody_gets_in_without_signing_in(
     client: TestClient, study: StudyInDatabase, method: str, path: str
 ) -> None:

@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
+from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services, open_services
 from server.export.formats import FORMATS
@@ -51,7 +52,7 @@ def migrated(empty_database_url: str, tmp_path: Path) -> Iterator[Services]:
 
 def exported(services: Services, study: str) -> bytes:
     with services.database.read() as session:
-        return b"".join(FORMATS["csv"](session, find_study(session, study), "all"))
+        return b"".join(FORMATS["csv"](session, find_study(session, study, OPERATOR, "view"), "all"))
 
 
 def older_columns_of(content: bytes, header: list[str]) -> bytes:

@@ -50,7 +50,7 @@ function Closed({ why }: { why: string }) {
 }
 
 const MAY: Record<Schemas["InvitationState"]["role"], string> = {
-  owner: "You will be an owner: you may do everything, accounts included.",
+  owner: "You will be an owner: you may do everything in your workspace, and manage this server.",
   experimenter: "You will be an experimenter: you may make and change studies.",
   viewer: "You will be a viewer: you may look at studies and their data.",
 };

@@ -41,7 +41,7 @@ export function DataTab() {
   const detail = useQuery(studyQuery(study)).data;
   const [excel, setExcel] = useState(false);
   const rated = detail?.definition.trial.kind === "clip_rating";
-  const mine = useMay("owner") ? [...FILES, IDENTITIES] : FILES;
+  const mine = useMay(study, "own") ? [...FILES, IDENTITIES] : FILES;
   const files = mine.filter(([file]) => rated || !file.startsWith("wide."));
   const version = detail?.summary.version ?? 1;
   const chosen = (file: string) => {

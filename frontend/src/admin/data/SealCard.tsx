@@ -57,7 +57,7 @@ function Sealed({ study, seal }: Props) {
 }
 
 function Unsealed({ study, seal }: Props) {
-  const mayChange = useMay("experimenter");
+  const mayChange = useMay(study, "edit");
   const [power, setPower] = useState<Record<string, unknown> | null>(null);
   const make = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/seal", { params: { path: { study } }, body: { power } })), {
     touches: [["study", study, "seal"]],

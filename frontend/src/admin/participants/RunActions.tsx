@@ -7,9 +7,10 @@ import { useChange } from "../ui/useChange";
 interface Props {
   study: string;
   summary: Schemas["RunSummary"];
+  mayErase: boolean;
 }
 
-export function RunActions({ study, summary }: Props) {
+export function RunActions({ study, summary, mayErase }: Props) {
   const path = { params: { path: { study, run: summary.run } } };
   const touches = [
     ["timeline", study, summary.run],
@@ -46,13 +47,15 @@ export function RunActions({ study, summary }: Props) {
           onDone={(reason) => exclude.mutate(reason)}
         />
       )}
-      <Ask
-        label="Erase this person's data"
-        words={`Ratings, questionnaires and events of this person are deleted for good. To go on, type ${summary.run}.`}
-        field="Identifier of the run"
-        ready={(text) => text === summary.run}
-        onDone={(confirm) => erase.mutate(confirm)}
-      />
+      {mayErase && (
+        <Ask
+          label="Erase this person's data"
+          words={`Ratings, questionnaires and events of this person are deleted for good. To go on, type ${summary.run}.`}
+          field="Identifier of the run"
+          ready={(text) => text === summary.run}
+          onDone={(confirm) => erase.mutate(confirm)}
+        />
+      )}
     </Group>
   );
 }

@@ -29,8 +29,9 @@ function calibrationFacts(one: Schemas["TimelineCalibration"]): Record<string, s
 
 export function TimelinePage() {
   const { study = "", run = "" } = useParams({ strict: false });
-  const mayChange = useMay("experimenter");
-  const owns = useMay("owner");
+  const mayChange = useMay(study, "run");
+  const mayErase = useMay(study, "edit");
+  const owns = useMay(study, "own");
   const timeline = useQuery({
     queryKey: ["timeline", study, run],
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/runs/{run}", { params: { path: { study, run } } })),
@@ -57,7 +58,7 @@ export function TimelinePage() {
               </div>
               <Group>
                 {owns && data.summary.erased_at === null && <IdentityButton study={study} run={run} />}
-                {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} />}
+                {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} mayErase={mayErase} />}
               </Group>
             </Group>
             <Group align="stretch">

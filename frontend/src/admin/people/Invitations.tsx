@@ -9,6 +9,7 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
+import { workspacesQuery } from "../queries";
 import { asRole, type Role, ROLES } from "./roles";
 
 export function Invitations() {
@@ -28,8 +29,10 @@ export function Invitations() {
 function Invite() {
   const [label, setLabel] = useState("");
   const [role, setRole] = useState<Role>("experimenter");
+  const [workspace, setWorkspace] = useState("default");
+  const workspaces = useQuery(workspacesQuery).data ?? [];
   const [url, setUrl] = useState<string | null>(null);
-  const invite = useChange(() => unwrap(api.POST("/api/admin/invitations", { body: { role, label } })), {
+  const invite = useChange(() => unwrap(api.POST("/api/admin/invitations", { body: { role, label, workspace } })), {
     touches: [["invitations"]],
     then: (made) => setUrl(made.url),
   });
@@ -43,6 +46,15 @@ function Invite() {
           onChange={(event) => setLabel(event.currentTarget.value)}
         />
         <Select label="As" data={ROLES} value={role} allowDeselect={false} onChange={(word) => setRole(asRole(word))} />
+        {workspaces.length > 1 && (
+          <Select
+            label="In the workspace"
+            data={workspaces.map(({ name, title }) => ({ value: name, label: title }))}
+            value={workspace}
+            allowDeselect={false}
+            onChange={(name) => setWorkspace(name ?? "default")}
+          />
+        )}
         <Button onClick={() => invite.mutate(undefined)} loading={invite.isPending}>
           Make a one-time link
         </Button>

@@ -1,5 +1,6 @@
-import { Badge, Select, Stack, Switch, Title } from "@mantine/core";
+import { Anchor, Badge, Select, Stack, Switch, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
 import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
@@ -17,7 +18,17 @@ export function PeoplePage() {
   );
   return (
     <Stack maw={900}>
-      <Title order={1}>People</Title>
+      <div>
+        <Title order={1}>People</Title>
+        <Text size="sm" c="dimmed">
+          The role on this server: owners manage accounts and workspaces, experimenters may make workspaces. What somebody may do with
+          studies is set under{" "}
+          <Anchor component={Link} to="/workspaces">
+            Workspaces
+          </Anchor>
+          .
+        </Text>
+      </div>
       <Answer of={accounts}>
         {(rows) => (
           <DataTable

@@ -11,7 +11,7 @@ import type { DataOrigin } from "./origins";
 export function Reports({ study, origin, series }: { study: string; origin: DataOrigin; series: number | null }) {
   const path = { params: { path: { study } } };
   const [sensitivity, setSensitivity] = useState(true);
-  const mayBuild = useMay("experimenter");
+  const mayBuild = useMay(study, "run");
   const reports = useQuery({
     queryKey: ["reports", study],
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/reports", path)),

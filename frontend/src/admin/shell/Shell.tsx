@@ -15,6 +15,7 @@ const PAGES = [
   { to: "/blinks", label: "Blinks", role: "viewer", group: "Stimuli" },
   { to: "/labelling", label: "Label video", role: "viewer", group: "Stimuli" },
   { to: "/blink-review", label: "Review blinks", role: "viewer", group: "Stimuli" },
+  { to: "/workspaces", label: "Workspaces", role: "viewer", group: "This server" },
   { to: "/people", label: "People", role: "owner", group: "This server" },
   { to: "/audit", label: "Audit log", role: "owner", group: "This server" },
   { to: "/account", label: "My account", role: "viewer", group: "This server" },

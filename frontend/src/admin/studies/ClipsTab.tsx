@@ -19,7 +19,7 @@ export function ClipsTab() {
 }
 
 function Clips({ study, clips }: { study: string; clips: Schemas["ClipOut"][] }) {
-  const mayChange = useMay("experimenter");
+  const mayChange = useMay(study, "edit");
   const [cell, setCell] = useState<string | null>(null);
   const [page, setPage] = useState(1);
   const cells = useMemo(() => [...new Set(clips.map((clip) => clip.cell))], [clips]);

@@ -10,6 +10,7 @@ import { CompareVersions } from "./CompareVersions";
 import { LifeCycle } from "./LifeCycle";
 import { PageLanguages } from "./PageLanguages";
 import { Running } from "./Running";
+import { Sharing } from "./Sharing";
 
 export function SettingsTab() {
   const { study = "" } = useParams({ strict: false });
@@ -21,6 +22,7 @@ export function SettingsTab() {
           <Versions detail={detail} />
           <CompareVersions detail={detail} />
           <PageLanguages />
+          {detail.summary.rights.includes("own") && <Sharing summary={detail.summary} />}
           <LifeCycle detail={detail} />
         </Stack>
       )}

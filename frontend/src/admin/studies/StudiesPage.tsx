@@ -1,16 +1,18 @@
-import { Anchor, Badge, Button, Group, Paper, Stack, Switch, Text, Title } from "@mantine/core";
+import { Alert, Anchor, Badge, Button, Group, Paper, Stack, Switch, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import type { Schemas } from "../api";
-import { studiesQuery, useMay } from "../queries";
+import { sessionQuery, studiesQuery, useOwnWorkspaces } from "../queries";
 import { Answer } from "../ui/Answer";
 import { type Column, DataTable } from "../ui/DataTable";
 import { StatusBadge } from "./StatusBadge";
 
 export function StudiesPage() {
   const studies = useQuery(studiesQuery);
-  const mayCreate = useMay("experimenter");
+  const mayCreate = useOwnWorkspaces().length > 0;
+  const mine = useQuery(sessionQuery).data?.workspaces ?? [];
+  const closed = mine.filter((workspace) => workspace.second_factor_needed);
   return (
     <Stack>
       <Group justify="space-between">
@@ -21,13 +23,30 @@ export function StudiesPage() {
           </Button>
         )}
       </Group>
-      <Answer of={studies}>{(rows) => (rows.length === 0 ? <Nothing /> : <Listed rows={rows} />)}</Answer>
+      {closed.map(({ name, title }) => (
+        <Alert key={name} color="yellow" title={`The studies of “${title}” are closed to you`}>
+          It asks for a second factor. Set one up under{" "}
+          <Anchor component={Link} to="/account">
+            My account
+          </Anchor>
+          , or sign in again with it.
+        </Alert>
+      ))}
+      <Answer of={studies}>
+        {(rows) =>
+          rows.length === 0 ? (
+            <Nothing mayCreate={mayCreate} />
+          ) : (
+            <Listed rows={rows} columns={mine.length > 1 ? WITH_WORKSPACE : COLUMNS} />
+          )
+        }
+      </Answer>
     </Stack>
   );
 }
 
 /** The studies, those in the archive where asked for. */
-function Listed({ rows }: { rows: Schemas["StudySummary"][] }) {
+function Listed({ rows, columns }: { rows: Schemas["StudySummary"][]; columns: typeof COLUMNS }) {
   const [all, setAll] = useState(false);
   const archived = rows.filter((row) => row.archived_at !== null).length;
   const shown = all ? rows : rows.filter((row) => row.archived_at === null);
@@ -36,15 +55,19 @@ function Listed({ rows }: { rows: Schemas["StudySummary"][] }) {
       {archived > 0 && (
         <Switch checked={all} onChange={(event) => setAll(event.currentTarget.checked)} label={`Also those in the archive (${archived})`} />
       )}
-      <DataTable rows={shown} rowKey={(row) => row.name} columns={COLUMNS} empty="No studies but those in the archive." />
+      <DataTable rows={shown} rowKey={(row) => row.name} columns={columns} empty="No studies but those in the archive." />
     </>
   );
 }
 
-function Nothing() {
+function Nothing({ mayCreate }: { mayCreate: boolean }) {
   return (
     <Paper withBorder p="xl">
-      <Text>No studies yet. Start from one of the three that ship with Palpebra, from a definition, or from your own clips.</Text>
+      <Text>
+        {mayCreate
+          ? "No studies yet. Start from one of the three that ship with Palpebra, from a definition, or from your own clips."
+          : "No study is open to you yet. Ask an owner of your workspace."}
+      </Text>
     </Paper>
   );
 }
@@ -85,4 +108,9 @@ const COLUMNS: Column<Schemas["StudySummary"]>[] = [
   { title: "Complete", number: true, cell: (row) => `${row.complete}${row.quota === null ? "" : ` of ${row.quota}`}` },
   { title: "Under way", number: true, wide: true, cell: (row) => row.active },
   { title: "Version", number: true, wide: true, cell: (row) => row.version },
+];
+const WITH_WORKSPACE: typeof COLUMNS = [
+  ...COLUMNS.slice(0, 1),
+  { title: "Workspace", wide: true, cell: (row) => row.workspace },
+  ...COLUMNS.slice(1),
 ];

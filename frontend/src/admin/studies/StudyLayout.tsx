@@ -4,7 +4,8 @@ import { Group, Stack, Tabs, Text, Title } from "@mantine/core";
 import { useEffect, useRef } from "react";
 import { useQuery } from "@tanstack/react-query";
 import { Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
-import { studyQuery, useMay } from "../queries";
+import type { Schemas } from "../api";
+import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { StatusBadge } from "./StatusBadge";
 import { StatusButtons } from "./StatusButtons";
@@ -20,13 +21,13 @@ const TABS = [
   ["participants", "Participants"],
   ["settings", "Settings"],
 ] as const;
-const FOR_EXPERIMENTERS = new Set<string>(["build", "links", "settings"]);
+type Right = Schemas["StudySummary"]["rights"][number];
+const NEEDED: Partial<Record<string, Right>> = { build: "edit", links: "run", settings: "run", data: "export", participants: "export" };
 
 export function StudyLayout() {
   const { study = "" } = useParams({ strict: false });
   const { pathname } = useLocation();
   const navigate = useNavigate();
-  const mayChange = useMay("experimenter");
   const current = pathname.split("/")[3] || "design";
   const line = useRef<HTMLDivElement>(null);
   useEffect(() => {
@@ -49,7 +50,7 @@ export function StudyLayout() {
                 {summary.archived_at !== null && ", in the archive: it can be read, and not changed"}
               </Text>
             </div>
-            {mayChange && summary.archived_at === null && <StatusButtons summary={summary} />}
+            {summary.rights.includes("run") && summary.archived_at === null && <StatusButtons summary={summary} />}
           </Group>
           <Tabs
             value={current}
@@ -57,7 +58,7 @@ export function StudyLayout() {
             onChange={(to) => void navigate({ to: `/studies/${study}${to === "design" ? "" : `/${to ?? ""}`}` })}
           >
             <Tabs.List ref={line} className="tabs-line">
-              {TABS.filter(([path]) => mayChange || !FOR_EXPERIMENTERS.has(path)).map(([path, label]) => (
+              {TABS.filter(([path]) => summary.rights.includes(NEEDED[path] ?? "view")).map(([path, label]) => (
                 <Tabs.Tab key={path} value={path}>
                   {label}
                 </Tabs.Tab>

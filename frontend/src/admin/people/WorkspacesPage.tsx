@@ -1,0 +1,139 @@
+/** Laboratories that share this server: who belongs to which, as what. */
+
+import { Alert, Badge, Button, Card, Group, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
+import { sessionQuery, workspacesQuery } from "../queries";
+import { Answer } from "../ui/Answer";
+import { ConfirmButton } from "../ui/ConfirmButton";
+import { useChange } from "../ui/useChange";
+import { Members } from "./Members";
+
+type Workspace = Schemas["WorkspaceOut"];
+const TOUCHED = [["workspaces"], ["session"], ["studies"]];
+
+export function WorkspacesPage() {
+  const account = useQuery(sessionQuery).data?.account;
+  const manages = account?.role === "owner";
+  return (
+    <Stack maw={900}>
+      <div>
+        <Title order={1}>Workspaces</Title>
+        <Text size="sm" c="dimmed">
+          Studies belong to a workspace and are open to its people alone: viewers look and download, experimenters make and run studies,
+          owners see who participants are to the recruiter and decide who belongs. Single studies are shared under their settings.
+        </Text>
+      </div>
+      <Answer of={useQuery(workspacesQuery)}>
+        {(rows) => (
+          <>
+            {rows.length === 0 && <Alert color="yellow">You belong to no workspace yet. Ask an owner of one to take you in.</Alert>}
+            {rows.map((row) => (
+              <OneWorkspace key={row.name} workspace={row} manages={manages} />
+            ))}
+          </>
+        )}
+      </Answer>
+      {account !== undefined && account?.role !== "viewer" && <NewWorkspace />}
+    </Stack>
+  );
+}
+
+function OneWorkspace({ workspace, manages }: { workspace: Workspace; manages: boolean }) {
+  const mine = manages || workspace.role === "owner";
+  return (
+    <Card withBorder component="section" aria-label={workspace.title}>
+      <Stack gap="sm">
+        <Group justify="space-between">
+          <Title order={2} size="h4">
+            {workspace.title}
+          </Title>
+          <Group gap="xs">
+            {workspace.second_factor_required && <Badge color="teal.9">second factor</Badge>}
+            <Badge color="gray.7">{workspace.role ?? "not a member"}</Badge>
+          </Group>
+        </Group>
+        <Text size="sm" c="dimmed">
+          {workspace.name}, {workspace.members} {workspace.members === 1 ? "person" : "people"}, {workspace.studies}{" "}
+          {workspace.studies === 1 ? "study" : "studies"}
+        </Text>
+        {mine && <Settings workspace={workspace} mayDelete={manages} />}
+        {mine && <Members workspace={workspace.name} />}
+      </Stack>
+    </Card>
+  );
+}
+
+function Settings({ workspace, mayDelete }: { workspace: Workspace; mayDelete: boolean }) {
+  const path = { params: { path: { workspace: workspace.name } } };
+  const [title, setTitle] = useState(workspace.title);
+  const change = useChange((body: Schemas["ChangeWorkspace"]) => unwrap(api.PUT("/api/admin/workspaces/{workspace}", { ...path, body })), {
+    touches: TOUCHED,
+    done: "Changed.",
+  });
+  const remove = useChange(() => unwrap(api.DELETE("/api/admin/workspaces/{workspace}", path)), {
+    touches: TOUCHED,
+    done: "The workspace is deleted.",
+  });
+  const { second_factor_required } = workspace;
+  return (
+    <Group align="end">
+      <TextInput label="Title" value={title} maxLength={200} onChange={(event) => setTitle(event.currentTarget.value)} />
+      <Button
+        variant="default"
+        disabled={title.trim() === "" || title === workspace.title}
+        onClick={() => change.mutate({ title, second_factor_required })}
+      >
+        Save
+      </Button>
+      <Switch
+        label="Ask for a second factor"
+        checked={second_factor_required}
+        onChange={(event) => change.mutate({ title: workspace.title, second_factor_required: event.currentTarget.checked })}
+      />
+      {mayDelete && workspace.studies === 0 && workspace.name !== "default" && (
+        <ConfirmButton
+          label="Delete"
+          question="The workspace is deleted; accounts stay."
+          confirm="Delete"
+          onConfirm={() => remove.mutate(undefined)}
+        />
+      )}
+    </Group>
+  );
+}
+
+function NewWorkspace() {
+  const [title, setTitle] = useState("");
+  const name = title
+    .toLowerCase()
+    .normalize("NFKD")
+    .replace(/[^a-z0-9]+/g, "-")
+    .replace(/^-+|-+$/g, "")
+    .slice(0, 60);
+  const create = useChange(() => unwrap(api.POST("/api/admin/workspaces", { body: { name, title } })), {
+    touches: TOUCHED,
+    done: "The workspace is made; you own it.",
+    then: () => setTitle(""),
+  });
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4" mb="sm">
+        New workspace
+      </Title>
+      <Group align="end">
+        <TextInput
+          label="Its title"
+          placeholder="Perception laboratory"
+          value={title}
+          maxLength={200}
+          onChange={(event) => setTitle(event.currentTarget.value)}
+        />
+        <Button disabled={name === ""} loading={create.isPending} onClick={() => create.mutate(undefined)}>
+          Make it
+        </Button>
+      </Group>
+    </Card>
+  );
+}

@@ -1,0 +1,60 @@
+"""`server audit verify`: go along the chain, and name the first entry that does not fit."""
+
+from dataclasses import dataclass
+
+from sqlalchemy.orm import Session
+
+from server.audit import chain, repository
+from server.audit.sealing import linked
+from server.models import AuditEntry
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What going along the chain gave.
+
+    position, hash: of the last entry that fits. erased: entries whose details were erased with a person.
+    before: rows from before there was a chain. broken: what does not fit first; None where all does.
+    """
+
+    position: int
+    hash: str
+    erased: int
+    before: int
+    broken: str | None
+
+
+def verify(session: Session, secret: bytes, kept: tuple[int, str] | None = None) -> Verdict:
+    """Check every entry; `kept` is a position and its hash, noted elsewhere, that the chain must hold."""
+    key, erased_runs = chain.chain_key(secret), repository.erased_runs(session)
+    position, previous, erased, seen = 0, chain.START, 0, kept is None
+    broken: str | None = None
+    for entry in repository.chained(session):
+        broken = _problem(key, position, previous, entry, erased_runs)
+        if broken is not None:
+            break
+        position, previous = entry.position or 0, entry.chain_hash or ""
+        erased += entry.details_salt is None
+        seen = seen or kept == (position, previous)
+    if broken is None and not seen and kept is not None:
+        broken = f"entry {kept[0]}, whose hash was kept, is not in the chain: it was changed or cut off"
+    first = repository.first_id(session)
+    if broken is None and first is not None and (strays := repository.unchained(session, first)):
+        broken = f"row {strays[0]} stands between the chain's rows without being in it: it was put in"
+    before = [row for row in repository.unchained(session, None) if first is None or row < first]
+    return Verdict(position, previous, erased, len(before), broken)
+
+
+def _problem(key: bytes, last: int, previous: str, entry: AuditEntry, erased_runs: set[str]) -> str | None:
+    named = f"entry {entry.position} (row {entry.id}, {entry.at:%Y-%m-%d %H:%M:%S}, {entry.action})"
+    if entry.position != last + 1:
+        return f"entry {last + 1} is missing; the next there is is {named}"
+    digest = entry.details_digest or ""
+    if entry.chain_hash != chain.entry_hash(key, previous, linked(entry), digest):
+        return f"{named} does not fit the chain: it, or the key of this server, was changed"
+    if entry.details_salt is not None:
+        fits = digest == chain.details_digest(key, entry.details_salt, entry.details)
+        return None if fits else f"{named}: its details were changed"
+    if entry.target_kind != "run" or entry.target not in erased_runs:
+        return f"{named}: its details were taken away, and no erasure of a person says why"
+    return None

@@ -1,0 +1,29 @@
+"""Who may send clips: recognised before the body of an upload is read."""
+
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from server.accounts.identity import WRITER, Identity, NotAllowed, Writer
+from server.context import Services, ServicesDep
+from server.workspaces import repository
+
+
+def _must_make_studies(services: Services, who: Identity) -> Identity:
+    with services.database.read() as session:
+        if not repository.may_upload(session, who):
+            raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
+    return who
+
+
+def recognise_uploader(request: Request, services: Services) -> Identity:
+    """The account behind an upload; NotSignedIn or NotAllowed where it may send none."""
+    return _must_make_studies(services, WRITER(request, services, None, None))
+
+
+def _uploader(services: ServicesDep, who: Writer) -> Identity:
+    return _must_make_studies(services, who)
+
+
+Uploader = Annotated[Identity, Depends(_uploader)]
+"""May make studies somewhere, or edit one."""

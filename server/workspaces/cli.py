@@ -1,0 +1,121 @@
+"""`server workspace`: laboratories on one server, their people, and rights on single studies."""
+
+from typing import Annotated
+
+import typer
+from pydantic import TypeAdapter, ValidationError
+from rich.table import Table
+
+from experiments.errors import InputError, did_you_mean
+from server.accounts.identity import OPERATOR
+from server.cli_common import migrated_services, out
+from server.models import RIGHTS, ROLES, Right, Role
+from server.studies.lookup import find_study
+from server.workspaces import repository, service
+from server.workspaces.schemas import WorkspaceName
+
+app = typer.Typer(help="Workspaces: laboratories that share this server.", no_args_is_help=True)
+WorkspaceArgument = Annotated[str, typer.Argument(help="Name of the workspace.")]
+AccountArgument = Annotated[str, typer.Argument(help="Name of the account.")]
+StudyArgument = Annotated[str, typer.Argument(help="Name of the study.")]
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server workspace` to the command line."""
+    parent.add_typer(app, name="workspace")
+
+
+def _role(word: str) -> Role:
+    known = next((one for one in ROLES if one == word), None)
+    if known is None:
+        raise InputError(f"expected the role {', '.join(ROLES)}, got '{word}'{did_you_mean(word, ROLES)}")
+    return known
+
+
+def _right(word: str) -> Right:
+    known = next((one for one in RIGHTS if one == word), None)
+    if known is None:
+        raise InputError(f"expected rights of {', '.join(RIGHTS)}, got '{word}'{did_you_mean(word, RIGHTS)}")
+    return known
+
+
+@app.command("list")
+def list_workspaces() -> None:
+    """List the workspaces with their members and number of studies.
+
+    Example: server workspace list
+    """
+    with migrated_services() as services, services.database.read() as session:
+        table = Table("workspace", "title", "studies", "second factor", "members")
+        counts = repository.counts(session)
+        for one in repository.every(session):
+            people = ", ".join(f"{who.name} ({role})" for who, role in repository.members(session, one))
+            needed = "required" if one.second_factor_required else ""
+            table.add_row(one.name, one.title, str(counts.get(one.id, (0, 0))[1]), needed, people)
+        out.print(
+            table if table.row_count else "no workspaces yet; the first account or study makes 'default'"
+        )
+
+
+@app.command("create")
+def create(
+    name: Annotated[str, typer.Argument(help="Small letters, digits and hyphens.")],
+    title: Annotated[str, typer.Option(help="What people read; the name where not given.")] = "",
+) -> None:
+    """Make a workspace.
+
+    Example: server workspace create perception-lab --title "Perception laboratory"
+    """
+    try:
+        TypeAdapter(WorkspaceName).validate_python(name)
+    except ValidationError as error:
+        raise InputError(f"expected small letters, digits and hyphens, got '{name}'") from error
+    with migrated_services() as services, services.database.write() as session:
+        service.create(session, name, title or name, OPERATOR)
+    out.print(f"workspace {name}: made; next: server workspace member {name} ACCOUNT --role owner")
+
+
+@app.command("member")
+def set_member(
+    workspace: WorkspaceArgument,
+    account: AccountArgument,
+    role: Annotated[str, typer.Option(help="viewer, experimenter or owner.")] = "experimenter",
+    remove: Annotated[bool, typer.Option("--remove", help="Take the account out.")] = False,
+) -> None:
+    """Take an account into a workspace, change its role there, or take it out.
+
+    Example: server workspace member perception-lab ada --role owner
+    """
+    wanted = None if remove else _role(role)
+    with migrated_services() as services, services.database.write() as session:
+        found = service.managed(session, workspace, OPERATOR)
+        service.set_member(session, found, account, wanted, OPERATOR)
+    out.print(f"workspace {workspace}: {account} {'is out' if remove else f'is {role}'}")
+
+
+@app.command("grant")
+def grant(
+    study: StudyArgument,
+    account: AccountArgument,
+    rights: Annotated[str, typer.Option(help="Of view,run,edit,export,own; empty: none.")],
+) -> None:
+    """Give an account rights on one study, beside those of its role in the workspace.
+
+    Example: server workspace grant exp3 ada --rights view,export
+    """
+    wanted = [_right(word.strip()) for word in rights.split(",") if word.strip()]
+    with migrated_services() as services, services.database.write() as session:
+        service.grant(session, find_study(session, study, OPERATOR, "own"), account, wanted, OPERATOR)
+    out.print(f"study {study}: {account} may {', '.join(wanted) or 'do what the role allows'}")
+
+
+@app.command("move")
+def move(study: StudyArgument, workspace: WorkspaceArgument) -> None:
+    """Put a study into another workspace.
+
+    Example: server workspace move exp3 perception-lab
+    """
+    with migrated_services() as services, services.database.write() as session:
+        found = find_study(session, study, OPERATOR, "own")
+        service.move(session, found, service.find_workspace(session, workspace), OPERATOR)
+    out.print(f"study {study}: in the workspace {workspace}")

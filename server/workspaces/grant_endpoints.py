@@ -1,0 +1,36 @@
+"""Grants on a study, and the workspace it belongs to: for who owns the study."""
+
+from fastapi import APIRouter
+
+from server.accounts.identity import Myself
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES
+from server.studies.lookup import find_study
+from server.workspaces import repository, service
+from server.workspaces.schemas import GrantOut, MoveStudy, SetGrant
+
+router = APIRouter(prefix="/api/admin/studies/{study}", tags=["workspaces"], responses=ERROR_RESPONSES)
+
+
+@router.get("/grants")
+def list_grants(services: ServicesDep, who: Myself, study: str) -> list[GrantOut]:
+    """The rights granted on a study."""
+    with services.database.read() as session:
+        found = find_study(session, study, who, "own")
+        given = repository.grants(session, found)
+        return [GrantOut(account=name, rights=rights) for name, rights in given.items()]
+
+
+@router.put("/grants/{account}", status_code=204)
+def set_grant(services: ServicesDep, who: Myself, study: str, account: str, body: SetGrant) -> None:
+    """Grant an account rights on a study, beside those it has by its role; an empty list takes them back."""
+    with services.database.write() as session:
+        service.grant(session, find_study(session, study, who, "own"), account, body.rights, who)
+
+
+@router.put("/workspace", status_code=204)
+def move_study(services: ServicesDep, who: Myself, study: str, body: MoveStudy) -> None:
+    """Put a study into another workspace in which one may make studies."""
+    with services.database.write() as session:
+        found = find_study(session, study, who, "own")
+        service.move(session, found, service.workspace_for(session, who, body.workspace), who)

@@ -1,0 +1,194 @@
+"""Queries of workspaces, their members and grants; and which studies somebody may see."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from sqlalchemy import ColumnElement, Select, delete, func, select, true
+from sqlalchemy.orm import Session
+
+from server.accounts.identity import Identity, Operator
+from server.models import (
+    DEFAULT_WORKSPACE,
+    RIGHTS,
+    ROLES,
+    Account,
+    Right,
+    Role,
+    Study,
+    StudyGrant,
+    Workspace,
+    WorkspaceMember,
+)
+from server.repository import insert_once
+from server.workspaces.rights import MAKING_STUDIES, effective
+
+
+def seen_by(who: Identity | Operator) -> ColumnElement[bool]:
+    """Holds for the studies that somebody may see: of her workspaces, or granted to her."""
+    if isinstance(who, Operator):
+        return true()
+    mine = select(WorkspaceMember.workspace_id).where(WorkspaceMember.account_id == who.account_id)
+    granted = select(StudyGrant.study_id).where(StudyGrant.account_id == who.account_id)
+    return Study.workspace_id.in_(mine) | Study.id.in_(granted)
+
+
+def opened_to(who: Identity | Operator) -> ColumnElement[bool]:
+    """As `seen_by`, without the studies that wait for a second factor."""
+    if isinstance(who, Operator) or who.second_factor:
+        return seen_by(who)
+    closed = select(Workspace.id).where(Workspace.second_factor_required.is_(True))
+    return seen_by(who) & (Study.workspace_id.is_(None) | Study.workspace_id.not_in(closed))
+
+
+def study_seen_by(session: Session, name: str, who: Identity | Operator) -> Study | None:
+    """The study called `name` where she may see it."""
+    return session.scalar(select(Study).where(Study.name == name, seen_by(who)))
+
+
+def study_names_seen_by(session: Session, who: Identity | Operator) -> Sequence[str]:
+    """The names of the studies she may see."""
+    return session.scalars(select(Study.name).where(seen_by(who))).all()
+
+
+def studies_opened_to(session: Session, who: Identity | Operator) -> list[Study]:
+    """The studies that are open to her, the latest first."""
+    return list(session.scalars(select(Study).where(opened_to(who)).order_by(Study.id.desc())))
+
+
+def rights_on(session: Session, studies: Iterable[Study], who: Identity) -> dict[int, frozenset[Right]]:
+    """Study number -> her rights on it."""
+    listed = list(studies)
+    roles = roles_of(session, who.account_id)
+    granted: dict[int, set[Right]] = defaultdict(set)
+    query = select(StudyGrant.study_id, StudyGrant.granted).where(StudyGrant.account_id == who.account_id)
+    for study_id, word in session.execute(query):
+        granted[study_id].add(RIGHTS[RIGHTS.index(word)])
+    return {one.id: effective(roles.get(one.workspace_id or 0), granted[one.id]) for one in listed}
+
+
+def roles_of(session: Session, account_id: int) -> dict[int, Role]:
+    """Workspace number -> the account's role in it."""
+    query = select(WorkspaceMember.workspace_id, WorkspaceMember.role)
+    rows = session.execute(query.where(WorkspaceMember.account_id == account_id))
+    return {workspace: ROLES[ROLES.index(role)] for workspace, role in rows}
+
+
+def workspaces_of(session: Session, account_id: int) -> list[tuple[Workspace, Role]]:
+    """The workspaces an account belongs to, by name, with its role in each."""
+    query = select(Workspace, WorkspaceMember.role).join(WorkspaceMember)
+    rows = session.execute(query.where(WorkspaceMember.account_id == account_id).order_by(Workspace.name))
+    return [(workspace, ROLES[ROLES.index(role)]) for workspace, role in rows]
+
+
+def workspace_of(session: Session, study: Study) -> Workspace | None:
+    """The workspace of a study."""
+    return session.get(Workspace, study.workspace_id) if study.workspace_id is not None else None
+
+
+def workspaces_for_new_studies(session: Session, who: Identity | Operator) -> list[Workspace]:
+    """Where she may make studies."""
+    query = select(Workspace).order_by(Workspace.id)
+    if isinstance(who, Identity):
+        query = query.join(WorkspaceMember).where(
+            WorkspaceMember.account_id == who.account_id, WorkspaceMember.role.in_(MAKING_STUDIES)
+        )
+        if not who.second_factor:
+            query = query.where(Workspace.second_factor_required.is_(False))
+    return list(session.scalars(query))
+
+
+def may_upload(session: Session, who: Identity) -> bool:
+    """True where she may make studies somewhere, or edit one."""
+    editing = select(StudyGrant.study_id).where(
+        StudyGrant.account_id == who.account_id, StudyGrant.granted.in_(("edit", "own"))
+    )
+    return bool(workspaces_for_new_studies(session, who)) or session.scalar(editing.limit(1)) is not None
+
+
+def default_workspace(session: Session) -> Workspace:
+    """The workspace of whatever is put into no other; made where it is missing."""
+    insert_once(session, Workspace, [{"name": DEFAULT_WORKSPACE, "title": "Laboratory"}])
+    return session.scalars(_named(DEFAULT_WORKSPACE)).one()
+
+
+def _named(name: str) -> Select[Workspace]:
+    return select(Workspace).where(Workspace.name == name)
+
+
+def find(session: Session, name: str, *, lock: bool = False) -> Workspace | None:
+    """The workspace called `name`; lock: hold it until the transaction ends."""
+    return session.scalar(_named(name).with_for_update() if lock else _named(name))
+
+
+def every(session: Session) -> list[Workspace]:
+    """All workspaces by name."""
+    return list(session.scalars(select(Workspace).order_by(Workspace.name)))
+
+
+def counts(session: Session) -> dict[int, tuple[int, int]]:
+    """Workspace number -> (members, studies)."""
+    of_members = select(WorkspaceMember.workspace_id, func.count()).group_by(WorkspaceMember.workspace_id)
+    of_studies = select(Study.workspace_id, func.count()).group_by(Study.workspace_id)
+    members = {number: counted for number, counted in session.execute(of_members) if counted}
+    studies = {number: counted for number, counted in session.execute(of_studies) if number is not None}
+    return {one: (members.get(one, 0), studies.get(one, 0)) for one in members.keys() | studies.keys()}
+
+
+def members(session: Session, workspace: Workspace) -> list[tuple[Account, Role]]:
+    """The people of a workspace by name."""
+    query = select(Account, WorkspaceMember.role).join(WorkspaceMember)
+    rows = session.execute(query.where(WorkspaceMember.workspace_id == workspace.id).order_by(Account.name))
+    return [(account, ROLES[ROLES.index(role)]) for account, role in rows]
+
+
+def account_called(session: Session, name: str) -> Account | None:
+    """The account of this name, letters small or large."""
+    return session.scalar(select(Account).where(func.lower(Account.name) == name.lower()))
+
+
+def set_member(session: Session, workspace: Workspace, account: Account, role: Role) -> None:
+    """Take somebody in, or change her role."""
+    known = session.get(WorkspaceMember, (workspace.id, account.id))
+    if known is None:
+        session.add(WorkspaceMember(workspace_id=workspace.id, account_id=account.id, role=role))
+    else:
+        known.role = role
+    session.flush()
+
+
+def remove_member(session: Session, workspace: Workspace, account: Account) -> bool:
+    """Take somebody out; False where she was not in it."""
+    known = session.get(WorkspaceMember, (workspace.id, account.id))
+    if known is None:
+        return False
+    session.delete(known)
+    session.flush()
+    return True
+
+
+def number_of_owners(session: Session, workspace: Workspace) -> int:
+    """How many owners can still sign in."""
+    query = select(func.count()).select_from(WorkspaceMember).join(Account)
+    query = query.where(WorkspaceMember.workspace_id == workspace.id, WorkspaceMember.role == "owner")
+    return session.scalar(query.where(Account.disabled_at.is_(None))) or 0
+
+
+def grants(session: Session, study: Study) -> dict[str, list[Right]]:
+    """Account name -> its grants on a study."""
+    query = select(Account.name, StudyGrant.granted).join(StudyGrant).where(StudyGrant.study_id == study.id)
+    listed: dict[str, list[Right]] = {}
+    for name, word in session.execute(query.order_by(Account.name)):
+        listed.setdefault(name, []).append(RIGHTS[RIGHTS.index(word)])
+    return {name: [one for one in RIGHTS if one in given] for name, given in listed.items()}
+
+
+def set_grants(
+    session: Session, study: Study, account: Account, rights: Iterable[Right], by: int | None
+) -> None:
+    """Give an account exactly these rights on a study, beside those of its role."""
+    session.execute(
+        delete(StudyGrant).where(StudyGrant.study_id == study.id, StudyGrant.account_id == account.id)
+    )
+    for right in sorted(set(rights)):
+        session.add(StudyGrant(study_id=study.id, account_id=account.id, granted=right, granted_by=by))
+    session.flush()

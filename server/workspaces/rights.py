@@ -1,0 +1,46 @@
+"""What somebody may do with a study: five rights, from the role in its workspace and from grants.
+
+view: the study, its progress and its results, no single person.
+run: links, status, settings, exclusions, reports.
+edit: versions, deletion of drafts, erasure of persons.
+export: downloads, and the answers of single persons.
+own: recruiters' ids, grants, the workspace a study belongs to; whoever owns a study may do all of it.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from server.errors import ApiError
+from server.models import RIGHTS, Right, Role
+
+OF_ROLE: Final[dict[Role, frozenset[Right]]] = {
+    "viewer": frozenset({"view", "export"}),
+    "experimenter": frozenset({"view", "run", "edit", "export"}),
+    "owner": frozenset(RIGHTS),
+}
+"""What a role in a workspace lets somebody do with its studies."""
+MAKING_STUDIES: Final[tuple[Role, ...]] = ("experimenter", "owner")
+"""The roles that may make studies in a workspace."""
+
+
+class SecondFactorNeeded(ApiError):
+    """The workspace opens only to who signed in with a second factor."""
+
+    status = 403
+    code = "second_factor_needed"
+
+
+def effective(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:
+    """The rights on a study of one with this role in its workspace and these grants.
+
+    >>> sorted(effective(None, ["run"]))
+    ['run', 'view']
+    >>> effective("viewer", ["own"]) == frozenset(RIGHTS)
+    True
+    >>> effective(None, [])
+    frozenset()
+    """
+    rights = (OF_ROLE[role] if role is not None else frozenset[Right]()) | frozenset(granted)
+    if "own" in rights:
+        return frozenset(RIGHTS)
+    return rights | {"view"} if rights else rights

@@ -1,0 +1,174 @@
+"""The rules of workspaces: who may put a study where, who manages members and grants."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sqlalchemy.orm import Session
+
+from experiments.errors import did_you_mean
+from server.accounts.audit import record
+from server.accounts.identity import Identity, NotAllowed, Operator
+from server.errors import Conflict, Invalid, NotFound
+from server.models import DEFAULT_WORKSPACE, RIGHTS, Account, Right, Role, Study, Workspace
+from server.workspaces import repository
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an account belongs, and as what."""
+
+    workspace: Workspace
+    role: Role
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a study belongs, and what the one who asks may do with it."""
+
+    workspace: str
+    rights: list[Right]
+
+
+def standing_of(session: Session, studies: Sequence[Study], who: Identity) -> dict[int, Standing]:
+    """Study number -> its workspace and her rights."""
+    names = {workspace.id: workspace.name for workspace in repository.every(session)}
+    rights = repository.rights_on(session, studies, who)
+    return {
+        study.id: Standing(
+            names.get(study.workspace_id or 0, ""), [one for one in RIGHTS if one in rights[study.id]]
+        )
+        for study in studies
+    }
+
+
+def find_workspace(session: Session, name: str, *, lock: bool = False) -> Workspace:
+    """The workspace called `name`, for whoever manages the server."""
+    workspace = repository.find(session, name, lock=lock)
+    if workspace is None:
+        if name == DEFAULT_WORKSPACE:
+            return repository.default_workspace(session)
+        names = [one.name for one in repository.every(session)]
+        raise NotFound(f"There is no workspace '{name[:60]}'{did_you_mean(name, names)}")
+    return workspace
+
+
+def workspace_for(session: Session, who: Identity, name: str | None) -> Workspace:
+    """Where a new study goes: the workspace named, or the only one (else the default one) she may use."""
+    open_ones = {one.name: one for one in repository.workspaces_for_new_studies(session, who)}
+    if not open_ones:
+        raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
+    if name is not None:
+        if name not in open_ones:
+            raise NotFound(f"There is no workspace '{name[:60]}' in which you may make studies.")
+        return open_ones[name]
+    if len(open_ones) == 1:
+        return next(iter(open_ones.values()))
+    if DEFAULT_WORKSPACE in open_ones:
+        return open_ones[DEFAULT_WORKSPACE]
+    raise Invalid(f"Say in which workspace: {', '.join(open_ones)}.")
+
+
+def place_of_copy(session: Session, study: Study, who: Identity) -> Workspace:
+    """Where a copy of a study goes: beside it where she may make studies there, else as `workspace_for`."""
+    own = {one.id: one for one in repository.workspaces_for_new_studies(session, who)}
+    return own.get(study.workspace_id or 0) or workspace_for(session, who, None)
+
+
+def managed(session: Session, name: str, who: Identity | Operator) -> Workspace:
+    """A workspace she may manage: her own, or any where she manages the server.
+
+    The row is held until the transaction ends, so that two owners do not take each other out at once.
+    """
+    if isinstance(who, Operator) or who.role == "owner":
+        return find_workspace(session, name, lock=True)
+    workspace = repository.find(session, name, lock=True)
+    role = repository.roles_of(session, who.account_id).get(workspace.id) if workspace is not None else None
+    if workspace is None or role is None:
+        raise NotFound(f"There is no workspace '{name[:60]}'.")
+    if role != "owner":
+        raise NotAllowed(f"This needs the role owner in the workspace '{name}'; yours is {role}.")
+    if workspace.second_factor_required and not who.second_factor:
+        raise NotAllowed(f"The workspace '{name}' asks for a second factor; set one up under My account.")
+    return workspace
+
+
+def create(session: Session, name: str, title: str, who: Identity | Operator) -> Workspace:
+    """Make a workspace; the account that makes it owns it."""
+    if repository.find(session, name) is not None:
+        raise Conflict(f"There is already a workspace called '{name}'; choose another name.")
+    author = who if isinstance(who, Identity) else None
+    workspace = Workspace(name=name, title=title, created_by=author.account_id if author else None)
+    session.add(workspace)
+    session.flush()
+    record(session, author, "workspace made", "workspace", name)
+    if author is not None:
+        account = session.get(Account, author.account_id)
+        if account is not None:
+            repository.set_member(session, workspace, account, "owner")
+    return workspace
+
+
+def change(
+    session: Session, workspace: Workspace, title: str, second_factor_required: bool, who: Identity
+) -> None:
+    """Give a workspace another title, or ask its people for a second factor."""
+    if second_factor_required and not who.second_factor:
+        raise Conflict("Set up a second factor of your own first, or you would shut yourself out.")
+    workspace.title, workspace.second_factor_required = title, second_factor_required
+    record(
+        session, who, "workspace changed", "workspace", workspace.name,
+        title=title, second_factor_required=second_factor_required,
+    )  # fmt: skip
+
+
+def delete(session: Session, workspace: Workspace, who: Identity) -> None:
+    """Remove a workspace that holds no study."""
+    if repository.counts(session).get(workspace.id, (0, 0))[1]:
+        raise Conflict("The workspace holds studies; move them to another one first.")
+    if workspace.name == DEFAULT_WORKSPACE:
+        raise Conflict("The default workspace stays; give it another title if you like.")
+    record(session, who, "workspace deleted", "workspace", workspace.name)
+    session.delete(workspace)
+
+
+def account_named(session: Session, name: str) -> Account:
+    """The account of this name; NotFound where there is none (names are not guessed at)."""
+    account = repository.account_called(session, name)
+    if account is None:
+        raise NotFound(f"There is no account '{name[:100]}'; invite the person first.")
+    return account
+
+
+def set_member(
+    session: Session, workspace: Workspace, name: str, role: Role | None, who: Identity | Operator
+) -> None:
+    """Take somebody into a workspace, change her role, or (None) take her out; one owner must remain."""
+    account = account_named(session, name)
+    owners = repository.number_of_owners(session, workspace)
+    if role is not None:
+        repository.set_member(session, workspace, account, role)
+    elif not repository.remove_member(session, workspace, account):
+        raise NotFound(f"'{name[:100]}' does not belong to the workspace '{workspace.name}'.")
+    if owners and not repository.number_of_owners(session, workspace):
+        raise Conflict("One owner must remain; make another member an owner first.")
+    action = "member removed" if role is None else "member set"
+    author = who if isinstance(who, Identity) else None
+    record(session, author, action, "workspace", workspace.name, account=account.name, role=role)
+
+
+def grant(
+    session: Session, study: Study, name: str, rights: Sequence[Right], who: Identity | Operator
+) -> None:
+    """Give somebody exactly these rights on a study beside those of her role; none takes them all back."""
+    account = account_named(session, name)
+    author = who if isinstance(who, Identity) else None
+    repository.set_grants(session, study, account, rights, author.account_id if author else None)
+    given = [one for one in RIGHTS if one in rights]
+    record(session, author, "rights granted", "study", study.name, account=account.name, rights=given)
+
+
+def move(session: Session, study: Study, workspace: Workspace, who: Identity | Operator) -> None:
+    """Put a study into another workspace; grants stay."""
+    study.workspace_id = workspace.id
+    author = who if isinstance(who, Identity) else None
+    record(session, author, "study moved", "study", study.name, workspace=workspace.name)

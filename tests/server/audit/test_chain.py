@@ -1,0 +1,177 @@
+"""The audit log's chain: whole, broken at each place, under many hands at once, and beside erasures."""
+
+import json
+import socket
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from sqlalchemy import text
+
+from server.accounts.audit import record
+from server.audit import repository
+from server.audit.cli import _lines
+from server.audit.verify import Verdict, verify
+from server.context import Services, open_services
+from server.db import open_database
+from tests.helpers.admins import Admin
+from tests.helpers.studies import Participant, StudyInDatabase
+
+
+def verdict(services: Services, kept: tuple[int, str] | None = None) -> Verdict:
+    with services.database.read() as session:
+        return verify(session, services.settings.key, kept)
+
+
+def write_three(services: Services) -> None:
+    for number in range(3):
+        with services.database.write() as session:
+            record(session, None, "study created", "study", f"s{number}", note=f"n{number}", number=number)
+
+
+def change(services: Services, statement: str, **values: Any) -> None:
+    with services.database.write() as session:
+        session.execute(text(statement), values)
+
+
+def test_entries_are_chained_in_the_order_of_their_commits(services: Services) -> None:
+    write_three(services)
+    found = verdict(services)
+    assert (found.position, found.erased, found.before, found.broken) == (3, 0, 0, None)
+    with services.database.write() as session:
+        for action in ("a", "b"):
+            record(session, None, action)
+    assert verdict(services).position == 5
+    assert verdict(services, (found.position, found.hash)).broken is None
+
+
+@pytest.mark.parametrize(
+    ("statement", "said"),
+    [
+        ("UPDATE audit_entries SET actor = 'somebody' WHERE position = 2", "entry 2"),
+        ("UPDATE audit_entries SET action = 'x' WHERE position = 2", "entry 2"),
+        ("UPDATE audit_entries SET target = 'other' WHERE position = 2", "entry 2"),
+        ("UPDATE audit_entries SET target_kind = 'run' WHERE position = 2", "entry 2"),
+        ("UPDATE audit_entries SET at = '2020-01-01 00:00:00' WHERE position = 2", "entry 2"),
+        ('UPDATE audit_entries SET details = \'{"note": "x"}\' WHERE position = 2', "details were changed"),
+        (
+            "UPDATE audit_entries SET details_salt = NULL WHERE position = 2",
+            "no erasure of a person says why",
+        ),
+        ("UPDATE audit_entries SET chain_hash = details_digest WHERE position = 2", "entry 2"),
+        ("DELETE FROM audit_entries WHERE position = 2", "entry 2 is missing"),
+        ("UPDATE audit_entries SET position = NULL WHERE position = 3", "put in"),
+        ("UPDATE audit_entries SET position = 9 WHERE position = 3", "entry 3 is missing"),
+    ],
+)
+def test_the_first_entry_that_was_tampered_with_is_named(
+    services: Services, statement: str, said: str
+) -> None:
+    write_three(services)
+    change(services, statement)
+    broken = verdict(services).broken
+    assert broken is not None
+    assert said in broken
+    assert "\n" not in broken
+
+
+def test_another_key_does_not_make_the_same_chain(services: Services) -> None:
+    write_three(services)
+    with services.database.read() as session:
+        broken = verify(session, b"another key").broken
+    assert broken is not None
+    assert "entry 1 " in broken
+
+
+def test_entries_that_were_cut_off_are_missed_where_the_head_was_kept(services: Services) -> None:
+    write_three(services)
+    head = verdict(services)
+    change(services, "DELETE FROM audit_entries WHERE position = 3")
+    assert verdict(services).broken is None
+    broken = verdict(services, (head.position, head.hash)).broken
+    assert broken is not None
+    assert "changed or cut off" in broken
+
+
+def test_many_at_once_make_one_chain(services: Services) -> None:
+    others = [open_database(services.settings) for _ in range(2)]  # as two more workers
+
+    def write(number: int) -> None:
+        with others[number % 2].write() as session:
+            record(session, None, "busy", "study", str(number))
+            record(session, None, "busy again", "study", str(number))
+
+    with ThreadPoolExecutor(8) as threads:
+        list(threads.map(write, range(40)))
+    for database in others:
+        database.close()
+    found = verdict(services)
+    assert (found.position, found.broken) == (80, None)
+
+
+def test_what_was_written_before_there_was_a_chain_stays_outside_it(services: Services) -> None:
+    change(
+        services,
+        "INSERT INTO audit_entries (at, actor, action, target_kind, target, details) "
+        "VALUES ('2025-01-01 00:00:00', 'ada', 'study created', 'study', 'old', '{}')",
+    )
+    write_three(services)
+    found = verdict(services)
+    assert (found.position, found.before, found.broken) == (3, 1, None)
+
+
+def test_an_erased_person_leaves_the_chain_whole(
+    services: Services, owner: Admin, participant: Participant
+) -> None:
+    participant.agree()
+    run = participant.run_id
+    path = f"/studies/short/runs/{run}"
+    assert owner.send("PUT", f"{path}/exclusion", {"reason": "Mrs Miller slept"}).status_code == 204
+    assert owner.send("POST", f"{path}/erase", {"confirm": run}).status_code == 200
+    found = verdict(services)
+    assert (found.erased, found.broken) == (1, None)
+    with services.database.read() as session:
+        assert not [entry for entry in repository.chained(session) if "Miller" in str(entry.details)]
+
+
+def test_looks_at_persons_and_downloads_are_in_the_log(
+    owner: Admin, study: StudyInDatabase, participant: Participant
+) -> None:
+    participant.agree()
+    owner.get("/studies/short/runs")
+    owner.get(f"/studies/short/runs/{participant.run_id}")
+    owner.get(f"/studies/short/runs/{participant.run_id}/identity")
+    owner.get("/studies/short/data/ratings.csv")
+    owner.get("/studies/short/links/personal.csv")
+    actions = [row["action"] for row in owner.get("/audit").json()][:5]
+    assert actions == [
+        "personal links downloaded",
+        "data downloaded",
+        "identity read",
+        "personal data read",
+        "participants listed",
+    ]
+
+
+def test_the_export_ends_with_the_chains_head(services: Services) -> None:
+    write_three(services)
+    lines = [json.loads(line) for line in _lines(services, 1)]
+    head = verdict(services)
+    assert [line["position"] for line in lines[:-1]] == [2, 3]
+    assert lines[-1] == {"complete": True, "entries": 2, "head": f"{head.position}:{head.hash}"}
+
+
+def test_syslog_gets_each_entry_after_its_commit_without_details(services: Services) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(10)
+        port = listener.getsockname()[1]
+        settings = services.settings.model_copy(update={"audit_syslog": f"127.0.0.1:{port}"})
+        told = open_services(settings)
+        with told.database.write() as session:
+            record(session, None, "study created", "study", "s", note="not for syslog")
+        sent = listener.recv(4096).decode()
+        told.database.close()
+    assert '"action": "study created"' in sent
+    assert verdict(services).hash in sent
+    assert "not for syslog" not in sent
