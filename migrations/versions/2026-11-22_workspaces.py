@@ -74,7 +74,7 @@ def upgrade() -> None:
     for change in (
         "studies ADD COLUMN workspace_id INTEGER CONSTRAINT fk_studies_workspace_id REFERENCES workspaces (id)",
         "invitations ADD COLUMN workspace_id INTEGER CONSTRAINT fk_invitations_workspace_id "
-        "REFERENCES workspaces (id) ON DELETE CASCADE",
+        "REFERENCES workspaces (id)",
         "invitations ADD COLUMN workspace_role VARCHAR(20)",
     ):
         op.execute(f"ALTER TABLE {change}")

@@ -5,6 +5,7 @@ from typing import Any, Literal
 from sqlalchemy.orm import Session
 
 from server.accounts.identity import Identity
+from server.audit import repository
 from server.audit.sealing import join_at_commit
 from server.clock import now
 from server.models import AuditEntry
@@ -37,3 +38,8 @@ def record(
     )
     session.add(entry)
     join_at_commit(session, entry)
+
+
+def latest(session: Session, before: int | None, limit: int) -> list[AuditEntry]:
+    """The latest entries with a number below `before`, newest first."""
+    return repository.latest(session, before, limit)

@@ -35,7 +35,7 @@ from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.models import Account, AdminSession, ApiToken
 from server.tokens import hash_token, new_token
-from server.workspaces.repository import workspaces_of
+from server.workspaces.service import own_workspaces
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
 DEVICE_DAYS = 365
@@ -99,7 +99,7 @@ def _me(session: Session, account: Account, *, second_factor: bool) -> Me:
             role=role,
             second_factor_needed=workspace.second_factor_required and not second_factor,
         )
-        for workspace, role in workspaces_of(session, account.id)
+        for workspace, role in own_workspaces(session, account.id)
     ]
     return Me(account=account_out(account), workspaces=belongs, accounts_exist=True)
 

@@ -16,7 +16,6 @@ from server.accounts.schemas import (
     NewInvitation,
     NewInvitationOut,
 )
-from server.audit import repository as audit_repository
 from server.clock import now
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
@@ -81,4 +80,4 @@ def list_audit(
 ) -> list[AuditOut]:
     """The audit log, newest first; `before` pages on."""
     with services.database.read() as session:
-        return [AuditOut.model_validate(row) for row in audit_repository.latest(session, before, limit)]
+        return [AuditOut.model_validate(row) for row in audit.latest(session, before, limit)]

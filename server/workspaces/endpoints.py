@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from server.accounts.identity import Founder, Myself, Owner
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
-from server.workspaces import repository, service
+from server.workspaces import service
 from server.workspaces.schemas import ChangeWorkspace, MemberOut, NewWorkspace, SetMember, WorkspaceOut
 
 router = APIRouter(prefix="/api/admin/workspaces", tags=["workspaces"], responses=ERROR_RESPONSES)
@@ -15,19 +15,7 @@ router = APIRouter(prefix="/api/admin/workspaces", tags=["workspaces"], response
 def list_workspaces(services: ServicesDep, who: Myself) -> list[WorkspaceOut]:
     """The workspaces one belongs to; all of them for who manages the server."""
     with services.database.read() as session:
-        roles, counts = repository.roles_of(session, who.account_id), repository.counts(session)
-        return [
-            WorkspaceOut(
-                name=one.name,
-                title=one.title,
-                second_factor_required=one.second_factor_required,
-                role=roles.get(one.id),
-                members=counts.get(one.id, (0, 0))[0],
-                studies=counts.get(one.id, (0, 0))[1],
-            )
-            for one in repository.every(session)
-            if one.id in roles or who.role == "owner"
-        ]
+        return service.listed(session, who)
 
 
 @router.post("", status_code=201)
@@ -57,15 +45,7 @@ def delete_workspace(services: ServicesDep, who: Owner, workspace: str) -> None:
 def list_members(services: ServicesDep, who: Myself, workspace: str) -> list[MemberOut]:
     """Who belongs to a workspace; for its owners."""
     with services.database.write() as session:
-        return [
-            MemberOut(
-                account=account.name,
-                role=role,
-                second_factor=account.totp_confirmed_at is not None,
-                disabled=account.disabled_at is not None,
-            )
-            for account, role in repository.members(session, service.managed(session, workspace, who))
-        ]
+        return service.members(session, service.managed(session, workspace, who))
 
 
 @router.put("/{workspace}/members/{account}", status_code=204)

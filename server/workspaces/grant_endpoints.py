@@ -6,7 +6,7 @@ from server.accounts.identity import Myself
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.studies.lookup import find_study
-from server.workspaces import repository, service
+from server.workspaces import service
 from server.workspaces.schemas import GrantOut, MoveStudy, SetGrant
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["workspaces"], responses=ERROR_RESPONSES)
@@ -16,9 +16,7 @@ router = APIRouter(prefix="/api/admin/studies/{study}", tags=["workspaces"], res
 def list_grants(services: ServicesDep, who: Myself, study: str) -> list[GrantOut]:
     """The rights granted on a study."""
     with services.database.read() as session:
-        found = find_study(session, study, who, "own")
-        given = repository.grants(session, found)
-        return [GrantOut(account=name, rights=rights) for name, rights in given.items()]
+        return service.grants_on(session, find_study(session, study, who, "own"))
 
 
 @router.put("/grants/{account}", status_code=204)

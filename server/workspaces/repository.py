@@ -12,6 +12,7 @@ from server.models import (
     RIGHTS,
     ROLES,
     Account,
+    Invitation,
     Right,
     Role,
     Study,
@@ -144,6 +145,17 @@ def members(session: Session, workspace: Workspace) -> list[tuple[Account, Role]
 def account_called(session: Session, name: str) -> Account | None:
     """The account of this name, letters small or large."""
     return session.scalar(select(Account).where(func.lower(Account.name) == name.lower()))
+
+
+def account_numbered(session: Session, number: int) -> Account | None:
+    """The account of this number."""
+    return session.get(Account, number)
+
+
+def delete_workspace(session: Session, workspace: Workspace) -> None:
+    """Delete a workspace without studies, and the invitations into it."""
+    session.execute(delete(Invitation).where(Invitation.workspace_id == workspace.id))
+    session.delete(workspace)
 
 
 def set_member(session: Session, workspace: Workspace, account: Account, role: Role) -> None:

@@ -11,6 +11,7 @@ from server.accounts.identity import Identity, NotAllowed, Operator
 from server.errors import Conflict, Invalid, NotFound
 from server.models import DEFAULT_WORKSPACE, RIGHTS, Account, Right, Role, Study, Workspace
 from server.workspaces import repository
+from server.workspaces.schemas import GrantOut, MemberOut, WorkspaceOut
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,47 @@ def place_of_copy(session: Session, study: Study, who: Identity) -> Workspace:
     return own.get(study.workspace_id or 0) or workspace_for(session, who, None)
 
 
+def own_workspaces(session: Session, account_id: int) -> list[tuple[Workspace, Role]]:
+    """The workspaces an account belongs to, by name, with its role in each."""
+    return repository.workspaces_of(session, account_id)
+
+
+def listed(session: Session, who: Identity) -> list[WorkspaceOut]:
+    """The workspaces she belongs to; all of them where she manages the server."""
+    roles, counts = repository.roles_of(session, who.account_id), repository.counts(session)
+    return [
+        WorkspaceOut(
+            name=one.name,
+            title=one.title,
+            second_factor_required=one.second_factor_required,
+            role=roles.get(one.id),
+            members=counts.get(one.id, (0, 0))[0],
+            studies=counts.get(one.id, (0, 0))[1],
+        )
+        for one in repository.every(session)
+        if one.id in roles or who.role == "owner"
+    ]
+
+
+def members(session: Session, workspace: Workspace) -> list[MemberOut]:
+    """Who belongs to a workspace."""
+    return [
+        MemberOut(
+            account=account.name,
+            role=role,
+            second_factor=account.totp_confirmed_at is not None,
+            disabled=account.disabled_at is not None,
+        )
+        for account, role in repository.members(session, workspace)
+    ]
+
+
+def grants_on(session: Session, study: Study) -> list[GrantOut]:
+    """The rights granted on a study."""
+    given = repository.grants(session, study)
+    return [GrantOut(account=name, rights=rights) for name, rights in given.items()]
+
+
 def managed(session: Session, name: str, who: Identity | Operator) -> Workspace:
     """A workspace she may manage: her own, or any where she manages the server.
 
@@ -102,7 +144,7 @@ def create(session: Session, name: str, title: str, who: Identity | Operator) ->
     session.flush()
     record(session, author, "workspace made", "workspace", name)
     if author is not None:
-        account = session.get(Account, author.account_id)
+        account = repository.account_numbered(session, author.account_id)
         if account is not None:
             repository.set_member(session, workspace, account, "owner")
     return workspace
@@ -128,7 +170,7 @@ def delete(session: Session, workspace: Workspace, who: Identity) -> None:
     if workspace.name == DEFAULT_WORKSPACE:
         raise Conflict("The default workspace stays; give it another title if you like.")
     record(session, who, "workspace deleted", "workspace", workspace.name)
-    session.delete(workspace)
+    repository.delete_workspace(session, workspace)
 
 
 def account_named(session: Session, name: str) -> Account:

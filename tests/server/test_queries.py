@@ -13,7 +13,6 @@ CALLED_TO_RUN_ONE = {"execute", "scalar", "scalars", "query", "get_one", "exec_d
 BEGINS_TRANSACTIONS = {"db.py": {"exec_driver_sql"}}
 """BEGIN and BEGIN IMMEDIATE, which are no queries."""
 REMAINING = {
-    "accounts/audit.py",
     "accounts/endpoints.py",
     "accounts/identity.py",
     "accounts/people.py",

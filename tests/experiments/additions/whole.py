@@ -13,6 +13,7 @@ from analysis.plans.plan import plan_of
 from analysis.plans.prepare import study_contents
 from analysis.read.study_answers import load_csv
 from analysis.report.write import write_report
+from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import open_services
 from server.export.formats import FORMATS
@@ -59,7 +60,7 @@ def main(folder: Path) -> dict[str, Any]:
         for seed in range(3):
             assert Person(Api(client), Rater(seed, 1, {})).take_part(link)  # type: ignore[arg-type]
     with services.database.read() as session:
-        stored = find_study(session, "short")
+        stored = find_study(session, "short", OPERATOR, "view")
         table = b"".join(FORMATS["csv"](session, stored, "simulated"))
         runs = b"".join(FORMATS["runs"](session, stored, "simulated")).decode()
         codebook = b"".join(FORMATS["codebook"](session, stored, "all")).decode()

@@ -19,6 +19,7 @@ from experiments.capsule.opening import CapsuleError, open_capsule
 from experiments.errors import InputError
 from experiments.load import FOLDER
 from experiments.seal import deviations, read_clips_sha256, read_seal
+from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.capsules.build import Wanted, _without_answers, build_capsule
 from server.context import Services, open_services
@@ -50,7 +51,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory, sqlite_template: Path) -> I
     text = (FOLDER / "exp3.toml").read_text(encoding="utf-8") + CREDIT
     study = add_study(services, folder / "clips", text)
     with services.database.write() as session:
-        seal_plan(session, find_study(session, "exp3"), None, None)
+        seal_plan(session, find_study(session, "exp3", OPERATOR, "view"), None, None)
     app = create_app(services.settings)
     app.state.services = services
     with TestClient(app) as client:

@@ -19,6 +19,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.load import parse_experiment
+from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.studies.importing import add_version, store_clips
 from server.studies.lookup import find_study
@@ -71,7 +72,9 @@ def dataset_of_two_versions(viewer: Admin, client: TestClient, services: Service
     manifest = make_clip_folder(experiment, tmp_path / "more")
     store_clips(services.clips, manifest, tmp_path / "more")
     with services.database.write() as session:
-        add_version(session, find_study(session, "short"), second, experiment, manifest, None)
+        add_version(
+            session, find_study(session, "short", OPERATOR, "view"), second, experiment, manifest, None
+        )
     Participant(client, study.link_token).agree().rate_all()
     return exported(viewer, tmp_path)
 

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import text
 
+from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.methods.paragraph import Methods
 from server.methods.repository import Number
@@ -72,7 +73,9 @@ def test_a_report_adds_what_each_declared_rule_left_out(
     trials = [{"rule": "slow_trials", "trials": 9, "participants": 2}]
     results = {"exclusions": {"runs": runs, "trials": trials}}
     with services.database.read() as session:
-        found = methods_of(session, find_study(session, "short"), "participant", None, results)
+        found = methods_of(
+            session, find_study(session, "short", OPERATOR, "view"), "participant", None, results
+        )
     assert "visits by attention checks failed: 2; trials by slow trials: 9" in found.plain()
     assert json.loads(found.json())["paragraph"] == found.plain()
 

@@ -12,6 +12,7 @@ from analysis.cli import app as analysis
 from experiments.errors import InputError
 from experiments.load import load_experiment, parse_experiment
 from experiments.seal import deviations, read_seal
+from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.errors import Conflict
 from server.seals.page import page
@@ -28,19 +29,19 @@ def test_a_plan_is_sealed_once_before_the_first_participant(
     services: Services, study: StudyInDatabase, client: TestClient
 ) -> None:
     with services.database.write() as session:
-        sealed = seal_plan(session, find_study(session, "short"), None, POWER)
+        sealed = seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, POWER)
     assert sealed.power == POWER
     assert sealed.experiment == study.experiment
     with services.database.write() as session:
-        assert seal_of(session, find_study(session, "short")) == sealed
+        assert seal_of(session, find_study(session, "short", OPERATOR, "view")) == sealed
         with pytest.raises(Conflict, match="a seal is never replaced"):
-            seal_plan(session, find_study(session, "short"), None, None)
+            seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
 
 
 def test_after_the_first_participant_nothing_is_sealed(services: Services, participant: Participant) -> None:
     participant.agree()
     with services.database.write() as session, pytest.raises(Conflict, match="1 participants have begun"):
-        seal_plan(session, find_study(session, "short"), None, None)
+        seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
 
 
 def test_a_later_study_of_the_same_name_is_not_sealed_by_the_deleted_one(
@@ -48,13 +49,13 @@ def test_a_later_study_of_the_same_name_is_not_sealed_by_the_deleted_one(
 ) -> None:
     add_study(services, tmp_path / "clips", status="draft")
     with services.database.write() as session:
-        seal_plan(session, find_study(session, "short"), None, None)
+        seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
     assert experimenter.send("DELETE", "/studies/short").status_code == 204
     add_study(services, tmp_path / "again")
     with services.database.write() as session:
-        assert seal_of(session, find_study(session, "short")) is None
-        later = seal_plan(session, find_study(session, "short"), None, POWER)
-        assert seal_of(session, find_study(session, "short")) == later
+        assert seal_of(session, find_study(session, "short", OPERATOR, "view")) is None
+        later = seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, POWER)
+        assert seal_of(session, find_study(session, "short", OPERATOR, "view")) == later
 
 
 def test_a_plan_is_sealed_once_though_two_seal_it_together(
@@ -65,14 +66,14 @@ def test_a_plan_is_sealed_once_though_two_seal_it_together(
 
     def first() -> None:
         with services.database.write() as session:
-            seal_plan(session, find_study(session, study.name), None, POWER)
+            seal_plan(session, find_study(session, study.name, OPERATOR, "view"), None, POWER)
             session.flush()
             sealed.set()
             go_on.wait(30)
 
     def second() -> None:
         with services.database.write() as session:
-            seal_plan(session, find_study(session, study.name), None, None)
+            seal_plan(session, find_study(session, study.name, OPERATOR, "view"), None, None)
 
     with ThreadPoolExecutor(2) as pool:
         one = pool.submit(first)
@@ -89,7 +90,7 @@ def test_a_plan_is_sealed_once_though_two_seal_it_together(
 def test_what_differs_from_the_plan_is_named(services: Services, tmp_path: Path) -> None:
     add_study(services, tmp_path / "clips")
     with services.database.write() as session:
-        sealed = seal_plan(session, find_study(session, "short"), None, None)
+        sealed = seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
     later = SHORT.replace('rule = "attention_checks_failed"', 'rule = "incomplete"').replace(
         'consent = "Do you agree?"', 'consent = "Do you still agree?"'
     )
@@ -110,7 +111,7 @@ def test_what_differs_from_the_plan_is_named(services: Services, tmp_path: Path)
 def sealed_exp3(services: Services, tmp_path: Path) -> Path:
     add_study(services, tmp_path / "clips", load_text("exp3"))
     with services.database.write() as session:
-        sealed = seal_plan(session, find_study(session, "exp3"), None, None)
+        sealed = seal_plan(session, find_study(session, "exp3", OPERATOR, "view"), None, None)
     (tmp_path / "seal.json").write_text(sealed.text(), encoding="utf-8")
     return tmp_path / "seal.json"
 

@@ -189,7 +189,12 @@ def ask(who: Admin, endpoint: Endpoint, about: Any, addresses: dict[str, str], k
         for one in about.get("parameters", [])
         if one["in"] == "query" and one["required"]
     }
-    return who.client.request(method, path.format(**addresses), json=body, params=query)
+    words = {
+        one["name"]: one["schema"]["enum"][0]
+        for one in about.get("parameters", [])
+        if one["in"] == "path" and "enum" in one["schema"]
+    }
+    return who.client.request(method, path.format(**addresses | words), json=body, params=query)
 
 
 def names_in(path: str) -> list[str]:

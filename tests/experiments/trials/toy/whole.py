@@ -30,6 +30,7 @@ from analysis.read.study_answers import load_csv, load_database  # noqa: E402
 from analysis.report.write import write_report  # noqa: E402
 from experiments.schema.stored import load_stored  # noqa: E402
 from experiments.schema.upgrades import FORMAT  # noqa: E402
+from server.accounts.identity import OPERATOR
 from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402
 from server.export.formats import FORMATS  # noqa: E402
@@ -61,7 +62,7 @@ def main(folder: Path) -> dict[str, Any]:
             assert Person(Api(client), Rater(seed, 1, {})).take_part(link)  # type: ignore[arg-type]
     found: dict[str, Any] = {"plan": list(TOY.plan(study.experiment))}
     with services.database.read() as session:
-        stored = find_study(session, "short")
+        stored = find_study(session, "short", OPERATOR, "view")
         table = b"".join(FORMATS["csv"](session, stored, "simulated"))
         found["codebook"] = b"".join(FORMATS["codebook"](session, stored, "all")).decode()
         found["psych_ds"] = sum(map(len, FORMATS["psych-ds"](session, stored, "simulated")))
