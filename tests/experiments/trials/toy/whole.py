@@ -30,7 +30,7 @@ from analysis.read.study_answers import load_csv, load_database  # noqa: E402
 from analysis.report.write import write_report  # noqa: E402
 from experiments.schema.stored import load_stored  # noqa: E402
 from experiments.schema.upgrades import FORMAT  # noqa: E402
-from server.accounts.identity import OPERATOR
+from server.accounts.identity import OPERATOR  # noqa: E402
 from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402
 from server.export.formats import FORMATS  # noqa: E402
