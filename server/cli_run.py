@@ -12,6 +12,7 @@ import typer
 import uvicorn
 
 from experiments.errors import InputError
+from server.accounts import invitations
 from server.accounts import service as accounts
 from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
@@ -117,5 +118,5 @@ def _welcome(services: Services) -> None:
         first = not accounts.accounts_exist(session)
     out.print(f"admin site: {settings.public_url}/admin/")
     if first:
-        _, token = accounts.invite(services.database, "owner", "first owner", None)
+        _, token = invitations.invite(services.database, "owner", "first owner", None)
         out.print(f"make the first account (once): {invitation_url(settings.public_url, token)}")

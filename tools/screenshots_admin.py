@@ -72,12 +72,12 @@ def simulate(data: Path, key: str, address: str) -> None:
 
 
 def sign_in(page: Page, address: str, settings) -> None:  # type: ignore[no-untyped-def]
-    from server.accounts import service
+    from server.accounts import invitations
     from server.cli_common import migrated_services
     from tests.helpers.admins import PASSWORD
 
     with migrated_services(settings) as services:
-        _, token = service.invite(services.database, "owner", "", None)
+        _, token = invitations.invite(services.database, "owner", "", None)
     page.goto(f"{address}/admin/invitation#{token}")
     page.get_by_label("Name to sign in with").fill("ada")
     page.locator("input[autocomplete=new-password]").fill(PASSWORD)

@@ -6,7 +6,7 @@ import typer
 from rich.console import Console
 
 from experiments.errors import InputError
-from server.accounts import service
+from server.accounts import invitations, service
 from server.accounts.passwords import hash_password
 from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
@@ -66,7 +66,7 @@ def link(
     Example: server admin link --role experimenter --label "Ada"
     """
     settings = Settings()
-    _, token = service.invite(open_database(settings), _known(role), label, None)
+    _, token = invitations.invite(open_database(settings), _known(role), label, None)
     Console(soft_wrap=True).print(invitation_url(settings.public_url, token), highlight=False)
 
 

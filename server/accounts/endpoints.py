@@ -1,15 +1,12 @@
 """Endpoints of one's own account: signing in and out, sessions, password, second factor, tokens."""
 
-from datetime import timedelta
 from typing import Annotated
 
 from fastapi import APIRouter, Cookie, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from server.accounts import second_factor, service
-from server.accounts.audit import record
+from server.accounts import invitations, second_factor, service, tokens
 from server.accounts.identity import COOKIE, Identity, Myself, NotSignedIn, account_of, check_origin, identify
 from server.accounts.passwords import hash_password, password_fits
 from server.accounts.schemas import (
@@ -32,9 +29,8 @@ from server.accounts.schemas import (
 from server.accounts.throttle import DEVICE_COOKIE, known_device, new_device
 from server.clock import now
 from server.context import Services, ServicesDep
-from server.errors import ERROR_RESPONSES, NotFound
-from server.models import Account, AdminSession, ApiToken
-from server.tokens import hash_token, new_token
+from server.errors import ERROR_RESPONSES
+from server.models import Account
 from server.workspaces.service import own_workspaces
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
@@ -158,16 +154,16 @@ def address_of(request: Request) -> str:
 
 def _just_signed_in(services: Services, token: str) -> Me:
     with services.database.read() as session:
-        found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(token)))
-        if found is None:
+        signed_in = service.session_of(session, token)
+        if signed_in is None:
             return Me(account=None, accounts_exist=True)
-        return _me(session, found.account, second_factor=found.second_factor)
+        return _me(session, signed_in.account, second_factor=signed_in.second_factor)
 
 
 @router.delete("/session", status_code=204)
 def sign_out(services: ServicesDep, me: Myself, response: Response) -> None:
     """End this session."""
-    _revoke_session(services, me, me.session_id)
+    tokens.revoke_session(services.database, me, me.session_id)
     response.delete_cookie(COOKIE, path="/api/admin")
 
 
@@ -175,7 +171,7 @@ def sign_out(services: ServicesDep, me: Myself, response: Response) -> None:
 def get_invitation(services: ServicesDep, token: str) -> InvitationState:
     """Whether a one-time link still works, and as what."""
     with services.database.read() as session:
-        found = service.find_invitation(session, token)
+        found = invitations.find_invitation(session, token)
         expired = "expired" if found.expires_at <= now() else "open"
         return InvitationState.model_validate(
             {"role": found.role, "status": "used" if found.used_at else expired}
@@ -196,9 +192,11 @@ async def accept_invitation(
     services.sign_ins.enter(
         services.sign_ins.key(body.name, address_of(request), None), address_of(request), None
     )
-    await run_in_threadpool(service.check_invitation, services, token)
+    await run_in_threadpool(invitations.check_invitation, services, token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, body.name))
-    cookie = await run_in_threadpool(service.accept_invitation, services, token, body.name, fresh, user_agent)
+    cookie = await run_in_threadpool(
+        invitations.accept_invitation, services, token, body.name, fresh, user_agent
+    )
     _set_cookie(response, services, cookie)
     _set_device(response, services, body.name)
     return await run_in_threadpool(_just_signed_in, services, cookie)
@@ -217,23 +215,14 @@ def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
                 last_seen_at=row.last_seen_at,
                 expires_at=row.expires_at,
             )
-            for row in service.open_sessions(session, me)
+            for row in tokens.open_sessions(session, me)
         ]
 
 
 @router.delete("/sessions/{session_id}", status_code=204)
 def revoke_session(services: ServicesDep, me: Myself, session_id: int) -> None:
     """Sign another of one's own browsers out."""
-    _revoke_session(services, me, session_id)
-
-
-def _revoke_session(services: Services, me: Identity, session_id: int | None) -> None:
-    with services.database.write() as session:
-        row = session.get(AdminSession, session_id)
-        if row is None or row.account_id != me.account_id:
-            raise NotFound("There is no such session.")
-        row.revoked_at = row.revoked_at or now()
-        record(session, me, "session ended", "session", str(session_id))
+    tokens.revoke_session(services.database, me, session_id)
 
 
 @router.put("/password", status_code=204)
@@ -282,34 +271,18 @@ async def remove_second_factor(services: ServicesDep, me: Myself, body: ConfirmP
 def list_tokens(services: ServicesDep, me: Myself) -> list[TokenOut]:
     """One's own API tokens."""
     with services.database.read() as session:
-        query = select(ApiToken).where(ApiToken.account_id == me.account_id, ApiToken.revoked_at.is_(None))
-        return [TokenOut.model_validate(row) for row in session.scalars(query.order_by(ApiToken.id))]
+        return [TokenOut.model_validate(row) for row in tokens.open_tokens(session, me)]
 
 
 @router.post("/tokens", status_code=201)
 def create_token(services: ServicesDep, me: Myself, body: NewToken) -> NewTokenOut:
     """Make an API token; its secret is shown this once. It can do no more than the account."""
-    secret = new_token()
     with services.database.write() as session:
-        row = ApiToken(
-            account_id=me.account_id,
-            name=body.name,
-            token_hash=hash_token(secret),
-            scopes=sorted(set(body.scopes)),
-            expires_at=now() + timedelta(days=body.days) if body.days else None,
-        )
-        session.add(row)
-        session.flush()
-        record(session, me, "token created", "token", body.name, scopes=row.scopes)
+        row, secret = tokens.create_token(session, me, body.name, list(body.scopes), body.days)
         return NewTokenOut(**TokenOut.model_validate(row).model_dump(), token=secret)
 
 
 @router.delete("/tokens/{token_id}", status_code=204)
 def revoke_token(services: ServicesDep, me: Myself, token_id: int) -> None:
     """Revoke one's own API token."""
-    with services.database.write() as session:
-        row = session.get(ApiToken, token_id)
-        if row is None or row.account_id != me.account_id:
-            raise NotFound("There is no such token.")
-        row.revoked_at = row.revoked_at or now()
-        record(session, me, "token revoked", "token", row.name)
+    tokens.revoke_token(services.database, me, token_id)

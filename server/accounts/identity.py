@@ -7,13 +7,13 @@ from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
 from fastapi.security import APIKeyCookie, HTTPBearer
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from server.accounts import repository
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ApiError
-from server.models import ROLES, Account, AdminSession, ApiToken, Role
+from server.models import ROLES, Account, Role
 from server.tokens import hash_token
 
 Scope = Literal["read", "personal", "write", "export"]
@@ -93,44 +93,45 @@ def identify(request: Request, services: Services) -> Identity:
 
 def _by_cookie(services: Services, cookie: str) -> Identity:
     with services.database.read() as session:
-        found = session.scalar(select(AdminSession).where(AdminSession.token_hash == hash_token(cookie)))
-        if found is None or found.revoked_at or found.expires_at <= now() or found.account.disabled_at:
+        signed_in = repository.session_by_token(session, hash_token(cookie))
+        ended = signed_in is not None and (signed_in.revoked_at or signed_in.expires_at <= now())
+        if signed_in is None or ended or signed_in.account.disabled_at:
             raise NotSignedIn("Your session has ended; please sign in again.")
-        account = found.account
+        account = signed_in.account
         identity = Identity(
             account.id,
             account.name,
             account.role,
-            session_id=found.id,
-            second_factor=found.second_factor,
+            session_id=signed_in.id,
+            second_factor=signed_in.second_factor,
         )
-        stale = now() - found.last_seen_at > _SEEN_EVERY
+        stale = now() - signed_in.last_seen_at > _SEEN_EVERY
     if stale:
         with services.database.write() as session:
-            if (row := session.get(AdminSession, identity.session_id)) is not None:
+            if (row := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
                 row.last_seen_at = now()
     return identity
 
 
-def _by_token(services: Services, token: str) -> Identity:
+def _by_token(services: Services, secret: str) -> Identity:
     with services.database.read() as session:
-        found = session.scalar(select(ApiToken).where(ApiToken.token_hash == hash_token(token)))
-        expired = found is not None and found.expires_at is not None and found.expires_at <= now()
-        if found is None or found.revoked_at or expired or found.account.disabled_at:
+        token = repository.token_by_hash(session, hash_token(secret))
+        expired = token is not None and token.expires_at is not None and token.expires_at <= now()
+        if token is None or token.revoked_at or expired or token.account.disabled_at:
             raise NotSignedIn("This API token is unknown, revoked or expired; make a new one.")
-        account = found.account
+        account = token.account
         identity = Identity(
             account.id,
             account.name,
             account.role,
-            scopes=frozenset(found.scopes),
+            scopes=frozenset(token.scopes),
             second_factor=account.totp_confirmed_at is not None,
         )
-        stale = found.last_used_at is None or now() - found.last_used_at > _SEEN_EVERY
-        token_id = found.id
+        stale = token.last_used_at is None or now() - token.last_used_at > _SEEN_EVERY
+        token_id = token.id
     if stale:
         with services.database.write() as session:
-            if (row := session.get(ApiToken, token_id)) is not None:
+            if (row := repository.token_of(session, identity.account_id, token_id)) is not None:
                 row.last_used_at = now()
     return identity
 
@@ -179,7 +180,7 @@ Owner = Annotated[Identity, Depends(_Access("owner", None))]
 
 def account_of(session: Session, identity: Identity) -> Account:
     """The account row of an identity."""
-    account = session.get(Account, identity.account_id)
+    account = repository.account(session, identity.account_id)
     if account is None:
         raise NotSignedIn("Your account no longer exists.")
     return account

@@ -3,9 +3,8 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Query
-from sqlalchemy import select
 
-from server.accounts import audit, service
+from server.accounts import audit, invitations, service
 from server.accounts.endpoints import account_out
 from server.accounts.identity import Owner
 from server.accounts.schemas import (
@@ -16,10 +15,8 @@ from server.accounts.schemas import (
     NewInvitation,
     NewInvitationOut,
 )
-from server.clock import now
 from server.context import ServicesDep
-from server.errors import ERROR_RESPONSES, NotFound
-from server.models import Account, Invitation
+from server.errors import ERROR_RESPONSES
 
 router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_RESPONSES)
 
@@ -28,7 +25,7 @@ router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_RESPONS
 def list_accounts(services: ServicesDep, _who: Owner) -> list[AccountOut]:
     """Every account."""
     with services.database.read() as session:
-        return [account_out(row) for row in session.scalars(select(Account).order_by(Account.id))]
+        return [account_out(row) for row in service.accounts(session)]
 
 
 @router.patch("/accounts/{account_id}")
@@ -40,15 +37,14 @@ def change_account(services: ServicesDep, who: Owner, account_id: int, body: Cha
 @router.get("/invitations")
 def list_invitations(services: ServicesDep, _who: Owner) -> list[InvitationOut]:
     """Invitations that have neither been used nor expired."""
-    query = select(Invitation).where(Invitation.used_at.is_(None), Invitation.expires_at > now())
     with services.database.read() as session:
-        return [InvitationOut.model_validate(row) for row in session.scalars(query.order_by(Invitation.id))]
+        return [InvitationOut.model_validate(row) for row in invitations.open_invitations(session)]
 
 
 @router.post("/invitations", status_code=201)
 def create_invitation(services: ServicesDep, who: Owner, body: NewInvitation) -> NewInvitationOut:
     """Invite somebody by a one-time link, shown this once."""
-    invitation, token = service.invite(
+    invitation, token = invitations.invite(
         services.database, body.role, body.label, who, body.workspace, body.workspace_role
     )
     shown = InvitationOut.model_validate(invitation)
@@ -63,12 +59,7 @@ def invitation_url(public_url: str, token: str) -> str:
 @router.delete("/invitations/{invitation_id}", status_code=204)
 def revoke_invitation(services: ServicesDep, who: Owner, invitation_id: int) -> None:
     """Take an invitation back."""
-    with services.database.write() as session:
-        row = session.get(Invitation, invitation_id)
-        if row is None:
-            raise NotFound("There is no such invitation.")
-        audit.record(session, who, "invitation revoked", "invitation", row.label)
-        session.delete(row)
+    invitations.revoke_invitation(services.database, who, invitation_id)
 
 
 @router.get("/audit")

@@ -1,37 +1,29 @@
-"""Signing in, invitations, second factor, tokens: the rules behind the account endpoints."""
+"""Signing in, passwords, second factor, roles: the rules behind the account endpoints."""
 
 from datetime import timedelta
-from typing import Any, cast
 
-from sqlalchemy import CursorResult, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
-from server.accounts import second_factor
+from server.accounts import repository, second_factor
 from server.accounts.audit import NOBODY, record
 from server.accounts.identity import Identity, account_of
 from server.accounts.passwords import hash_password, password_fits
+from server.accounts.tokens import end_everything
 from server.clock import now
 from server.context import Services
 from server.db import Database
 from server.errors import ApiError, Conflict, NotFound
 from server.models import (
-    DEFAULT_WORKSPACE,
     ROLES,
     Account,
     AdminSession,
-    ApiToken,
-    Invitation,
     Role,
-    Workspace,
 )
 from server.tokens import hash_token, new_token
 from server.workspaces.repository import default_workspace, set_member
-from server.workspaces.service import Place, find_workspace
-
-INVITATION_DAYS = 7
-INVITATION_USED = Conflict("This invitation was used or has expired; ask for a new one.")
+from server.workspaces.service import Place
 
 
 class WrongCredentials(ApiError):
@@ -55,13 +47,18 @@ def identity_of(account: Account, session_id: int | None = None) -> Identity:
 
 def accounts_exist(session: Session) -> bool:
     """False until the first account has been made."""
-    return bool(session.scalar(select(func.count()).select_from(Account)))
+    return repository.any_accounts(session)
+
+
+def session_of(session: Session, token: str) -> AdminSession | None:
+    """The session of a cookie's value."""
+    return repository.session_by_token(session, hash_token(token))
 
 
 def stored_password(services: Services, name: str) -> str | None:
     """The password's hash of the account called `name`; None where there is none."""
     with services.database.read() as session:
-        account = _by_name(session, name)
+        account = repository.account_named(session, name)
         return account.password_hash if account else None
 
 
@@ -74,13 +71,13 @@ def open_session(
     meanwhile, so that a code works once however many ask at once; failures are written down too.
     """
     with services.database.write() as session:
-        account = _by_name(session, name, lock=True)
+        account = repository.account_named(session, name, lock=True)
         if account is None or account.disabled_at is not None or account.password_hash != checked:
             failure: ApiError | None = WrongCredentials("Name or password are wrong.")
         else:
             failure = _second_factor_failure(services, account, code)
         if account is not None and failure is None:
-            token = _open_session(services, session, account, user_agent)
+            token = begin_session(services, session, account, user_agent)
             record(session, identity_of(account), "signed in", "account", account.name)
             return token, None
         if not isinstance(failure, SecondFactorRequired):
@@ -96,11 +93,6 @@ def record_failure(services: Services, session: Session, account: Account | None
     name = account.name if account else "(unknown)"
     details = {"not_written_before": unwritten} if unwritten else {}
     record(session, NOBODY, "sign-in failed", "account", name, **details)
-
-
-def _by_name(session: Session, name: str, *, lock: bool = False) -> Account | None:
-    query = select(Account).where(func.lower(Account.name) == name.lower())
-    return session.scalar(query.with_for_update() if lock else query)
 
 
 def _second_factor_failure(services: Services, account: Account, code: str | None) -> ApiError | None:
@@ -120,7 +112,8 @@ def _second_factor_failure(services: Services, account: Account, code: str | Non
     return WrongCredentials("That code is wrong or was used before.")
 
 
-def _open_session(services: Services, session: Session, account: Account, user_agent: str) -> str:
+def begin_session(services: Services, session: Session, account: Account, user_agent: str) -> str:
+    """Sign an account in that has just been recognised; return the session's token."""
     token = new_token()
     session.add(
         AdminSession(
@@ -136,7 +129,7 @@ def _open_session(services: Services, session: Session, account: Account, user_a
 
 def create_account(session: Session, name: str, password: str, role: Role) -> Account:
     """Add an account; Conflict where the name is taken."""
-    if _by_name(session, name) is not None:
+    if repository.account_named(session, name) is not None:
         raise Conflict(f"There is already an account called '{name}'; choose another name.")
     return add_account(session, name, hash_password(password, name), role)
 
@@ -148,7 +141,7 @@ def add_account(
 
     place: where it belongs, and as what; the default workspace, in the same role, where None.
     """
-    if _by_name(session, name) is not None:
+    if repository.account_named(session, name) is not None:
         raise Conflict(f"There is already an account called '{name}'; choose another name.")
     account = Account(name=name, password_hash=password_hash, role=role)
     session.add(account)
@@ -163,77 +156,6 @@ def add_account(
         workspace=place.workspace.name, workspace_role=place.role,
     )  # fmt: skip
     return account
-
-
-def invite(
-    database: Database,
-    role: Role,
-    label: str,
-    who: Identity | None,
-    workspace: str | None = None,
-    workspace_role: Role | None = None,
-) -> tuple[Invitation, str]:
-    """Make a one-time link's token; only its hash is kept. For the arguments see `Invitation`."""
-    token = new_token()
-    with database.write() as session:
-        belongs = find_workspace(session, workspace) if workspace is not None else None
-        invitation = Invitation(
-            token_hash=hash_token(token),
-            role=role,
-            workspace_id=belongs.id if belongs else None,
-            workspace_role=workspace_role,
-            label=label,
-            created_by=who.account_id if who else None,
-            expires_at=now() + timedelta(days=INVITATION_DAYS),
-        )
-        session.add(invitation)
-        session.flush()
-        record(
-            session, who, "invited", "invitation", label, role=role, workspace=workspace or DEFAULT_WORKSPACE
-        )
-    return invitation, token
-
-
-def find_invitation(session: Session, token: str) -> Invitation:
-    """The invitation of a token; NotFound where it is unknown."""
-    found = session.scalar(select(Invitation).where(Invitation.token_hash == hash_token(token)))
-    if found is None:
-        raise NotFound("This invitation is unknown; ask for a new one.")
-    return found
-
-
-def check_invitation(services: Services, token: str) -> None:
-    """NotFound or Conflict where a one-time link does not work, before a password is hashed for it."""
-    with services.database.read() as session:
-        _must_be_open(find_invitation(session, token))
-
-
-def _must_be_open(invitation: Invitation) -> None:
-    if invitation.used_at is not None or invitation.expires_at <= now():
-        raise INVITATION_USED
-
-
-def accept_invitation(services: Services, token: str, name: str, password_hash: str, user_agent: str) -> str:
-    """Make the invited account and sign it in; return the session's token."""
-    with services.database.write() as session:
-        invitation = find_invitation(session, token)
-        # One statement decides, so that of many who come at once one is let in, whatever the database.
-        used = (
-            update(Invitation)
-            .where(
-                Invitation.id == invitation.id, Invitation.used_at.is_(None), Invitation.expires_at > now()
-            )
-            .values(used_at=now())
-        )
-        if cast(CursorResult[Any], session.execute(used)).rowcount != 1:
-            raise INVITATION_USED
-        role = known_role(invitation.role)
-        belongs = session.get(Workspace, invitation.workspace_id) if invitation.workspace_id else None
-        place = Place(
-            belongs or default_workspace(session), known_role(invitation.workspace_role or invitation.role)
-        )
-        account = add_account(session, name, password_hash, role, place)
-        return _open_session(services, session, account, user_agent)
 
 
 def known_role(word: str) -> Role:
@@ -278,21 +200,11 @@ def reset_second_factor(session: Session, name: str) -> None:
 
 
 def _named(session: Session, name: str) -> Account:
-    account = _by_name(session, name, lock=True)
+    account = repository.account_named(session, name, lock=True)
     if account is None:
-        names = list(session.scalars(select(Account.name)))
+        names = [known.name for known in repository.accounts(session)]
         raise NotFound(f"There is no account called '{name}'{did_you_mean(name, names)}.")
     return account
-
-
-def open_sessions(session: Session, who: Identity) -> list[AdminSession]:
-    """One's own sessions that are neither revoked nor expired."""
-    query = select(AdminSession).where(
-        AdminSession.account_id == who.account_id,
-        AdminSession.revoked_at.is_(None),
-        AdminSession.expires_at > now(),
-    )
-    return list(session.scalars(query.order_by(AdminSession.last_seen_at.desc())))
 
 
 def start_second_factor(services: Services, who: Identity) -> str:
@@ -317,7 +229,7 @@ def confirm_second_factor(services: Services, who: Identity, code: str) -> list[
         if step is None:
             raise WrongCredentials("That code does not fit; check the clock of your phone and try again.")
         account.totp_confirmed_at, account.totp_last_step = now(), step
-        if (current := session.get(AdminSession, who.session_id)) is not None:
+        if (current := repository.session_of(session, who.account_id, who.session_id)) is not None:
             current.second_factor = True
         account.recovery_code_hashes = [second_factor.hash_recovery_code(c) for c in codes]
         record(session, who, "second factor set up", "account", who.name)
@@ -328,7 +240,7 @@ def remove_second_factor(services: Services, who: Identity) -> None:
     """Turn the second factor off again; the password was asked for."""
     with services.database.write() as session:
         _without_second_factor(account_of(session, who))
-        for row in open_sessions(session, who):
+        for row in repository.open_sessions(session, who.account_id):
             row.second_factor = False
         record(session, who, "second factor removed", "account", who.name)
 
@@ -343,17 +255,15 @@ def change_account(
 ) -> Account:
     """Change another account's role, or disable it and end its sessions; one owner must remain."""
     with database.write() as session:
-        # All owners are held: two who demote each other at once would leave none.
-        session.scalars(select(Account.id).where(Account.role == "owner").with_for_update()).all()
-        account = session.get(Account, account_id, populate_existing=True)
+        repository.hold_owners(session)
+        account = repository.account(session, account_id, fresh=True)
         if account is None:
             raise NotFound("There is no such account.")
         account.role = role or account.role
         if disabled is not None:
             account.disabled_at = now() if disabled else None
         session.flush()
-        owners = select(func.count()).where(Account.role == "owner", Account.disabled_at.is_(None))
-        if not session.scalar(owners):
+        if not repository.owners_left(session):
             raise Conflict("One owner must remain; make another account an owner first.")
         if account.disabled_at is not None:
             end_everything(session, account.id)
@@ -361,10 +271,6 @@ def change_account(
     return account
 
 
-def end_everything(session: Session, account_id: int, keep_session: int | None = None) -> None:
-    """End the sessions of an account, but for one, and revoke its API tokens."""
-    for row in session.scalars(select(AdminSession).where(AdminSession.account_id == account_id)):
-        if row.id != keep_session:
-            row.revoked_at = row.revoked_at or now()
-    for token in session.scalars(select(ApiToken).where(ApiToken.account_id == account_id)):
-        token.revoked_at = token.revoked_at or now()
+def accounts(session: Session) -> list[Account]:
+    """Every account, the oldest first."""
+    return repository.accounts(session)

@@ -2,7 +2,6 @@
 
 import secrets
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from experiments.assignment.grouping import deciding
@@ -13,6 +12,7 @@ from server.clock import now
 from server.errors import Conflict, Invalid
 from server.models import NO_SLOT, Study, StudyRun
 from server.operations import erasures
+from server.repository import run_called
 from server.runs import repository
 from server.runs.schemas import Erased, HeldReport
 from server.settings import Settings
@@ -50,7 +50,7 @@ def replay(session: Session, settings: Settings) -> int:
     """Erase again what the ledger names and the database holds; return how many runs that were."""
     erased = 0
     for public_id in erasures.noted(settings):
-        run = session.scalar(select(StudyRun).where(StudyRun.public_id == public_id))
+        run = run_called(session, public_id)
         if run is not None and run.erased_at is None:
             forget(session, run)
             record(session, None, "run erased", "run", public_id, again=True)

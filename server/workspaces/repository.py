@@ -187,7 +187,11 @@ def number_of_owners(session: Session, workspace: Workspace) -> int:
 
 def grants(session: Session, study: Study) -> dict[str, list[Right]]:
     """Account name -> its grants on a study."""
-    query = select(Account.name, StudyGrant.granted).join(StudyGrant).where(StudyGrant.study_id == study.id)
+    query = (
+        select(Account.name, StudyGrant.granted)
+        .join(StudyGrant, StudyGrant.account_id == Account.id)
+        .where(StudyGrant.study_id == study.id)
+    )
     listed: dict[str, list[Right]] = {}
     for name, word in session.execute(query.order_by(Account.name)):
         listed.setdefault(name, []).append(RIGHTS[RIGHTS.index(word)])

@@ -18,7 +18,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 from sqlalchemy import text
 
-from server.accounts import service as accounts
+from server.accounts import invitations
 from server.cli_common import migrated_services
 from tests.bench.server_data import add_runs
 from tests.browser.conftest import CHROMIUM_FLAGS, CHROMIUM_NAMES
@@ -51,7 +51,7 @@ def filled(folder: Path, runs: int, trials: int = TRIALS) -> ServerProcess:
 
 def owner_link(process: ServerProcess) -> str:
     with migrated_services(process.settings) as services:
-        return accounts.invite(services.database, "owner", "", None)[1]
+        return invitations.invite(services.database, "owner", "", None)[1]
 
 
 class Owner:

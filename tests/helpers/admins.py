@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 from starlette.testclient import TestClient as StarletteClient
 
-from server.accounts import service
+from server.accounts import invitations
 from server.context import Services
 from server.models import Role
 from server.settings import Settings
@@ -40,7 +40,7 @@ def signed_in(client: TestClient, services: Services, role: Role, name: str = ""
     """A new account of this role, signed in through a one-time link in a browser of its own."""
     name = name or f"the {role}"
     client = fresh_browser(client, services.settings)
-    _, token = service.invite(services.database, role, "", None)
+    _, token = invitations.invite(services.database, role, "", None)
     made = client.post(f"/api/admin/invitations/{token}/account", json={"name": name, "password": PASSWORD})
     assert made.status_code == 201, made.text
     return Admin(client, name)

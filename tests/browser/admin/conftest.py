@@ -9,7 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 from playwright.sync_api import Browser, ConsoleMessage, Page
 
-from server.accounts import service
+from server.accounts import invitations
 from server.app import create_app
 from server.cli_common import migrated_services
 from tests.browser.conftest import REPOSITORY
@@ -73,7 +73,7 @@ def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> 
 def dashboard(busy_server: ServerProcess, chromium: Browser) -> Iterator[Dashboard]:
     """The owner's browser, signed in through the page of a one-time link."""
     with migrated_services(busy_server.settings) as services:
-        _, token = service.invite(services.database, "owner", "", None)
+        _, token = invitations.invite(services.database, "owner", "", None)
     context = chromium.new_context(viewport={"width": 1280, "height": 800}, locale="en-GB")
     page = context.new_page()
     found = Dashboard(page, busy_server, [])

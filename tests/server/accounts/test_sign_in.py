@@ -2,7 +2,7 @@ import pyotp
 import pytest
 from fastapi.testclient import TestClient
 
-from server.accounts import service
+from server.accounts import invitations
 from server.accounts.identity import COOKIE
 from server.context import Services
 from server.models import Account, AdminSession, ApiToken, Invitation
@@ -11,9 +11,10 @@ from tests.helpers.admins import PASSWORD, Admin, fresh_browser
 
 
 def test_a_one_time_link_works_once(client: TestClient, settings: Settings, services: Services) -> None:
-    _, token = service.invite(services.database, "owner", "first", None)
+    _, token = invitations.invite(services.database, "owner", "first", None)
     browser = fresh_browser(client, settings)
-    assert browser.get("/api/admin/session").json() == {"account": None, "accounts_exist": False}
+    nobody = {"account": None, "workspaces": [], "accounts_exist": False}
+    assert browser.get("/api/admin/session").json() == nobody
     body = {"name": "ada", "password": PASSWORD}
     assert browser.post(f"/api/admin/invitations/{token}/account", json=body).status_code == 201
     assert browser.get("/api/admin/session").json()["account"]["role"] == "owner"
@@ -25,7 +26,7 @@ def test_a_one_time_link_works_once(client: TestClient, settings: Settings, serv
 def test_a_weak_password_is_refused(
     client: TestClient, settings: Settings, services: Services, password: str
 ) -> None:
-    _, token = service.invite(services.database, "owner", "", None)
+    _, token = invitations.invite(services.database, "owner", "", None)
     answer = fresh_browser(client, settings).post(
         f"/api/admin/invitations/{token}/account", json={"name": "ada", "password": password}
     )
@@ -48,7 +49,7 @@ def test_secrets_are_stored_hashed(services: Services, owner: Admin) -> None:
 def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(
     client: TestClient, settings: Settings, services: Services
 ) -> None:
-    _, token = service.invite(services.database, "owner", "", None)
+    _, token = invitations.invite(services.database, "owner", "", None)
     made = fresh_browser(client, settings).post(
         f"/api/admin/invitations/{token}/account", json={"name": "ada", "password": PASSWORD}
     )

@@ -10,7 +10,7 @@ import pyotp
 import pytest
 from fastapi.testclient import TestClient
 
-from server.accounts import service
+from server.accounts import invitations, service
 from server.accounts.passwords import WeakPassword, check_strength, hash_password
 from server.accounts.throttle import BackOff, TooManyFailures, address_range, known_device, new_device
 from server.context import Services
@@ -39,9 +39,9 @@ def together(number: int, work) -> list[object]:
 
 
 def test_of_six_who_use_one_invitation_one_gets_in(services: Services) -> None:
-    _, token = service.invite(services.database, "owner", "", None)
+    _, token = invitations.invite(services.database, "owner", "", None)
     ready = hash_password(PASSWORD, "x")
-    made = together(SIX, lambda n: service.accept_invitation(services, token, f"owner{n}", ready, ""))
+    made = together(SIX, lambda n: invitations.accept_invitation(services, token, f"owner{n}", ready, ""))
     assert sum(isinstance(one, str) for one in made) == 1, made
     with services.database.read() as session:
         assert session.query(Account).count() == 1

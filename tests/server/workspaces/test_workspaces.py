@@ -103,6 +103,9 @@ def test_a_study_moves_and_its_old_people_lose_it(
     assert owner.get("/studies/short").json()["summary"]["workspace"] == "new-lab"
     assert owner.send("PUT", "/studies/short/grants/the viewer", {"rights": ["view"]}).status_code == 204
     assert viewer.get("/studies/short").json()["summary"]["rights"] == ["view"]
+    assert owner.get("/studies/short/grants").json() == [{"account": "the viewer", "rights": ["view"]}]
+    assert [one["account"] for one in owner.get("/workspaces/new-lab/members").json()] == ["the owner"]
+    assert [one["studies"] for one in owner.get("/workspaces").json()] == [0, 1]
     assert owner.send("DELETE", "/workspaces/new-lab").status_code == 409
     actions = [row["action"] for row in owner.get("/audit").json()]
     assert actions[:3] == ["rights granted", "study moved", "workspace made"]

@@ -23,7 +23,7 @@ export function PeoplePage() {
         <Text size="sm" c="dimmed">
           The role on this server: owners manage accounts and workspaces, experimenters may make workspaces. What somebody may do with
           studies is set under{" "}
-          <Anchor component={Link} to="/workspaces">
+          <Anchor component={Link} to="/workspaces" underline="always">
             Workspaces
           </Anchor>
           .

@@ -26,7 +26,7 @@ export function StudiesPage() {
       {closed.map(({ name, title }) => (
         <Alert key={name} color="yellow" title={`The studies of “${title}” are closed to you`}>
           It asks for a second factor. Set one up under{" "}
-          <Anchor component={Link} to="/account">
+          <Anchor component={Link} to="/account" underline="always">
             My account
           </Anchor>
           , or sign in again with it.
