@@ -137,10 +137,10 @@ def _by_token(services: Services, secret: str) -> Identity:
 
 
 class _Access:
-    """A dependency: lets in accounts of at least `role` on the server; tokens must carry `scope` as well."""
+    """A dependency: lets in accounts of at least `role` on the server; tokens with one of `scopes` as well."""
 
-    def __init__(self, role: Role, scope: Scope | None) -> None:
-        self.role, self.scope = role, scope
+    def __init__(self, role: Role, *scopes: Scope) -> None:
+        self.role, self.scopes = role, scopes
 
     def __call__(
         self,
@@ -153,10 +153,11 @@ class _Access:
         if ROLES.index(identity.role) < ROLES.index(self.role):
             raise NotAllowed(f"This needs the role {self.role} on this server; yours is {identity.role}.")
         if identity.scopes is not None:
-            if self.scope is None:
+            if not self.scopes:
                 raise NotAllowed("This cannot be done with an API token; sign in in a browser.")
-            if self.scope not in identity.scopes:
-                raise NotAllowed(f"This needs a token with the scope '{self.scope}'.")
+            if identity.scopes.isdisjoint(self.scopes):
+                wanted = " or ".join(f"'{scope}'" for scope in self.scopes)
+                raise NotAllowed(f"This needs a token with the scope {wanted}.")
         return identity
 
 
@@ -167,14 +168,16 @@ Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]
 """May download data."""
 PersonalReader = Annotated[Identity, Depends(_Access("viewer", "personal"))]
 """May look at single persons: their answers, recruiters' ids and devices. Scope `read` alone does not do."""
+ReportReader = Annotated[Identity, Depends(_Access("viewer", "export", "personal"))]
+"""May open the files of reports, which hold rows of single persons."""
 WRITER = _Access("viewer", "write")
 Writer = Annotated[Identity, Depends(WRITER)]
 """May change things."""
-Myself = Annotated[Identity, Depends(_Access("viewer", None))]
+Myself = Annotated[Identity, Depends(_Access("viewer"))]
 """A signed-in browser: one's own account, and what no token opens."""
-Founder = Annotated[Identity, Depends(_Access("experimenter", None))]
+Founder = Annotated[Identity, Depends(_Access("experimenter"))]
 """A signed-in browser of one who may make workspaces."""
-Owner = Annotated[Identity, Depends(_Access("owner", None))]
+Owner = Annotated[Identity, Depends(_Access("owner"))]
 """A signed-in browser of one who manages this server: accounts, workspaces, the audit log."""
 
 

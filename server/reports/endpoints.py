@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.accounts.identity import Viewer, Writer
+from server.accounts.identity import ReportReader, Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.reports import service
@@ -29,9 +29,9 @@ def build_report(services: ServicesDep, who: Writer, study: str, body: NewReport
 
 @router.get("/{report}/{file}", response_class=FileResponse)
 def get_report_file(
-    services: ServicesDep, who: Viewer, study: str, report: str, file: str, download: bool = False
+    services: ServicesDep, who: ReportReader, study: str, report: str, file: str, download: bool = False
 ) -> FileResponse:
-    """One file of a finished report."""
+    """One file of a finished report: needs the right `export`, for it holds rows of single persons."""
     with services.database.read() as session:
         path = service.report_file(services, session, study, who, report, file)
     kind = "attachment" if download or path.suffix != ".html" else "inline"

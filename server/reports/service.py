@@ -99,8 +99,11 @@ def report_folder(services: Services, public_id: str) -> Path:
 def report_file(
     services: Services, session: Session, name: str, who: Identity, public_id: str, file: str
 ) -> Path:
-    """One file of a finished report; NotFound where it is not one of its files."""
-    study = find_study(session, name, who, "view")
+    """One file of a finished report; NotFound where it is not one of its files.
+
+    Its tables have rows of single persons (means of each, exclusions), so it takes the right of downloads.
+    """
+    study = find_study(session, name, who, "export")
     job = repository.find_report(session, study, public_id)
     if job is None or file not in report_out(services, job).files:
         raise NotFound("There is no such report, or it has no such file.")

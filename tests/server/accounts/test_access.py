@@ -1,8 +1,11 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from server.accounts.identity import OPERATOR
 from server.context import Services
+from server.models import Job
 from server.settings import Settings
+from server.studies.lookup import find_study
 from tests.helpers.admins import Admin, fresh_browser, signed_in
 from tests.helpers.studies import SHORT, StudyInDatabase
 
@@ -60,6 +63,27 @@ def test_a_token_cannot_exceed_its_scopes(
     for script in (reads, exports, by_token(client, settings, owner, "read", "write", "export")):
         assert script.get("/api/admin/accounts").status_code == 403
         assert script.post("/api/admin/tokens", json={"name": "more", "scopes": ["write"]}).status_code == 403
+
+
+def test_files_of_reports_hold_persons_and_need_a_token_for_them(
+    client: TestClient, settings: Settings, services: Services, owner: Admin, study: StudyInDatabase
+) -> None:
+    with services.database.write() as session:
+        found = find_study(session, study.name, OPERATOR, "view")
+        session.add(Job(public_id="f" * 32, kind="report", study_id=found.id, status="done", message=""))
+    folder = services.settings.data_folder / "reports" / ("f" * 32)
+    folder.mkdir(parents=True)
+    (folder / "cell-means.csv").write_text("participant,mean\n")
+    reports = "/api/admin/studies/short/reports"
+    file = f"{reports}/{'f' * 32}/cell-means.csv"
+    reads = by_token(client, settings, owner, "read", "write")
+    assert reads.get(reports).json()[0]["files"] == ["cell-means.csv"]
+    refused = reads.get(file)
+    assert (refused.status_code, "'export' or 'personal'" in refused.text) == (403, True)
+    assert "participant" not in refused.text
+    for scope in ("export", "personal"):
+        assert by_token(client, settings, owner, scope).get(file).text == "participant,mean\n"
+    assert owner.get(f"/studies/short/reports/{'f' * 32}/cell-means.csv").status_code == 200
 
 
 def test_a_viewers_token_cannot_write(

@@ -43,7 +43,6 @@ NEEDED: dict[Right, set[str]] = {
         "GET data/analysis.{language}",
         "GET data/codebook.md",
         "GET reports",
-        "GET reports/{report}/{file}",
         "GET methods",
         "GET methods/methods.txt",
         "GET comparison",
@@ -72,6 +71,7 @@ NEEDED: dict[Right, set[str]] = {
         "GET data/raw.ndjson",
         "GET data/psych-ds.zip",
         "GET data/{table}.{ending}",
+        "GET reports/{report}/{file}",
     },
     "own": {
         "GET runs/{run}/identity",

@@ -12,6 +12,7 @@ export function Reports({ study, origin, series }: { study: string; origin: Data
   const path = { params: { path: { study } } };
   const [sensitivity, setSensitivity] = useState(true);
   const mayBuild = useMay(study, "run");
+  const mayOpen = useMay(study, "export");
   const reports = useQuery({
     queryKey: ["reports", study],
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/reports", path)),
@@ -47,7 +48,7 @@ export function Reports({ study, origin, series }: { study: string; origin: Data
           ) : (
             <Stack gap="xs">
               {rows.map((row) => (
-                <Report key={row.id} study={study} report={row} />
+                <Report key={row.id} study={study} report={row} mayOpen={mayOpen} />
               ))}
             </Stack>
           )
@@ -61,7 +62,7 @@ function isUnderWay(report: Schemas["ReportOut"]): boolean {
   return report.status === "queued" || report.status === "running";
 }
 
-function Report({ study, report }: { study: string; report: Schemas["ReportOut"] }) {
+function Report({ study, report, mayOpen }: { study: string; report: Schemas["ReportOut"]; mayOpen: boolean }) {
   const address = (file: string) => `/api/admin/studies/${study}/reports/${report.id}/${file}`;
   return (
     <Group gap="sm">
@@ -72,11 +73,13 @@ function Report({ study, report }: { study: string; report: Schemas["ReportOut"]
       </Text>
       {isUnderWay(report) && <Progress w={160} value={100 * report.progress} animated aria-label={report.message} />}
       {report.status === "failed" && <Text size="sm">{report.message}</Text>}
-      {report.files.map((file) => (
-        <Anchor key={file} href={address(file)} target="_blank" rel="noopener" size="sm">
-          {file}
-        </Anchor>
-      ))}
+      {mayOpen &&
+        report.files.map((file) => (
+          <Anchor key={file} href={address(file)} target="_blank" rel="noopener" size="sm">
+            {file}
+          </Anchor>
+        ))}
+      {!mayOpen && report.files.length > 0 && <Text size="sm">Its files hold rows of single persons: they need the right “export”.</Text>}
     </Group>
   );
 }
