@@ -137,7 +137,7 @@ def _by_token(services: Services, secret: str) -> Identity:
 
 
 class _Access:
-    """A dependency: lets in accounts of at least `role` on the server; tokens with one of `scopes` as well."""
+    """A dependency: lets in accounts of at least `role` on the server; tokens with one of `scopes` too."""
 
     def __init__(self, role: Role, *scopes: Scope) -> None:
         self.role, self.scopes = role, scopes
