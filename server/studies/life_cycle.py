@@ -22,9 +22,8 @@ def clone(session: Session, name: str, wanted: CloneStudy, who: Identity) -> Non
     """
     source = find_study(session, name, who, "edit")
     version = version_numbered(session, source, wanted.version or source.active_version)
-    copy = create_study(
-        session, wanted.name, definition_of(version), who, place_of_copy(session, source, who)
-    )
+    home = place_of_copy(session, source, who, wanted.workspace)
+    copy = create_study(session, wanted.name, definition_of(version), who, home)
     note = f"copied from {source.name}, version {version.number}"
     manifest = Manifest.model_validate(version.manifest)
     add_version(session, copy, version.definition_toml, definition_of(version), manifest, who, note)

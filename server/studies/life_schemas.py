@@ -3,8 +3,9 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from server.numbers import Number
 from server.studies.schemas import Revision, StudyName
 
 
@@ -16,8 +17,12 @@ class CloneStudy(_In):
     """A copy of a study under a name of its own."""
 
     name: StudyName
-    version: Annotated[int, Field(ge=1)] | None = Field(
+    version: Number | None = Field(
         default=None, description="The version to copy; the active one where none is given."
+    )
+    workspace: Annotated[str, StringConstraints(max_length=60)] | None = Field(
+        default=None,
+        description="Where the copy goes; needed where one may make no studies beside its source.",
     )
 
 

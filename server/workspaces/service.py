@@ -69,10 +69,22 @@ def workspace_for(session: Session, who: Identity, name: str | None) -> Workspac
     raise Invalid(f"Say in which workspace: {', '.join(open_ones)}.")
 
 
-def place_of_copy(session: Session, study: Study, who: Identity) -> Workspace:
-    """Where a copy of a study goes: beside it where she may make studies there, else as `workspace_for`."""
+def place_of_copy(session: Session, study: Study, who: Identity, name: str | None) -> Workspace:
+    """Where a copy of a study goes: into the workspace named, else beside its source.
+
+    Invalid where she may make no studies beside it and names no other: a copy opens the declaration to
+    another laboratory, which nothing but her word does.
+    """
     own = {one.id: one for one in repository.workspaces_for_new_studies(session, who)}
-    return own.get(study.workspace_id or 0) or workspace_for(session, who, None)
+    if name is not None or not own:
+        return workspace_for(session, who, name)
+    if study.workspace_id not in own:
+        names = ", ".join(one.name for one in own.values())
+        raise Invalid(
+            f"You may make no studies in the workspace of '{study.name}'; say which workspace the copy goes "
+            f"into, of: {names}."
+        )
+    return own[study.workspace_id]
 
 
 def own_workspaces(session: Session, account_id: int) -> list[tuple[Workspace, Role]]:
@@ -119,18 +131,27 @@ def grants_on(session: Session, study: Study) -> list[GrantOut]:
 def managed(session: Session, name: str, who: Identity | Operator) -> Workspace:
     """A workspace she may manage: her own, or any where she manages the server.
 
-    The row is held until the transaction ends, so that two owners do not take each other out at once.
+    One that asks for a second factor is managed by nobody without, the server's owners included; the command
+    line needs none. The row is held until the transaction ends, so that two owners do not take each other out
+    at once.
     """
-    if isinstance(who, Operator) or who.role == "owner":
+    if isinstance(who, Operator):
         return find_workspace(session, name, lock=True)
+    workspace = (
+        find_workspace(session, name, lock=True) if who.role == "owner" else _owned(session, name, who)
+    )
+    if workspace.second_factor_required and not who.second_factor:
+        raise NotAllowed(f"The workspace '{name}' asks for a second factor; set one up under My account.")
+    return workspace
+
+
+def _owned(session: Session, name: str, who: Identity) -> Workspace:
     workspace = repository.find(session, name, lock=True)
     role = repository.roles_of(session, who.account_id).get(workspace.id) if workspace is not None else None
     if workspace is None or role is None:
         raise NotFound(f"There is no workspace '{name[:60]}'.")
     if role != "owner":
         raise NotAllowed(f"This needs the role owner in the workspace '{name}'; yours is {role}.")
-    if workspace.second_factor_required and not who.second_factor:
-        raise NotAllowed(f"The workspace '{name}' asks for a second factor; set one up under My account.")
     return workspace
 
 

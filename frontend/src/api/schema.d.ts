@@ -1636,7 +1636,7 @@ export interface paths {
         };
         /**
          * Get Report File
-         * @description One file of a finished report.
+         * @description One file of a finished report: needs the right `export`, for it holds rows of single persons.
          */
         get: operations["get_report_file"];
         put?: never;
@@ -2508,6 +2508,11 @@ export interface components {
              * @description The version to copy; the active one where none is given.
              */
             version?: number | null;
+            /**
+             * Workspace
+             * @description Where the copy goes; needed where one may make no studies beside its source.
+             */
+            workspace?: string | null;
         };
         /**
          * ComparedVersion

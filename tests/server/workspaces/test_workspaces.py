@@ -88,6 +88,54 @@ def test_a_workspace_that_asks_for_a_second_factor_is_closed_without_one(
     assert owner.get("/studies/short").status_code == 403
 
 
+def test_who_manages_the_server_needs_the_second_factor_of_a_workspace_too(
+    services: Services, owner: Admin
+) -> None:
+    with services.database.write() as session:
+        service.create(session, "locked", "Locked", OPERATOR).second_factor_required = True
+    wanted = {"title": "Opened", "second_factor_required": False}
+    for method, path, body in (
+        ("PUT", "/workspaces/locked", wanted),
+        ("GET", "/workspaces/locked/members", None),
+        ("PUT", "/workspaces/locked/members/the owner", {"role": "owner"}),
+        ("DELETE", "/workspaces/locked", None),
+    ):
+        refused = owner.send(method, path, body)
+        assert (refused.status_code, "second factor" in refused.text) == (403, True), (method, path)
+    secret = owner.send("POST", "/second-factor").json()["secret"]
+    assert owner.send("PUT", "/second-factor", {"code": pyotp.TOTP(secret).now()}).status_code == 200
+    assert owner.send("PUT", "/workspaces/locked", wanted).status_code == 204
+
+
+def test_a_copy_lands_beside_its_source_or_where_the_copier_says(
+    client: TestClient, services: Services, owner: Admin, study: StudyInDatabase
+) -> None:
+    owner.send("POST", "/workspaces", {"name": "new-lab", "title": "New"})
+    other = signed_in(client, services, "experimenter", "other")
+    with services.database.write() as session:
+        home = service.find_workspace(session, "default")
+        found = find_study(session, "short", OPERATOR, "own")
+        service.set_member(session, home, "other", None, OPERATOR)
+        new = service.find_workspace(session, "new-lab")
+        service.set_member(session, new, "other", "experimenter", OPERATOR)
+        service.grant(session, found, "other", ["edit"], OPERATOR)
+    refused = other.send("POST", "/studies/short/copies", {"name": "copy"})
+    assert (refused.status_code, "new-lab" in refused.text, "default" in refused.text) == (422, True, False)
+    foreign = other.send("POST", "/studies/short/copies", {"name": "copy", "workspace": "default"})
+    assert foreign.status_code == 404
+    assert other.get("/studies/copy").status_code == 404
+    taken = other.send("POST", "/studies/short/copies", {"name": "copy", "workspace": "new-lab"})
+    assert (taken.status_code, taken.json()["summary"]["workspace"]) == (201, "new-lab")
+    beside = owner.send("POST", "/studies/short/copies", {"name": "beside"})
+    assert beside.json()["summary"]["workspace"] == "default"
+    elsewhere = owner.send("POST", "/studies/short/copies", {"name": "further", "workspace": "new-lab"})
+    assert elsewhere.json()["summary"]["workspace"] == "new-lab"
+    with services.database.write() as session:
+        service.set_member(session, service.find_workspace(session, "new-lab"), "other", None, OPERATOR)
+    nowhere = other.send("POST", "/studies/short/copies", {"name": "nowhere"})
+    assert (nowhere.status_code, "you have it in none" in nowhere.text) == (403, True)
+
+
 def test_one_owner_of_a_workspace_must_remain(owner: Admin) -> None:
     assert owner.send("DELETE", "/workspaces/default/members/the owner").status_code == 409
     assert owner.send("PUT", "/workspaces/default/members/the owner", {"role": "viewer"}).status_code == 409

@@ -4,6 +4,7 @@ import { Button, Card, Group, Select, Stack, Text, TextInput, Title } from "@man
 import { useNavigate } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
+import { useOwnWorkspaces } from "../queries";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
 
@@ -33,12 +34,16 @@ function Copy({ detail: { summary, versions } }: { detail: Schemas["StudyDetail"
   const navigate = useNavigate();
   const [name, setName] = useState(`${summary.name.slice(0, 54)}-copy`);
   const [version, setVersion] = useState(String(summary.version));
+  const own = useOwnWorkspaces();
+  const [chosen, setWorkspace] = useState<string | null>(null);
+  const beside = own.find((one) => one.name === summary.workspace);
+  const workspace = chosen ?? beside?.name ?? null;
   const copy = useChange(
     () =>
       unwrap(
         api.POST("/api/admin/studies/{study}/copies", {
           params: { path: { study: summary.name } },
-          body: { name, version: Number(version) },
+          body: { name, version: Number(version), workspace },
         }),
       ),
     {
@@ -60,9 +65,18 @@ function Copy({ detail: { summary, versions } }: { detail: Schemas["StudyDetail"
           onChange={(chosen) => setVersion(chosen ?? version)}
           w={140}
         />
+        {own.length > (beside === undefined ? 0 : 1) && (
+          <Select
+            label="Into the workspace"
+            data={own.map((one) => ({ value: one.name, label: one.title }))}
+            value={workspace}
+            allowDeselect={false}
+            onChange={setWorkspace}
+          />
+        )}
         <Button
           variant="default"
-          disabled={!/^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$/.test(name)}
+          disabled={(workspace === null && own.length > 0) || !/^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$/.test(name)}
           loading={copy.isPending}
           onClick={() => copy.mutate(undefined)}
         >
