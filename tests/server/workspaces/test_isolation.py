@@ -6,6 +6,7 @@ or fails here until it is said what a foreign object of its kind is, and which r
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,9 +17,11 @@ from fastapi.testclient import TestClient
 from server.accounts.identity import OPERATOR
 from server.app import _routers
 from server.context import Services
+from server.errors import NotFound
 from server.models import RIGHTS, Job, Right
 from server.studies.links import create_link
 from server.studies.lookup import find_study
+from server.studies.uploads import upload_folder
 from server.workspaces import service
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
@@ -291,6 +294,12 @@ def test_an_upload_is_its_senders_alone(services: Services, outsiders: dict[str,
     body = {"name": "taken", "upload": sent.json()["id"], "levels": {"pattern": "{a}_{b}_{exemplar}.mp4"}}
     answer = outsiders["experimenter elsewhere"].send("POST", "/studies", body)
     assert (answer.status_code, answer.json()["error"]["code"]) == (404, "not_found")
+
+
+def test_an_upload_from_before_uploads_had_senders_is_sent_again(tmp_path: Path) -> None:
+    (tmp_path / ("a" * 32)).mkdir()
+    with pytest.raises(NotFound, match="please upload the clips again"):
+        upload_folder(tmp_path, "a" * 32, 1)
 
 
 def test_a_person_taken_out_of_a_workspace_is_out_at_once(
