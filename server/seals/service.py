@@ -14,7 +14,7 @@ from server.errors import Conflict
 from server.models import Study
 from server.participants.repository import lock_study
 from server.seals.repository import people_of_series, sealed_document
-from server.studies.lookup import active_version, definition_of
+from server.studies.lookup import active_version, definition_of, must_not_be_archived
 
 ACTION = "plan sealed"
 
@@ -31,9 +31,10 @@ def people_begun(session: Session, study: Study) -> int:
 
 
 def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[str, Any] | None) -> Seal:
-    """Seal the active version; Conflict where its series is sealed, or people have taken part already."""
+    """Seal the active version; Conflict where it is sealed or archived, or people have taken part already."""
     # Held until the seal is stored: nobody begins meanwhile, nor does another seal.
     study = lock_study(session, study.id)
+    must_not_be_archived(study)
     version = active_version(session, study)
     if sealed := seal_of(session, study):
         raise Conflict(f"The plan was sealed {sealed.sealed_at} already; a seal is never replaced.")

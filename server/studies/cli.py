@@ -30,7 +30,7 @@ from server.studies.links import (
     prepared_links,
 )
 from server.studies.links_repository import links_of
-from server.studies.lookup import active_version, find_study
+from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.planned import planned_experiment
 
 study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
@@ -71,6 +71,8 @@ def add(
         new = store_clips(services.clips, manifest, clips)
         with services.database.write() as session:
             study = repository.study_called(session, name or declared.name)
+            if study is not None:
+                must_not_be_archived(study)
             study = study or create_study(session, name or declared.name, declared, None)
             version = _same_version(session, study, definition_sha256(declared), manifest)
             said = f"version {study.active_version}, nothing new"
@@ -107,6 +109,7 @@ def _urls(services: Services, session: Session, study: Study) -> list[tuple[str,
 
 
 def _set_status(session: Session, study: Study, status: str) -> None:
+    must_not_be_archived(study)
     if study.status == status:
         return
     record(session, None, "status changed", "study", study.name, old=study.status, new=status)

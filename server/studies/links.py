@@ -14,7 +14,7 @@ from server.clock import now
 from server.errors import Invalid, NotFound
 from server.models import Link, Study
 from server.studies import links_repository as repository
-from server.studies.lookup import active_definition
+from server.studies.lookup import active_definition, must_not_be_archived
 from server.tokens import derived_token, hash_token, new_public_id
 
 LinkKind = Literal["general", "personal", "preview"]
@@ -120,7 +120,8 @@ def _with_runs(session: Session, links: Sequence[Link]) -> list[tuple[Link, Runs
 def make_links(
     session: Session, study: Study, kind: LinkKind, group: str, rows: Sequence[dict[str, Any]]
 ) -> None:
-    """Store prepared links, all of one kind and group."""
+    """Store prepared links, all of one kind and group; Conflict where the study is in the archive."""
+    must_not_be_archived(study)
     check_group(active_definition(session, study), kind, group)
     repository.add_links(session, study, rows)
 

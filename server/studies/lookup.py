@@ -6,7 +6,7 @@ from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
 from server.accounts.identity import Identity, NotAllowed, Operator
-from server.errors import NotFound
+from server.errors import Conflict, NotFound
 from server.models import RIGHTS, Right, Study, StudyVersion
 from server.studies import repository
 from server.workspaces import repository as workspaces
@@ -44,6 +44,19 @@ def _check(session: Session, study: Study, who: Identity, right: Right) -> None:
         raise SecondFactorNeeded(
             f"The workspace '{workspace.title}' asks for a second factor; set one up under My account, "
             "or sign in again with it."
+        )
+
+
+def must_not_be_archived(study: Study) -> None:
+    """Conflict where a study is in the archive: asked before its status, versions, links or seal change.
+
+    Allowed stay, in the archive: what people have a right to and what takes something back (erasure of a
+    person, exclusions, withdrawal of links), who may see it (sharing, the workspace it belongs to), and what
+    only reads it (copies, downloads, reports, a seal written out again).
+    """
+    if study.archived_at is not None:
+        raise Conflict(
+            f"The study '{study.name}' is in the archive; take it out again (Settings) before it is changed."
         )
 
 

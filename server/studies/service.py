@@ -23,7 +23,7 @@ from server.errors import Conflict, Invalid, NotFound
 from server.models import Right, Study, StudyVersion, VersionClip
 from server.studies import own_clips, repository
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
-from server.studies.lookup import active_version, find_study
+from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.planned import planned_experiment
 from server.studies.schemas import (
     BlockOut,
@@ -203,10 +203,8 @@ def for_edit(
             "load it again and repeat your edit.",
             revision=study.revision,
         )
-    if study.archived_at is not None and not archived:
-        raise Conflict(
-            f"The study '{name}' is in the archive; take it out again (Settings) before it is changed."
-        )
+    if not archived:
+        must_not_be_archived(study)
     return study
 
 
@@ -273,6 +271,7 @@ def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Id
 def delete(session: Session, name: str, who: Identity) -> None:
     """Delete a draft that nobody has taken part in."""
     study = find_study(session, name, who, "edit")
+    must_not_be_archived(study)
     if study.status != "draft" or repository.run_count(session, study):
         raise Conflict("Only a draft without runs can be deleted; close this study instead.")
     repository.delete_study(session, study)

@@ -11,6 +11,7 @@ import pytest
 from experiments.load import parse_experiment
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import SCALE_NAME
+from server.clock import now
 from server.context import Services
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
 from server.results.repository import Pool
@@ -74,6 +75,27 @@ def test_adding_again_changes_nothing_and_a_change_makes_a_version(
         assert session.query(StudyVersion).count() == 2
         assert session.query(Clip).count() == 8
         assert (session.query(Study).one().active_version, session.query(Link).count()) == (2, 1)
+
+
+def test_an_archived_study_is_not_changed_from_the_command_line(
+    settings: Settings, services: Services, sources: Path, study: StudyInDatabase
+) -> None:
+    with services.database.write() as session:
+        archived = session.query(Study).one()
+        archived.status, archived.archived_at = "closed", now()
+    (sources / "short.toml").write_text(SHORT.replace("Do you agree?", "Do you agree to take part?"))
+    for refused in (
+        add(settings, sources, "--open"),
+        run_server_command(settings, "study", "status", "short", "live"),
+        run_server_command(settings, "link", "create", "short"),
+        run_server_command(settings, "seal", "short", "--out", str(sources / "seal.json")),
+    ):
+        assert (refused.returncode, refused.stderr.count("\n")) == (2, 1), refused.args
+        assert "is in the archive; take it out again" in refused.stderr
+    with services.database.read() as session:
+        kept = session.query(Study).one()
+        assert (kept.status, kept.active_version, len(kept.versions)) == ("closed", 1, 1)
+        assert session.query(Link).count() == 1
 
 
 def damage_clip(folder: Path) -> str:

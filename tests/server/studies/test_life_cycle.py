@@ -6,6 +6,10 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.accounts.identity import OPERATOR
+from server.clock import now
+from server.context import Services
+from server.studies.lookup import find_study
 from server.studies.word_difference import word_difference
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -70,6 +74,46 @@ def test_an_archived_study_can_be_read_and_not_changed(experimenter: Admin, stud
         ).status_code
         == 200
     )
+
+
+def test_an_archived_study_gets_no_links_versions_or_seal_and_is_not_deleted(
+    experimenter: Admin, services: Services, study: StudyInDatabase
+) -> None:
+    link = experimenter.send("POST", "/studies/short/links", {"kind": "general"}).json()[0]["id"]
+    with services.database.write() as session:
+        find_study(session, "short", OPERATOR, "view").status = "draft"
+        find_study(session, "short", OPERATOR, "view").archived_at = now()
+    for method, path, body in (
+        ("POST", "/studies/short/links", {"kind": "general"}),
+        ("POST", "/studies/short/seal", {}),
+        ("DELETE", "/studies/short", None),
+    ):
+        refused = experimenter.send(method, path, body)
+        assert (refused.status_code, "in the archive" in refused.text) == (409, True), (method, path)
+    # What takes something back from the study stays possible.
+    assert experimenter.send("DELETE", f"/studies/short/links/{link}").status_code == 204
+    assert experimenter.send("POST", "/studies/short/copies", {"name": "again"}).status_code == 201
+
+
+def test_numbers_that_no_column_holds_are_refused(
+    experimenter: Admin, owner: Admin, study: StudyInDatabase
+) -> None:
+    for number in (0, 2**31, 2**70):
+        copied = experimenter.send("POST", "/studies/short/copies", {"name": "again", "version": number})
+        asked = [
+            experimenter.get("/studies/short/results", params={"series": number}),
+            experimenter.get("/studies/short/methods", params={"series": number}),
+            experimenter.get("/studies/short/methods/methods.txt", params={"series": number}),
+            experimenter.get(f"/studies/short/versions/{number}"),
+            experimenter.send("POST", "/studies/short/reports", {"series": number}),
+            experimenter.send("DELETE", f"/sessions/{number}"),
+            experimenter.send("DELETE", f"/tokens/{number}"),
+            owner.send("DELETE", f"/invitations/{number}"),
+            owner.send("PATCH", f"/accounts/{number}", {"disabled": True}),
+        ]
+        assert {one.status_code for one in (copied, *asked)} == {422}, (number, [one.text for one in asked])
+    largest = experimenter.send("POST", "/studies/short/copies", {"name": "again", "version": 2**31 - 1})
+    assert largest.status_code == 404
 
 
 def test_two_versions_compared_word_by_word(experimenter: Admin, study: StudyInDatabase) -> None:
