@@ -31,6 +31,7 @@ from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.models import Account
+from server.numbers import Number
 from server.workspaces.service import own_workspaces
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
@@ -220,7 +221,7 @@ def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
 
 
 @router.delete("/sessions/{session_id}", status_code=204)
-def revoke_session(services: ServicesDep, me: Myself, session_id: int) -> None:
+def revoke_session(services: ServicesDep, me: Myself, session_id: Number) -> None:
     """Sign another of one's own browsers out."""
     tokens.revoke_session(services.database, me, session_id)
 
@@ -283,6 +284,6 @@ def create_token(services: ServicesDep, me: Myself, body: NewToken) -> NewTokenO
 
 
 @router.delete("/tokens/{token_id}", status_code=204)
-def revoke_token(services: ServicesDep, me: Myself, token_id: int) -> None:
+def revoke_token(services: ServicesDep, me: Myself, token_id: Number) -> None:
     """Revoke one's own API token."""
     tokens.revoke_token(services.database, me, token_id)

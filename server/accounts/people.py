@@ -17,6 +17,7 @@ from server.accounts.schemas import (
 )
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.numbers import Number
 
 router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_RESPONSES)
 
@@ -29,7 +30,7 @@ def list_accounts(services: ServicesDep, _who: Owner) -> list[AccountOut]:
 
 
 @router.patch("/accounts/{account_id}")
-def change_account(services: ServicesDep, who: Owner, account_id: int, body: ChangeAccount) -> AccountOut:
+def change_account(services: ServicesDep, who: Owner, account_id: Number, body: ChangeAccount) -> AccountOut:
     """Change a role, or disable an account."""
     return account_out(service.change_account(services.database, who, account_id, body.role, body.disabled))
 
@@ -57,7 +58,7 @@ def invitation_url(public_url: str, token: str) -> str:
 
 
 @router.delete("/invitations/{invitation_id}", status_code=204)
-def revoke_invitation(services: ServicesDep, who: Owner, invitation_id: int) -> None:
+def revoke_invitation(services: ServicesDep, who: Owner, invitation_id: Number) -> None:
     """Take an invitation back."""
     invitations.revoke_invitation(services.database, who, invitation_id)
 

@@ -9,6 +9,7 @@ from server.accounts.identity import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.methods import service
+from server.numbers import Number
 from server.studies.lookup import find_study
 
 router = APIRouter(prefix="/api/admin/studies/{study}/methods", tags=["reports"], responses=ERROR_RESPONSES)
@@ -39,7 +40,7 @@ def get_methods(
     who: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
-    series: int | None = None,
+    series: Number | None = None,
 ) -> MethodsOut:
     """Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts."""
     with services.database.read() as session:
@@ -56,7 +57,7 @@ def get_methods_text(
     who: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
-    series: int | None = None,
+    series: Number | None = None,
 ) -> Response:
     """The paragraph as plain text, with the query of each number below it."""
     with services.database.read() as session:

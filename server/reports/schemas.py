@@ -5,13 +5,15 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from server.numbers import Number
+
 
 class NewReport(BaseModel):
     """Which data to analyse."""
 
     model_config = ConfigDict(extra="forbid")
     origin: Literal["participant", "pilot", "simulated"] = "participant"
-    series: int | None = Field(
+    series: Number | None = Field(
         default=None, description="Data series; that of the active version where none is given."
     )
     sensitivity: bool = True

@@ -8,6 +8,7 @@ from pydantic import Field
 from server.accounts.identity import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.numbers import Number
 from server.participants.schemas import Origin
 from server.results import counting
 from server.results.cache import Revision
@@ -30,7 +31,7 @@ def get_results(
     who: Viewer,
     study: str,
     origin: Origin = "participant",
-    series: int | None = None,
+    series: Number | None = None,
     scale: str | None = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:

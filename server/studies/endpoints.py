@@ -9,6 +9,7 @@ from fastapi.responses import PlainTextResponse
 from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.numbers import Number
 from server.studies import service, uploads
 from server.studies.schemas import (
     ChangeSettings,
@@ -107,7 +108,7 @@ def judge_version(services: ServicesDep, who: Viewer, study: str, body: Definiti
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)
-def get_version(services: ServicesDep, who: Viewer, study: str, number: int) -> str:
+def get_version(services: ServicesDep, who: Viewer, study: str, number: Number) -> str:
     """The TOML of one version."""
     with services.database.read() as session:
         return service.version_text(session, study, number, who)

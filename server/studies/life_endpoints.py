@@ -7,13 +7,12 @@ from fastapi import APIRouter, Query
 from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.numbers import Number
 from server.studies import comparing, life_cycle, service
 from server.studies.life_schemas import ArchiveStudy, CloneStudy, Comparison
 from server.studies.schemas import StudyDetail
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["studies"], responses=ERROR_RESPONSES)
-
-VersionNumber = Annotated[int, Query(ge=1, le=2**31 - 1)]
 
 
 @router.post("/copies", status_code=201)
@@ -39,8 +38,8 @@ def compare_versions(
     services: ServicesDep,
     who: Viewer,
     study: str,
-    old: VersionNumber,
-    new: VersionNumber,
+    old: Number,
+    new: Number,
     other: Annotated[str | None, Query(description="The study that `old` is a version of.")] = None,
 ) -> Comparison:
     """What differs between two versions: keys of the declaration, word by word, and clips."""
