@@ -90,7 +90,7 @@ def test_an_archived_study_is_not_changed_from_the_command_line(
         run_server_command(settings, "link", "create", "short"),
         run_server_command(settings, "seal", "short", "--out", str(sources / "seal.json")),
     ):
-        assert (refused.returncode, refused.stderr.count("\n")) == (2, 1), refused.args
+        assert (refused.returncode, refused.stderr.count("\n")) == (2, 1), refused.stderr
         assert "is in the archive; take it out again" in refused.stderr
     with services.database.read() as session:
         kept = session.query(Study).one()
