@@ -24,7 +24,7 @@ from server.simulation.manners import MANNERS
 from server.simulation.observer import observer_of
 from server.simulation.person import Person, Rater
 from server.studies.links import PURPOSE, create_link
-from server.studies.lookup import active_version, find_study
+from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.repository import clips_of_design
 from server.tokens import derived_token
 
@@ -127,6 +127,7 @@ def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Ca
     """A link whose runs are simulated, and the maker of raters, who know the levels of each clip."""
     with services.database.write() as session:
         study = find_study(session, name, OPERATOR, "view")
+        must_not_be_archived(study)
         version = active_version(session, study)
         rows = clips_of_design(session, version)
         blinks: dict[str, list[float]] = {row.clip_sha256: row.blinks_s or [] for row in rows}

@@ -88,6 +88,7 @@ def test_an_archived_study_is_not_changed_from_the_command_line(
         add(settings, sources, "--open"),
         run_server_command(settings, "study", "status", "short", "live"),
         run_server_command(settings, "link", "create", "short"),
+        run_server_command(settings, "simulate", "short", "--participants", "1"),
         run_server_command(settings, "seal", "short", "--out", str(sources / "seal.json")),
     ):
         assert (refused.returncode, refused.stderr.count("\n")) == (2, 1), refused.stderr
