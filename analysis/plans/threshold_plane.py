@@ -11,6 +11,7 @@ from analysis.thresholds.plane import Points, counted_points
 from analysis.thresholds.plane_people import PlanesResult, fit_planes
 from experiments.errors import InputError
 from experiments.trials.threshold.declaration import Threshold, threshold_of
+from experiments.trials.threshold.grid import seconds
 
 
 @dataclass(frozen=True)
@@ -29,18 +30,21 @@ def analyse(prepared: Prepared) -> Contents:
     from analysis.report.plane_contents import contents_of
 
     trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
-    fits = tuple(_fit(name, labels[name], mine, trial) for name, mine in answers_of(prepared).items())
+    # The declared middle, as the server has it: series that lack a level are compared with the others.
+    across = list(seconds(prepared.experiment))
+    middle = (across[0] + across[-1]) / 2
+    fits = tuple(_fit(name, labels[name], mine, trial, middle) for name, mine in answers_of(prepared).items())
     compared: tuple[Difference, ...] = ()
     for what in ("threshold", "tilt"):
         compared += differences([(fit.label, _by_person(fit, what)) for fit in fits], what)
     return contents_of(prepared, fits, compared)
 
 
-def _fit(name: str, label: str, answers: Answers, trial: Threshold) -> SeriesPlane:
+def _fit(name: str, label: str, answers: Answers, trial: Threshold, middle: float) -> SeriesPlane:
     across = answers.x if answers.second is None else answers.second
     points, falling = counted_points(answers.x, across, answers.response), trial.direction == "falling"
     try:
-        result = fit_planes(answers, "normal", trial.task.guess, trial.lapse, falling=falling)
+        result = fit_planes(answers, "normal", trial.task.guess, trial.lapse, falling=falling, middle=middle)
     except InputError as error:
         return SeriesPlane(name, label, points, None, str(error).removeprefix(f"{answers.source}: "))
     return SeriesPlane(name, label, points, result, None)

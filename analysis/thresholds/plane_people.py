@@ -42,11 +42,19 @@ class PlanesResult:
 
 
 def fit_planes(
-    answers: Answers, shape: PlaneShape, guess: float, lapse: float, *, falling: bool | None = None
+    answers: Answers,
+    shape: PlaneShape,
+    guess: float,
+    lapse: float,
+    *,
+    falling: bool | None = None,
+    middle: float | None = None,
 ) -> PlanesResult:
     """Fit every condition over all trials and, where people are named, every person in it.
 
     Where it is not said whether the function is `falling`, the answers tell, without a guess rate alone.
+    middle: the second variable's number at which thresholds are given. Fits that are compared must share
+    it; halfway between the ends of these answers where it is not given.
 
     Raises
     ------
@@ -58,7 +66,8 @@ def fit_planes(
     size = answers.x.size
     labels = np.full(size, "all", dtype=object) if answers.condition is None else answers.condition
     names = np.full(size, "", dtype=object) if answers.participant is None else answers.participant
-    middle = float(answers.second.min() + answers.second.max()) / 2
+    if middle is None:
+        middle = float(answers.second.min() + answers.second.max()) / 2
     pooled: dict[str, Plane] = {}
     reasons: dict[str, str] = {}
     people: list[PersonPlane] = []

@@ -6,7 +6,8 @@ With k a key derived from the secret key, s an entry's salt and d its details as
     H_n = HMAC-SHA256(k, "entry" | H_(n-1) | n | time | actor | action | kind | target | D)   (2)
 
 Whoever can write to the database, but has not the key, cannot change, remove or put in an entry without
-breaking (2) at it. The last entries can be cut off unseen: keep the newest hash elsewhere (export, syslog).
+breaking (2) at it. What the database alone cannot tell is that the last entries were cut off, or the whole
+chain taken away from rows that stay: keep the newest hash elsewhere (export, syslog) and verify with it.
 Details can be erased with their salt, as data protection asks; D stays, and tells nothing without s.
 """
 

@@ -2,6 +2,8 @@
 
 import json
 import logging
+import queue
+import threading
 from functools import lru_cache
 from logging.handlers import SysLogHandler
 from pathlib import Path
@@ -10,14 +12,42 @@ from experiments.errors import InputError
 
 log = logging.getLogger("palpebra")
 UDP_PORT = 514
+WAITING_MAX = 1000
+"""Entries that may wait for a syslog that is slow."""
 
 
 def forward(address: str, entries: list[dict[str, object]]) -> None:
-    """Send entries, details left out; a syslog that is away costs one line of log and no request."""
-    handler = _handler(address)
+    """Send entries, details left out, by a thread of their own: a syslog that is away holds up no request.
+
+    Entries that cannot be sent, or wait while `WAITING_MAX` others do, are dropped with a line of log: the
+    log in the database has them.
+    """
+    waiting = _queue(address)
     for entry in entries:
         kept = {name: value for name, value in entry.items() if name != "details"}
-        handler.emit(logging.makeLogRecord({"msg": json.dumps(kept), "levelno": logging.INFO}))
+        try:
+            waiting.put_nowait(json.dumps(kept))
+        except queue.Full:
+            log.warning("the audit log could not be sent to syslog: %d entries wait already", WAITING_MAX)
+            return
+
+
+@lru_cache(maxsize=4)
+def _queue(address: str) -> "queue.Queue[str]":
+    waiting: queue.Queue[str] = queue.Queue(WAITING_MAX)
+    threading.Thread(target=_send, args=(address, waiting), name="audit-syslog", daemon=True).start()
+    return waiting
+
+
+def _send(address: str, waiting: "queue.Queue[str]") -> None:
+    handler: SysLogHandler | None = None
+    while True:
+        line = waiting.get()
+        try:
+            handler = handler or _handler(address)
+            handler.emit(logging.makeLogRecord({"msg": line, "levelno": logging.INFO}))
+        except (OSError, InputError) as error:
+            log.warning("the audit log could not be sent to syslog: %s", error)
 
 
 class _Handler(SysLogHandler):
@@ -25,7 +55,6 @@ class _Handler(SysLogHandler):
         log.warning("the audit log could not be sent to syslog")
 
 
-@lru_cache(maxsize=4)
 def _handler(address: str) -> SysLogHandler:
     handler = _Handler(syslog_address(address), facility=SysLogHandler.LOG_AUTH)
     handler.setFormatter(logging.Formatter("palpebra-audit: %(message)s"))

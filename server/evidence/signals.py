@@ -139,6 +139,12 @@ def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ())
     )
 
 
+def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:
+    """Whether the motion checks asked, void ones and those passed over too, can tell guesses from people."""
+    asked = [one.choices for one in answers if one.part == "check" and one.choices and not one.other_way]
+    return _tell([*asked, *passed_over])
+
+
 def guessed(right: int, choices: Sequence[int], asked: Sequence[int] | None = None) -> float | None:
     """How likely somebody who guesses is right at least `right` times; None where too few were asked.
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from server.evidence.signals import GUESSED_BY_CHANCE, JudgedAnswer, Signals, signals_of
+from server.evidence.signals import GUESSED_BY_CHANCE, JudgedAnswer, Signals, checks_tell, signals_of
 
 Verdict = Literal["likely", "unclear", "unlikely", "not_judged"]
 VERDICTS: tuple[Verdict, ...] = ("likely", "unclear", "unlikely", "not_judged")
@@ -82,7 +82,7 @@ def judge(
     refused: answers of the run were refused for their evidence, which happens to no page of this program.
     passed_over: number of choices of each motion check that was left out.
     Where motion checks were answered the other way that the study offers, or too many of them tell nothing,
-    the verdict is at most unclear.
+    the verdict is at most unclear; not so where they were too few to tell anything.
     """
     signals = signals_of(answers, passed_over)
     points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
@@ -90,7 +90,8 @@ def judge(
         few: Verdict = "unlikely" if refused else "unclear" if answers else "not_judged"
         return Judgement(few, points, signals)
     verdict: Verdict = "likely" if points >= LIKELY else "unlikely" if points <= UNLIKELY else "unclear"
-    if verdict == "likely" and (signals.motion_checks_other_way or _escapes(signals)):
+    escaped = _escapes(signals) and checks_tell(answers, passed_over)
+    if verdict == "likely" and (signals.motion_checks_other_way or escaped):
         verdict = "unclear"
     return Judgement(verdict, points, signals)
 

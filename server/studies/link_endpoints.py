@@ -101,4 +101,5 @@ def revoke_link(services: ServicesDep, who: Writer, study: str, link: str) -> No
     with services.database.write() as session:
         found = find_study(session, study, who, "run")
         withdrawn = withdraw(session, found, link)
-        record(session, who, "link withdrawn", "study", study, label=withdrawn.label)
+        # A personal link's label is a person's name, which an erasure could not take out of the log's chain.
+        record(session, who, "link withdrawn", "study", study, link=withdrawn.public_id, kind=withdrawn.kind)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 from analysis.cli import app
 from analysis.thresholds.people import read_answers
 from analysis.thresholds.plane import Points, counted_points, fit_plane
+from analysis.thresholds.plane_people import fit_planes
 from experiments.errors import InputError
 
 FOLDER = Path(__file__).parents[2] / "golden/r/plane"
@@ -46,6 +48,18 @@ def test_the_line_has_the_threshold_and_the_interval_of_a_fit_with_its_middle_th
         there = fit_plane(points("two_interval"), guess=0.5, lapse=0.02, middle=point.z)
         assert there.threshold == pytest.approx(point.threshold, rel=1e-6)
         assert there.threshold_ci.low == pytest.approx(point.ci.low, rel=1e-6)
+
+
+def test_answers_that_lack_a_level_are_fitted_at_the_middle_that_is_said() -> None:
+    """Compared at the middles of their own answers, two series would differ by their tilt alone."""
+    answers = read_answers(FOLDER / "yes_no.csv", "duration", "seen", second="asymmetry")
+    assert answers.second is not None
+    kept = answers.second < answers.second.max()
+    less = replace(answers, x=answers.x[kept], response=answers.response[kept], second=answers.second[kept])
+    here = fit_planes(less, "normal", 0.0, 0.0, middle=0.5).pooled["all"]
+    expected = fit_plane(counted_points(less.x, answers.second[kept], less.response), middle=0.5)
+    assert here.threshold == pytest.approx(expected.threshold, rel=1e-6)
+    assert here.threshold != pytest.approx(fit_planes(less, "normal", 0.0, 0.0).pooled["all"].threshold)
 
 
 def test_a_falling_function_is_the_rising_one_of_the_other_answers() -> None:

@@ -175,3 +175,13 @@ def test_syslog_gets_each_entry_after_its_commit_without_details(services: Servi
     assert '"action": "study created"' in sent
     assert verdict(services).hash in sent
     assert "not for syslog" not in sent
+
+
+@pytest.mark.parametrize("address", ["no-such-host.invalid:514", "/nowhere/socket"])
+def test_a_syslog_that_is_away_costs_no_request(services: Services, address: str) -> None:
+    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    for number in range(2):
+        with told.database.write() as session:
+            record(session, None, "study created", "study", f"s{number}")
+    told.database.close()
+    assert verdict(services).position == 2

@@ -122,6 +122,16 @@ def test_somebody_who_guesses_gains_nothing_by_failing_the_most_that_may_fail() 
     assert judged.verdict == "unclear"
 
 
+def test_a_failed_play_of_the_only_check_says_nothing_of_an_honest_person() -> None:
+    """One check of four choices cannot tell guesses from people, whether it is answered or not."""
+    checked = with_checks(gamma_person(3), random.Random(1), 1.0)
+    first = next(one.trial_index for one in checked if one.part == "check")
+    alone = [one for one in checked if one.part != "check" or one.trial_index == first]
+    assert judge(alone).verdict == "likely"
+    assert judge(void(alone, 1)).verdict == "likely"
+    assert judge([one for one in alone if one.part != "check"], passed_over=[4]).verdict == "likely"
+
+
 def test_checks_that_were_passed_over_count_as_void() -> None:
     checked = with_checks(gamma_person(3), random.Random(1), 1.0)
     without = [one for one in checked if one.part != "check"]
