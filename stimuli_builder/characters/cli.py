@@ -10,7 +10,9 @@ from stimuli_builder.characters.retired import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
 
 bake_app = typer.Typer(no_args_is_help=True, help="Render a character's atlas of baked pictures.")
-character_app = typer.Typer(no_args_is_help=True, help="List characters, and bring back one that left.")
+character_app = typer.Typer(
+    no_args_is_help=True, help="List the characters that are here, and bring back one of an earlier release."
+)
 
 
 @bake_app.callback()
