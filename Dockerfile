@@ -16,6 +16,7 @@ COPY pyproject.toml LICENSE docs/server.md ./
 COPY experiments experiments
 COPY server server
 COPY stimuli_builder stimuli_builder
+COPY video_conversion video_conversion
 COPY analysis analysis
 COPY migrations migrations
 RUN cp server.md README.md && venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps .

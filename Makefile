@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test check setup setup-test lock format types bench scope load evidence audit screenshots docs api clean
+.PHONY: addon playground help run test check setup setup-test lock format types bench sbom scope load evidence audit screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -17,16 +17,20 @@ run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 
 test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
 	@cd frontend && npm run --silent test
-	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadgroup --no-loadscope-reorder $(TESTS)
+	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check -q .
+	@$(BIN)/python tools/check_names.py
+	@$(BIN)/python tools/check_unused.py
+	@$(BIN)/python -m tools.check_docstrings
 	@$(BIN)/mypy
 	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools
 	@$(BIN)/lint-imports
 	@cd frontend && npm run --silent typecheck && npm run --silent lint && npm run --silent api -- --check && npm run --silent size
 	@$(BIN)/python tools/check_lock_files.py
+	@$(BIN)/python tools/sbom.py --check
 	@$(BIN)/python tools/audit.py
 
 setup:
@@ -50,12 +54,16 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_tracking.py
 	@for size in 960x360 1920x720; do PYTHONPATH=. $(BIN)/python tests/bench/clip_memory.py $$size; done
 	@PYTHONPATH=. $(BIN)/python tests/bench/performance_memory.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/addon_fill.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/models_against_r.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_server.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_study_creation.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/before_and_after.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_evidence.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_workers.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_labels.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_lid_events.py $(BLINK_SERIES)
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_stated_error.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_free.py
 	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/face_quality.py alder $(FACEKIT)
 
@@ -73,6 +81,9 @@ load: setup-test ## real servers under load and kill -9, a table at the end (LOA
 
 evidence: setup-test ## people and programs of every manner take part: who is caught, who is warned (EVIDENCE="--runs 20 --honest 100")
 	@$(BIN)/python -m tools.evidence_table $(EVIDENCE)
+
+sbom: setup-test ## bill of materials (CycloneDX) and licences of all that a server runs: dist/sbom.cdx.json
+	@$(BIN)/python tools/sbom.py
 
 addon: setup ## build the Blender add-on: dist/palpebra_blinks-VERSION.zip
 	@$(BIN)/python tools/build_addon.py

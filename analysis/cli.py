@@ -3,6 +3,7 @@
 import typer
 
 from experiments.command_line import run_command_line
+from experiments.descriptions import leave_descriptions_out
 
 app = typer.Typer(
     name="analysis",
@@ -21,6 +22,7 @@ def _gather() -> None:
     from analysis.commands.models import register as register_models
     from analysis.commands.opinion import register as register_opinion
     from analysis.commands.pairs import register as register_pairs
+    from analysis.commands.plan import register as register_plan
     from analysis.commands.reshape import register as register_reshape
     from analysis.commands.run import register as register_run
     from analysis.commands.thresholds import register as register_thresholds
@@ -37,6 +39,7 @@ def _gather() -> None:
     register_verify(app)
     register_convert(app)
     register_reshape(app)
+    register_plan(app)
 
 
 _gather()
@@ -44,4 +47,5 @@ _gather()
 
 def main() -> None:
     """Run `analysis`; bad input ends in one line on stderr and exit code 2."""
+    leave_descriptions_out()
     run_command_line(app)

@@ -23,9 +23,12 @@ class Channel:
 
     Attributes
     ----------
-    owner : bpy ID with the animation: the shape keys' data block, or the armature object.
-    path, index : its data path, and the place within a vector; -1 for a single number.
-    rest, closed : its value with the eye open and shut.
+    owner : Any
+        bpy ID with the animation: the shape keys' data block, or the armature object.
+    path, index : str, int
+        Its data path, and the place within a vector; -1 for a single number.
+    rest, closed : float
+        Its value with the eye open and shut.
     """
 
     owner: Any

@@ -76,8 +76,8 @@ def guesses(shape_keys: Iterable[str], bones: Iterable[str]) -> list[Guess]:
 
 def _following(scheme: Scheme, names: Sequence[str]) -> Guess | None:
     left, right = (
-        next((name for name in names if name.lower().endswith(wanted.lower())), None)
-        for wanted in (scheme.left, scheme.right)
+        next((name for name in names if name.lower().endswith(name_of_side.lower())), None)
+        for name_of_side in (scheme.left, scheme.right)
     )
     return Guess(scheme.title, scheme.kind, left, right) if left and right else None
 
@@ -104,4 +104,4 @@ def _side(name: str) -> Literal["left", "right"] | None:
 
 
 def _lowered_sides(name: str) -> str:
-    return re.sub(r"left|right", lambda found: found.group().lower(), name, flags=re.IGNORECASE)
+    return re.sub(r"left|right", lambda word: word.group().lower(), name, flags=re.IGNORECASE)

@@ -1,7 +1,5 @@
 """What the panel asks for, kept with each object."""
 
-from typing import Any
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -78,8 +76,3 @@ def unregister() -> None:
     del bpy.types.Object.palpebra
     for one in reversed(CLASSES):
         bpy.utils.unregister_class(one)
-
-
-def of_object(rig: Any) -> Any:
-    """The settings of an object."""
-    return rig.palpebra

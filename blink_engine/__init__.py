@@ -6,7 +6,14 @@ Pure numpy; the same core in TypeScript gives the same curves (docs/blink-engine
 from blink_engine.engine import BlinkEngine, LidFrame
 from blink_engine.events import EVENT_KINDS, Event, EventKind, Response
 from blink_engine.laws import Law
-from blink_engine.parameters import STATE_NAMES, Parameters, ProfileModel, StateName, default_parameters
+from blink_engine.parameters import (
+    STATE_NAMES,
+    Drift,
+    Parameters,
+    ProfileModel,
+    StateName,
+    default_parameters,
+)
 from blink_engine.performance import Performance, StateChange, perform
 from blink_engine.plan import Blink
 from blink_engine.profile import BlinkShape
@@ -17,6 +24,7 @@ __all__ = [
     "Blink",
     "BlinkEngine",
     "BlinkShape",
+    "Drift",
     "Event",
     "EventKind",
     "Law",

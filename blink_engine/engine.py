@@ -15,9 +15,14 @@ GAZE_CLOSURE_MIN, GAZE_CLOSURE_MAX = -0.15, 0.6
 class LidFrame:
     """Both eyes' lids at one moment.
 
-    `left`, `right`: closure by the upper lid, 0 open to 1 closed (below 0 where a look upwards widens the
-    eye).
-    `*_lower_up`, `*_lower_in`: the lower lid's way upwards and towards the nose, 0 to 1 of its full travel.
+    Attributes
+    ----------
+    left, right : float
+        Closure by the upper lid, 0 open to 1 closed (below 0 where a look upwards widens the eye).
+    left_lower_up, right_lower_up : float
+        The lower lid's way upwards, 0 to 1 of its full travel.
+    left_lower_in, right_lower_in : float
+        The lower lid's way towards the nose, 0 to 1 of its full travel.
     """
 
     left: float

@@ -33,6 +33,17 @@ class Law:
         z = numbers.normal()
         return self.median if self.kind == "fixed" else self.median * math.exp(self.spread * z)
 
+    def draw_under_way(self, numbers: RandomNumbers) -> float:
+        """Draw the interval that a random moment falls into: the longer one is, the likelier it is met.
+
+        Its density is x f(x) / mean. A log-normal's is log-normal with the median exp(spread^2) times as
+        great, a gamma's a gamma of the same scale and a shape greater by 1.
+        """
+        if self.kind == "gamma":
+            return self._scale() * _gamma(self.spread + 1.0, numbers)
+        drawn = self.draw(numbers)
+        return drawn if self.kind == "fixed" else drawn * math.exp(self.spread**2)
+
     @property
     def mean(self) -> float:
         """Expected value."""

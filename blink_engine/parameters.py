@@ -1,6 +1,7 @@
 """What the engine needs to know of a person and a state, with defaults that each name their source."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
@@ -54,13 +55,50 @@ class ProfileModel:
 
 
 @dataclass(frozen=True)
+class Drift:
+    r"""How somebody's rate wanders: blinks come in stretches of many and of few.
+
+    Each interval is the law's draw times e to the power of d_k, for blink k
+
+    .. math::
+
+        d_k = \varphi d_{k-1} + \sqrt{1 - \varphi^2}\, \sigma z_k \tag{4}
+
+    Attributes
+    ----------
+    spread : float
+        sigma, the standard deviation of d; z_k is standard normal. 0: no drift.
+    kept : float
+        phi, what is kept of d from one blink to the next, 0 to 1.
+    """
+
+    spread: float
+    kept: float
+
+    @property
+    def mean(self) -> float:
+        """Expected value of e to the power of d."""
+        return math.exp(self.spread**2 / 2.0)
+
+    def under_way(self, z: float) -> float:
+        """Return d at a random moment, given a standard normal number: it falls into long intervals."""
+        return self.spread**2 + self.spread * z
+
+    def following(self, before: float, z: float) -> float:
+        """Return d_k, given d_(k-1) and a standard normal number."""
+        return self.kept * before + math.sqrt(1.0 - self.kept**2) * self.spread * z
+
+
+@dataclass(frozen=True)
 class Parameters:
     """Everything the engine draws by.
 
     Attributes
     ----------
     intervals : mapping of state to Law
-        Onset to onset, in s.
+        Onset to onset, in s, where the drift is 0. A `fixed` law does not drift.
+    drift, slow_drift : Drift
+        Over some blinks, and over minutes; both apply.
     responses : mapping of event kind to Response
     profile : ProfileModel
     least_interval_s : float
@@ -72,12 +110,19 @@ class Parameters:
     """
 
     intervals: Mapping[StateName, Law]
+    drift: Drift
+    slow_drift: Drift
     responses: Mapping[EventKind, Response]
     profile: ProfileModel
     least_interval_s: float
     gaze_closure_per_deg: float
     squint_closure: float
     sources: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+    def mean_interval_s(self, state: StateName) -> float:
+        """Return the mean time from onset to onset in a state, the drifts included."""
+        law = self.intervals[state]
+        return law.mean if law.kind == "fixed" else law.mean * self.drift.mean * self.slow_drift.mean
 
     def with_rate(self, state: StateName, per_minute: float) -> "Parameters":
         """Return the same with another mean blink rate in one state.
@@ -89,7 +134,9 @@ class Parameters:
         """
         if not 0.1 <= per_minute <= 60.0:
             raise ValueError(f"expected a blink rate of 0.1 to 60 a minute, got {per_minute}")
-        return self.with_intervals({state: self.intervals[state].with_mean(60.0 / per_minute)})
+        law = self.intervals[state]
+        ratio = 60.0 / per_minute / self.mean_interval_s(state)
+        return self.with_intervals({state: law.with_mean(law.mean * ratio)})
 
     def with_intervals(self, laws: Mapping[StateName, Law]) -> "Parameters":
         """Return the same with other laws of the intervals in some states."""
@@ -118,6 +165,8 @@ def from_json(data: Mapping[str, Any]) -> Parameters:
     }
     return Parameters(
         intervals={state: Law(**data["intervals"][state]) for state in STATE_NAMES},
+        drift=Drift(**data["drift"]),
+        slow_drift=Drift(**data["slow_drift"]),
         responses={kind: Response(**data["responses"][kind]) for kind in EVENT_KINDS},
         profile=ProfileModel(**profile),
         least_interval_s=data["least_interval_s"],

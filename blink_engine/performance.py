@@ -52,7 +52,7 @@ def perform(
     ----------
     duration_s, fps : float
         Length in s, and frames a second (0 < fps <= 10,000).
-    seed, state, parameters
+    seed, state, parameters : int, str, Parameters, optional
         As for `BlinkEngine`.
     events : iterable of Event
     changes : iterable of StateChange

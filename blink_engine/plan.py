@@ -9,7 +9,7 @@ from blink_engine.parameters import Parameters, StateName
 from blink_engine.profile import BlinkShape
 from blink_engine.random_numbers import RandomNumbers
 
-INTERVALS, SHAPES, RESPONSES = 1, 2, 3
+INTERVALS, SHAPES, RESPONSES, DRIFT = 1, 2, 3, 4
 ANTICIPATED_MAX = 2
 
 
@@ -39,9 +39,9 @@ class BlinkPlan:
     """Plans one spontaneous blink and at most one answer to an event ahead; its memory does not grow.
 
     An event's blink is one that would have come anyhow: the next spontaneous one is left out for it (two at
-    most wait so), so that the rate stays the state's, as the published rates hold both kinds. Three streams
-    of random numbers serve intervals, shapes and responses, so that an event changes when blinks come, never
-    what those that still come look like.
+    most wait so), so that the rate stays the state's, as the published rates hold both kinds. Four streams
+    of random numbers serve intervals, shapes, responses and the drifts, so that an event changes when blinks
+    come, never what those that still come look like.
     """
 
     def __init__(self, parameters: Parameters, state: StateName = "rest", seed: int = 0) -> None:
@@ -50,16 +50,21 @@ class BlinkPlan:
         self._intervals = RandomNumbers(seed, INTERVALS)
         self._shapes = RandomNumbers(seed, SHAPES)
         self._responses = RandomNumbers(seed, RESPONSES)
+        self._drifts = RandomNumbers(seed, DRIFT)
         self._last_onset_s = -math.inf
-        # As if the run began at a random moment between two blinks.
-        self._spontaneous_s = self._interval() * self._intervals.uniform()
+        # A run begins at a random moment of a life: within a long interval rather than a short one, and in a
+        # stretch of few blinks rather than of many. Else its first seconds would hold too many blinks.
+        self._drift = parameters.drift.under_way(self._drifts.normal())
+        self._slow = parameters.slow_drift.under_way(self._drifts.normal())
+        met = parameters.intervals[state].draw_under_way(self._intervals)
+        self._spontaneous_s = self._drifted(met) * self._intervals.uniform()
         self._answer_s, self._answer_cause = math.inf, ""
         self._anticipated = 0
 
     def set_state(self, state: StateName, time_s: float) -> None:
         """Enter a state: what is left of the interval is stretched to the new state's mean."""
-        intervals = self._parameters.intervals
-        ratio = intervals[state].mean / intervals[self._state].mean
+        mean_s = self._parameters.mean_interval_s
+        ratio = mean_s(state) / mean_s(self._state)
         self._spontaneous_s = time_s + max(0.0, self._spontaneous_s - time_s) * ratio
         self._state = state
 
@@ -96,8 +101,16 @@ class BlinkPlan:
             self._answer_s, self._answer_cause = onset, cause
 
     def _interval(self) -> float:
-        drawn = self._parameters.intervals[self._state].draw(self._intervals)
-        return max(drawn, self._parameters.least_interval_s)
+        return self._drifted(self._parameters.intervals[self._state].draw(self._intervals))
+
+    def _drifted(self, drawn_s: float) -> float:
+        """Apply the drifts to an interval, and take them to the next one."""
+        parameters, numbers = self._parameters, self._drifts
+        fixed = parameters.intervals[self._state].kind == "fixed"
+        interval_s = drawn_s if fixed else drawn_s * math.exp(self._drift + self._slow)
+        self._drift = parameters.drift.following(self._drift, numbers.normal())
+        self._slow = parameters.slow_drift.following(self._slow, numbers.normal())
+        return max(interval_s, parameters.least_interval_s)
 
     def _blink(self, onset: float, cause: str) -> Blink:
         """Draw the shape: nine uniform numbers, whatever comes of it."""

@@ -4,6 +4,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
+from experiments.descriptions import descriptions_are_read
+
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,39}$")]
 """A factor, experiment or form name: letters, digits and underscores, at most 40, a letter first."""
 
@@ -31,5 +33,5 @@ class Declaration(BaseModel):
         frozen=True,
         extra="forbid",
         json_schema_serialization_defaults_required=True,
-        use_attribute_docstrings=True,
+        use_attribute_docstrings=descriptions_are_read(),
     )

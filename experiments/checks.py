@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from experiments.base import Translated
+from experiments.check_words import WORDS
+from experiments.check_words.words import Asked
 
 CheckName = Literal["digit", "direction", "shape", "first_blink", "first_eye"]
 CHECK_CELL = ""
@@ -16,8 +18,10 @@ class CheckKind:
 
     Attributes
     ----------
-    question, choices: by language; answers are numbered from 1 in the order of the choices.
-    own_look: True where the clip shows the study's own character, else it shows random dots.
+    question, choices : Translated, tuple of Translated
+        By language; answers are numbered from 1 in the order of the choices.
+    own_look : bool
+        True where the clip shows the study's own character, else it shows random dots.
     """
 
     question: Translated
@@ -25,43 +29,20 @@ class CheckKind:
     own_look: bool = False
 
 
+def _kind(name: CheckName, *, own_look: bool = False) -> CheckKind:
+    said: dict[str, Asked] = {language: getattr(words, name) for language, words in WORDS.items()}
+    numbers = range(len(next(iter(said.values())).choices))
+    return CheckKind(
+        {language: asked.question for language, asked in said.items()},
+        tuple({language: asked.choices[number] for language, asked in said.items()} for number in numbers),
+        own_look,
+    )
+
+
 CHECK_KINDS: dict[CheckName, CheckKind] = {
-    "digit": CheckKind(
-        {"en": "Which digit did you see?", "de": "Welche Ziffer haben Sie gesehen?"},
-        tuple({"en": str(digit), "de": str(digit)} for digit in range(1, 10)),
-    ),
-    "direction": CheckKind(
-        {"en": "Which way did the dots move?", "de": "Wohin haben sich die Punkte bewegt?"},
-        (
-            {"en": "left", "de": "nach links"},
-            {"en": "right", "de": "nach rechts"},
-            {"en": "up", "de": "nach oben"},
-            {"en": "down", "de": "nach unten"},
-        ),
-    ),
-    "shape": CheckKind(
-        {"en": "Which shape did you see?", "de": "Welche Form haben Sie gesehen?"},
-        (
-            {"en": "circle", "de": "Kreis"},
-            {"en": "square", "de": "Quadrat"},
-            {"en": "triangle", "de": "Dreieck"},
-            {"en": "cross", "de": "Kreuz"},
-        ),
-    ),
-    "first_blink": CheckKind(
-        {"en": "Which blink came first?", "de": "Welcher Lidschlag kam zuerst?"},
-        (
-            {"en": "the full one (the eyes closed)", "de": "der ganze (die Augen schlossen sich)"},
-            {"en": "the half one", "de": "der halbe"},
-        ),
-        own_look=True,
-    ),
-    "first_eye": CheckKind(
-        {
-            "en": "Which eye closed first, as you saw it?",
-            "de": "Welches Auge schloss sich zuerst, von Ihnen aus gesehen?",
-        },
-        ({"en": "the left one", "de": "das linke"}, {"en": "the right one", "de": "das rechte"}),
-        own_look=True,
-    ),
+    "digit": _kind("digit"),
+    "direction": _kind("direction"),
+    "shape": _kind("shape"),
+    "first_blink": _kind("first_blink", own_look=True),
+    "first_eye": _kind("first_eye", own_look=True),
 }

@@ -47,6 +47,17 @@ def clips(experiment: "Experiment") -> list[ClipSpec]:
     return [ClipSpec(cell, number) for cell in cells(experiment) for number in numbers]
 
 
+def rated_clips(experiment: "Experiment") -> list[ClipSpec]:
+    """The clips that trials ask about; a reference is only shown beside them."""
+    return [clip for clip in clips(experiment) if experiment.trial.rates(experiment, clip)]
+
+
+def rated_levels(experiment: "Experiment", factor: str) -> list[str]:
+    """The declared levels of a factor, in order, without one whose clips are only shown as references."""
+    rated = {clip.level(factor) for clip in rated_clips(experiment)}
+    return [level.name for level in experiment.factor(factor).levels if level.name in rated]
+
+
 def blocks(experiment: "Experiment") -> list[BlockSpec]:
     """Blocks in declared order, repeats included; a participant's order is drawn by the server."""
     every = clips(experiment)

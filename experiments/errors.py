@@ -14,8 +14,8 @@ class InputError(ValueError):
 def nearest(word: str, candidates: Iterable[str]) -> str | None:
     """Return the candidate most like `word`, or None where nothing is near."""
     choices = {candidate.casefold(): candidate for candidate in candidates}
-    found = get_close_matches(word.casefold(), list(choices), n=1, cutoff=0.5)
-    return choices[found[0]] if found else None
+    nearest = get_close_matches(word.casefold(), list(choices), n=1, cutoff=0.5)
+    return choices[nearest[0]] if nearest else None
 
 
 def did_you_mean(word: str, candidates: Iterable[str]) -> str:

@@ -53,9 +53,13 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        if error.errno not in NO_ROOM:
-            raise
-        raise InputError(f"{path} cannot be written ({error.strerror}); make room and try again") from error
+        if error.errno in NO_ROOM:
+            raise InputError(
+                f"{path} cannot be written ({error.strerror}); make room and try again"
+            ) from error
+        if error.filename == str(temporary):
+            raise InputError(f"{path} cannot be written ({error.strerror}); write it elsewhere") from error
+        raise
     finally:
         remove_quietly(temporary)
 

@@ -16,10 +16,10 @@ from experiments.schema.upgrades import upgraded
 from experiments.toml_lines import line_of
 
 FOLDER = Path(__file__).parent
-_PLACE = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
+_LOCATION = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
 SHIPPED = ("exp1", "exp2", "exp3")
 DEMOS = (
-    *("pairs-demo", "sliders-demo", "threshold-demo", "checks-demo", "faces-demo"),
+    *("pairs-demo", "sliders-demo", "dcr-demo", "threshold-demo", "plane-demo", "checks-demo", "faces-demo"),
     *("timing", "timing-pairs", "timing-continuous"),
 )
 """Demonstrations of the other kinds of trial and of sliders; each is found by its file's name or its own."""
@@ -34,8 +34,8 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        place = f"line {self.line}: " if self.line else ""
-        return f"{place}{self.path + ': ' if self.path else ''}{self.message}"
+        line = f"line {self.line}: " if self.line else ""
+        return f"{line}{self.path + ': ' if self.path else ''}{self.message}"
 
 
 class DefinitionError(InputError):
@@ -106,8 +106,8 @@ def _problem(detail: Any, text: str) -> Problem:
         location = (*location, detail["ctx"]["discriminator"].strip("'"))
     path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
     message = str(detail["msg"]).removeprefix("Value error, ")
-    if not location and (place := _PLACE.match(message)):
-        path, message = place[1], place[2]
+    if not location and (named := _LOCATION.match(message)):
+        path, message = named[1], named[2]
         location = tuple(path.split("."))
     if detail["type"] == "extra_forbidden":
         word = str(location[-1])

@@ -10,6 +10,7 @@ from pydantic import Field, StringConstraints, ValidationError
 from experiments.base import Declaration
 from experiments.checks import CheckName
 from experiments.errors import InputError
+from experiments.source_video import SourceVideo
 
 MANIFEST_NAME = "manifest.json"
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
@@ -22,13 +23,26 @@ class Clip(Declaration):
 
     Attributes
     ----------
-    levels, cell, exemplar: its place in the design. profile: identifier of the blink shown.
-    profile_repeated: True where the same recorded eye already stands for another exemplar of this cell.
-    closure: closure at 300 fps over the whole clip (0 open, 1 closed); empty for clips not made here.
-    closure_other: the right eye's, where the eyes move apart. lower_vertical_mm, lower_horizontal_mm: the
-    lower lid's lift and its slide towards the nose, at 300 fps; empty where it rests.
-    blinks_s: onsets of the blinks of a performance, in s from the clip's start; left out of other clips.
-    onset_frame: output frame at which the blink begins. width_mm: shown width at actual size.
+    levels, cell, exemplar : dict of str to str, str, int
+        Its place in the design.
+    profile : str
+        Identifier of the blink shown.
+    profile_repeated : bool
+        True where the same recorded eye already stands for another exemplar of this cell.
+    closure : tuple of float
+        Closure at 300 fps over the whole clip (0 open, 1 closed); empty for clips not made here.
+    closure_other : tuple of float
+        The right eye's, where the eyes move apart.
+    lower_vertical_mm, lower_horizontal_mm : tuple of float
+        The lower lid's lift and its slide towards the nose, at 300 fps; empty where it rests.
+    blinks_s : tuple of float
+        Onsets of the blinks of a performance, in s from the clip's start; left out of other clips.
+    onset_frame : int or None
+        Output frame at which the blink begins.
+    width_mm : float or None
+        Shown width at actual size.
+    source : SourceVideo or None
+        What a converted clip was made from; left out where the file is shown as it came.
     """
 
     levels: dict[str, str]
@@ -53,6 +67,7 @@ class Clip(Declaration):
     blinks_s: tuple[float, ...] = Field(default=(), exclude_if=lambda blinks: not blinks)
     inputs: dict[str, str] = Field(default_factory=dict)
     seed: int | None = None
+    source: SourceVideo | None = Field(default=None, exclude_if=lambda source: source is None)
 
 
 class CheckClip(Declaration):
@@ -60,8 +75,14 @@ class CheckClip(Declaration):
 
     Attributes
     ----------
-    check: kind of check. number: of the check, from 1. answer: number of the right choice, from 1.
-    width_mm: shown width at actual size.
+    check : {"digit", "direction", "shape", "first_blink", "first_eye"}
+        Kind of check.
+    number : int
+        Of the check, from 1.
+    answer : int
+        Number of the right choice, from 1.
+    width_mm : float or None
+        Shown width at actual size.
     """
 
     check: CheckName
@@ -81,7 +102,12 @@ class CheckClip(Declaration):
 class Manifest(Declaration):
     """All clips of one experiment, and what made them.
 
-    checks: clips of motion checks. checks_seed: what they were made from; who knows it knows their answers.
+    Attributes
+    ----------
+    checks : tuple of CheckClip
+        Clips of motion checks.
+    checks_seed : int or None
+        What they were made from; who knows it knows their answers.
     """
 
     experiment: str
@@ -99,6 +125,11 @@ class Manifest(Declaration):
         """Every clip that has a file: those of the design and those of checks."""
         return (*self.clips, *self.checks)
 
+    @property
+    def sources(self) -> tuple[SourceVideo, ...]:
+        """The originals of clips that were converted."""
+        return tuple(clip.source for clip in self.clips if clip.source is not None)
+
 
 def read_manifest(folder: Path) -> Manifest:
     """Read and validate `folder/manifest.json`; InputError in one line where it cannot be used."""
@@ -113,8 +144,8 @@ def read_manifest(folder: Path) -> Manifest:
         raise InputError(f"{path} is not valid JSON ({error}); build the clips again") from error
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: {place}: {first['msg']}; build the clips again") from error
+        key = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: {key}: {first['msg']}; build the clips again") from error
 
 
 def check_files(manifest: Manifest, folder: Path) -> None:
@@ -123,11 +154,23 @@ def check_files(manifest: Manifest, folder: Path) -> None:
         path = folder / clip.file
         if not path.is_file():
             raise InputError(f"clip {clip.file} ({place_of(clip)}) is missing from {folder}")
-        found = file_sha256(path)
-        if found != clip.sha256:
+        digest = file_sha256(path)
+        if digest != clip.sha256:
             raise InputError(
-                f"clip {clip.file}: expected sha256 {clip.sha256[:12]}..., got {found[:12]}...; "
+                f"clip {clip.file}: expected sha256 {clip.sha256[:12]}..., got {digest[:12]}...; "
                 "the file was changed or damaged, build it again"
+            )
+
+
+def check_originals(manifest: Manifest, folder: Path) -> None:
+    """Raise InputError for the first original of a converted clip that is missing or was changed."""
+    for source in manifest.sources:
+        path = folder / source.kept_as
+        if not path.is_file() or file_sha256(path) != source.sha256:
+            state = "was changed" if path.is_file() else "is missing"
+            raise InputError(
+                f"original {source.kept_as}, from which a clip was converted, {state} in {folder}; write the "
+                "manifest again with `stimuli manifest`, which puts it there"
             )
 
 

@@ -61,18 +61,28 @@ def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
         raise InputError(
             "expected a pattern with factors in braces, each once, such as {character}_{exemplar}.mp4"
         )
-    escaped = re.escape(one_form(pattern))
-    for name in fields:
-        escaped = escaped.replace(re.escape("{" + name + "}"), f"(?P<{name}>[^/]+?)", 1)
-    matcher = re.compile(escaped)
+    matcher, by_stem = _matcher(pattern, fields), _matcher(_stem(pattern), fields)
     rows = {}
     for name in files:
         fit = matcher.fullmatch(name)
+        if fit is None and _stem(pattern) != pattern:
+            fit = by_stem.fullmatch(_stem(name))  # files of several formats follow one pattern
         if fit is None:
             raise InputError(f"the file name '{name}' does not follow the pattern {pattern}")
         levels = {field: fit[field] for field in fields if field != FIRST_FIELD}
         rows[name] = (levels, fit[FIRST_FIELD] if FIRST_FIELD in fields else "")
     return _numbered(rows)
+
+
+def _matcher(pattern: str, fields: Sequence[str]) -> re.Pattern[str]:
+    escaped = re.escape(one_form(pattern))
+    for name in fields:
+        escaped = escaped.replace(re.escape("{" + name + "}"), f"(?P<{name}>[^/]+?)", 1)
+    return re.compile(escaped)
+
+
+def _stem(name: str) -> str:
+    return re.sub(r"\.[A-Za-z0-9]{1,4}$", "", name)
 
 
 def _numbered(rows: dict[str, tuple[dict[str, str], str]]) -> Placed:
@@ -99,11 +109,11 @@ def check_factorial(placed: Placed) -> None:
         cells *= len(levels)
     if len(counts) != cells:
         raise InputError(f"expected clips in all {cells} cells of the design, got {len(counts)} of them")
-    most, fewest = counts.most_common()[0], counts.most_common()[-1]
-    if most[1] != fewest[1]:
+    largest, smallest = counts.most_common()[0], counts.most_common()[-1]
+    if largest[1] != smallest[1]:
         raise InputError(
-            f"every cell needs the same number of clips: {'/'.join(most[0])} has {most[1]}, "
-            f"{'/'.join(fewest[0])} has {fewest[1]}"
+            f"every cell needs the same number of clips: {'/'.join(largest[0])} has {largest[1]}, "
+            f"{'/'.join(smallest[0])} has {smallest[1]}"
         )
     if reserved := [name for name in known if name in reserved_names()]:
         raise InputError(
@@ -141,7 +151,7 @@ def suggest_pattern(names: Iterable[str]) -> str | None:
     """A pattern where every name has the same number of parts between underscores; None elsewhere."""
     stems = [PurePosixPath(name).stem.split("_") for name in names]
     endings = {PurePosixPath(name).suffix for name in names}
-    if not stems or len(endings) != 1 or len({len(parts) for parts in stems}) != 1 or len(stems[0]) < 2:
+    if not stems or len({len(parts) for parts in stems}) != 1 or len(stems[0]) < 2:
         return None
     columns = list(zip(*stems, strict=True))
     varying = [len(set(column)) > 1 for column in columns]
@@ -153,4 +163,4 @@ def suggest_pattern(names: Iterable[str]) -> str | None:
         words.append(f"{{factor{1 + sum('{' in word for word in words)}}}" if varies else column[0])
     if varying[-1] and sum(varying) > 1 and all(part.isdigit() for part in columns[-1]):
         words[-1] = "{" + FIRST_FIELD + "}"
-    return "_".join(words) + endings.pop()
+    return "_".join(words) + (endings.pop() if len(endings) == 1 else ".mp4")

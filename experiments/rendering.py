@@ -26,6 +26,8 @@ ProfileName = Annotated[str, AfterValidator(_known_profile)]
 Fps = Annotated[int, Field(ge=24, le=60)]
 DurationFrames = Annotated[float, Field(ge=3, le=600)]
 DurationMs = Annotated[float, Field(ge=100, le=2000)]
+LowerLidGain = Annotated[float, Field(ge=0, le=3)]
+MovedMm = Annotated[float, Field(ge=0, le=1)]
 CountingRate = Annotated[float, Field(ge=15, le=1000)]
 MIN_BLINK_MS, MAX_BLINK_MS = 100.0, 2000.0
 Timing = Literal["uniform", "intervals", "events", "none"]
@@ -42,7 +44,8 @@ class RenderSettings(Declaration):
 
     character: str = "photorealistic"
     """A shipped character (`stimuli character list`: `alder`, `cartoon`), or the path of a folder of
-    your own. Left out, it is the retired `photorealistic`, so that old declarations keep their meaning."""
+    your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
+    retired `photorealistic`, so that old declarations keep their meaning."""
     profile: ProfileName = "real"
     """Blink profile: recorded (`real`), of the PCA model (`model`), a textbook curve (`SL`, `AL`, `SL_ease`,
     `AL_ease`: symmetric or asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""
@@ -59,6 +62,20 @@ class RenderSettings(Declaration):
     """Mean of the 300 fps samples of an output frame in linear light (MB), or one sample of it (NB)."""
     lower_lid: Literal["both", "vertical", "horizontal", "none"] = "none"
     """Which recorded signals move the lower lid."""
+    lower_lid_gain: LowerLidGain = 1.0
+    """Size of the lower lid's motion relative to what was recorded; 0 holds it still. A clip that asks for
+    more than its character was baked for (1 mm up, 5 mm towards the nose) is refused."""
+    brow_mm: MovedMm | None = None
+    """How far the brows sink and draw together while the eye shuts, in mm at closure 1, in proportion to it;
+    0 holds them still. Left out, as the character was drawn or baked (`cartoon` 0.45, baked faces 0)."""
+    cheek_mm: MovedMm | None = None
+    """How far the cheeks rise while the eye shuts, in mm at closure 1; as `brow_mm`."""
+    squint_mm: MovedMm | None = None
+    """How far the skin below the eye draws up and towards the nose while it shuts, in mm at closure 1; as
+    `brow_mm`. The margin of the lower lid is `lower_lid`'s."""
+    gaze_mm: MovedMm | None = None
+    """How far the iris turns down, and half as far towards the nose, under the closing lid, in mm at closure
+    1 (0.2 is one degree); as `brow_mm`."""
     eyes: Literal["alike", "separate"] = "alike"
     """One signal drives both eyes, or the left and the right recording an eye each."""
     performance: Timing | None = None
@@ -84,7 +101,7 @@ class RenderSettings(Declaration):
     """Frame rate of the clip, in frames per second."""
     width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
     """Width of the clip, in pixels."""
-    height_px: Annotated[int, Field(ge=120, le=720, multiple_of=2)] = 360
+    height_px: Annotated[int, Field(ge=120, le=1200, multiple_of=2)] = 360
     """Height of the clip, in pixels."""
 
     @model_validator(mode="after")
@@ -137,6 +154,16 @@ class RenderOverrides(Declaration):
     """As [render] `motion_blur`, for clips of this level."""
     lower_lid: Literal["both", "vertical", "horizontal", "none"] | None = None
     """As [render] `lower_lid`, for clips of this level."""
+    lower_lid_gain: LowerLidGain | None = None
+    """As [render] `lower_lid_gain`, for clips of this level."""
+    brow_mm: MovedMm | None = None
+    """As [render] `brow_mm`, for clips of this level."""
+    cheek_mm: MovedMm | None = None
+    """As [render] `cheek_mm`, for clips of this level."""
+    squint_mm: MovedMm | None = None
+    """As [render] `squint_mm`, for clips of this level."""
+    gaze_mm: MovedMm | None = None
+    """As [render] `gaze_mm`, for clips of this level."""
     eyes: Literal["alike", "separate"] | None = None
     """As [render] `eyes`, for clips of this level."""
     performance: Timing | None = None

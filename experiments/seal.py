@@ -82,11 +82,11 @@ def read_seal(path: Path) -> Seal:
     return seal
 
 
-ClipPlace = tuple[str, int, str]
+SealedClip = tuple[str, int, str]
 """Cell, exemplar and SHA-256 of a clip."""
 
 
-def clips_sha256(clips: Iterable[ClipPlace]) -> str:
+def clips_sha256(clips: Iterable[SealedClip]) -> str:
     """Hash over the clips' own hashes, in order of cells and exemplars."""
     return hashlib.sha256("\n".join(map(str, sorted(clips))).encode()).hexdigest()
 
@@ -110,8 +110,10 @@ def deviations(seal: Seal, experiment: Experiment, participants: int, clips: str
 
     Parameters
     ----------
-    participants: those analysed.
-    clips: hash of the clips that were shown (`clips_sha256`); None where it is not known.
+    participants : int
+        Those analysed.
+    clips : str, optional
+        Hash of the clips that were shown (`clips_sha256`); None where it is not known.
     """
     changes = difference(seal.experiment, experiment)
     lines = [str(change) for change in changes if change.path.split(".")[0] not in OF_PAGES]
@@ -130,7 +132,7 @@ def deviations_said(
 ) -> tuple[str, ...]:
     """The lines of a report on the plan it is held against."""
     plan = f"the plan sealed {seal.sealed_at} (sha256 {seal.sha256[:12]}...)"
-    found = deviations(seal, experiment, participants, clips)
-    return tuple(f"deviation from {plan}: {line}" for line in found) or (
+    departures = deviations(seal, experiment, participants, clips)
+    return tuple(f"deviation from {plan}: {line}" for line in departures) or (
         f"no deviation from {plan}" + ("" if clips else "; its clips were not compared"),
     )

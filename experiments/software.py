@@ -32,21 +32,21 @@ def present_software() -> Software:
 
 def _versions() -> dict[str, str]:
     """The program's packages and theirs, as far as they are installed; optional ones left out."""
-    found: dict[str, str] = {}
+    versions: dict[str, str] = {}
     waiting = [PROGRAM]
     while waiting:
         name = waiting.pop()
-        if name in found:
+        if name in versions:
             continue
         try:
             distribution = metadata.distribution(name)
         except metadata.PackageNotFoundError:  # for another system
             continue
-        found[name] = distribution.version
+        versions[name] = distribution.version
         waiting.extend(
             _normalised(needed) for needed in distribution.requires or () if "extra ==" not in needed
         )
-    return found
+    return versions
 
 
 def _normalised(requirement: str) -> str:

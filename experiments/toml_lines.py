@@ -17,11 +17,11 @@ def line_of(text: str, location: Sequence[object]) -> int | None:
     their headers; keys inside inline tables are found on the line of the table's own key.
     """
     places = _places(text)
-    wanted = list(location)
-    while wanted:
-        if tuple(wanted) in places:
-            return places[tuple(wanted)]
-        wanted.pop()
+    prefix = list(location)
+    while prefix:
+        if tuple(prefix) in places:
+            return places[tuple(prefix)]
+        prefix.pop()
     return None
 
 

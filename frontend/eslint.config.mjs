@@ -4,11 +4,25 @@ import { defineConfig, globalIgnores } from "eslint/config";
 import reactHooks from "eslint-plugin-react-hooks";
 import tseslint from "typescript-eslint";
 
+/** CONTRIBUTING.md: names say what they hold. `tools/check_names.py` keeps the same ones out of Python. */
+const EMPTY_NAMES = ["found", "place", "wanted", "who"];
 const BROWSER = ["document", "location", "navigator", "setTimeout", "window", "XMLHttpRequest"];
 
 export default defineConfig([
   globalIgnores(["dist", "src/api/schema.d.ts"]),
   js.configs.recommended,
+  {
+    rules: {
+      "id-denylist": ["error", ...EMPTY_NAMES],
+      "no-restricted-syntax": [
+        "error",
+        {
+          selector: ":matches(VariableDeclarator, TSEnumMember, PropertyDefinition) > Identifier[name=/(^|_)MOST(_|$)/]",
+          message: "Write MAX, not MOST.",
+        },
+      ],
+    },
+  },
   {
     files: ["**/*.{ts,tsx}"],
     extends: [tseslint.configs.strictTypeChecked, reactHooks.configs.flat["recommended-latest"]],

@@ -7,7 +7,7 @@ const NAMED = "[name]-[hash:6].js";
 const LATER = "[hash:6].js";
 /** What every kind of trial and the pages beside them need. */
 const SHARED =
-  /src\/ui\/|participant\/(session|screens\/support|jspsych|playback\/protocol|trials\/(save-rating|shared\/(stage|already-seen|place|showing|feedback|broken)))/;
+  /src\/ui\/|participant\/(session|screens\/support|jspsych|playback\/(protocol|record)|views\/|trials\/(rating|save-rating|shared\/(stage|already-seen|parameters|prepare|showing|feedback|broken)))/;
 
 /** Tells the service worker the names of the built files, which it keeps. */
 function listFiles(): Plugin {

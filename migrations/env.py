@@ -33,6 +33,7 @@ if given is not None:
     migrate(given)
 else:
     database = open_database(Settings())
+    context.config.attributes["secret_key"] = database.secret_key
     with migrating(database) as connection:
         migrate(connection)
     database.close()

@@ -10,10 +10,12 @@ from fastapi.routing import APIRoute
 from server import health, pages
 from server.accounts import endpoints as accounts
 from server.accounts import people
+from server.capsules import endpoints as capsules
 from server.clips import endpoints as clips
 from server.context import open_services
 from server.door import Door
 from server.errors import install_error_handlers
+from server.evidence.later import digests_judged_later
 from server.export import endpoints as export
 from server.library import endpoints as library
 from server.library import strips
@@ -21,44 +23,62 @@ from server.methods import endpoints as methods
 from server.middleware import SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.operations import endpoints as operations
+from server.operations.drill_schedule import weekly_drill
 from server.operations.observer import Observer
 from server.participants import endpoints as participants
 from server.participants import rating_endpoints as trials
 from server.participants import view_endpoints as views
+from server.persons import endpoints as persons
+from server.providers import endpoints as providers
+from server.rehearsals import endpoints as rehearsals
+from server.replay import endpoints as replay
 from server.reports import endpoints as reports
+from server.resets import endpoints as resets
 from server.results import endpoints as results
+from server.retention import endpoints as retention
+from server.retention.schedule import hourly_retention
 from server.runs import endpoints as runs
 from server.seals import endpoints as seals
 from server.settings import Settings
 from server.studies import endpoints as studies
 from server.studies import life_endpoints as life_cycle
 from server.studies import link_endpoints as links
+from server.studies import upload_endpoints as uploads
 from server.workspaces import endpoints as workspaces
 from server.workspaces import grant_endpoints as grants
 
 
 def _routers() -> tuple[APIRouter, ...]:
-    """Every router; `pages` comes last because it answers for whole folders of addresses."""
+    """Every router: the busiest first, and `pages` last, which answers for whole folders of addresses."""
     return (
-        health.router,
-        operations.router,
-        clips.router,
-        participants.router,
         trials.router,
         views.router,
+        participants.router,
+        clips.router,
+        health.router,
+        operations.router,
+        operations.admin_router,
         accounts.router,
+        providers.router,
+        resets.router,
         people.router,
         workspaces.router,
         grants.router,
         studies.router,
+        uploads.router,
         life_cycle.router,
         links.router,
         monitor.router,
         results.router,
         runs.router,
+        replay.router,
+        persons.router,
+        retention.router,
         seals.router,
         export.router,
         reports.router,
+        rehearsals.router,
+        capsules.router,
         methods.router,
         library.router,
         strips.router,
@@ -73,14 +93,23 @@ def _operation_id(route: APIRoute) -> str:
 def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> FastAPI:
     """The server with these settings (from the environment where None); the database must be migrated.
 
-    rehearses: as in `open_services`.
+    Parameters
+    ----------
+    rehearses : bool, optional
+        As in `open_services`.
     """
     services = open_services(settings or Settings(), rehearses=rehearses)
 
     @asynccontextmanager
     async def lifespan(served: FastAPI) -> AsyncIterator[None]:
         served.state.services.stopping.listen()
-        yield
+        async with (
+            weekly_drill(services.settings),
+            hourly_retention(services.database, services.settings),
+            digests_judged_later(services.database, services.intake),
+        ):
+            yield
+        served.state.services.preparing.close()
         served.state.services.passwords.close()
         served.state.services.intake.clips.close()
         served.state.services.group_commit.close()

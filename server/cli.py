@@ -29,6 +29,9 @@ def _gather() -> None:
     from server.export import cli as export
     from server.methods import cli as methods
     from server.operations import cli as operations
+    from server.operations import cli_backups as backups
+    from server.persons import cli as persons
+    from server.retention import cli as retention
     from server.seals import cli as seals
     from server.simulation import cli as simulation
     from server.studies import cli as studies
@@ -46,7 +49,10 @@ def _gather() -> None:
         accounts,
         audit,
         workspaces,
+        persons,
+        retention,
         operations,
+        backups,
     ):
         group.register(app)
 
@@ -66,7 +72,7 @@ def _call(*, standalone_mode: bool) -> object:
 
 
 def _setting(problem: ErrorDetails) -> str:
-    name = str(problem["loc"][0]).upper() if problem["loc"] else "a setting"
+    name = "__".join(map(str, problem["loc"])).upper() or "a setting"
     shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
     return f"{shown}: {problem['msg']}, got {problem['input']!r}; see docs/settings.md"
 

@@ -1,17 +1,19 @@
 """What the command groups share: the migrated database of the settings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 from rich.console import Console
 from sqlalchemy.exc import OperationalError
 
-from experiments.errors import InputError
+from experiments.errors import InputError, did_you_mean
 from server.context import Services, open_services
 from server.migrate import current_revision, known_revision, upgrade
 from server.settings import Settings
 
 out = Console(soft_wrap=True, highlight=False)
+Word = TypeVar("Word", bound=str)
 
 
 @contextmanager
@@ -19,10 +21,10 @@ def migrated_services(settings: Settings | None = None) -> Iterator[Services]:
     """Database and clip store of the settings, the database brought to the newest revision."""
     services = open_services(settings or Settings())
     try:
-        found = _found_revision(services)
-        if found is not None and not known_revision(found):
+        revision = _stored_revision(services)
+        if revision is not None and not known_revision(revision):
             raise InputError(
-                f"the database has revision {found}, which this program does not know; "
+                f"the database has revision {revision}, which this program does not know; "
                 "it was written by a newer version, install that one"
             )
         upgrade(services.database)
@@ -31,10 +33,18 @@ def migrated_services(settings: Settings | None = None) -> Iterator[Services]:
         services.database.close()
 
 
-def _found_revision(services: Services) -> str | None:
+def _stored_revision(services: Services) -> str | None:
     try:
         return current_revision(services.database)
     except OperationalError as error:
         address = services.database.url.render_as_string(hide_password=True)
         reason = str(error.orig).strip().splitlines()[0]
         raise InputError(f"cannot open the database {address}: {reason}") from error
+
+
+def one_of(words: Sequence[Word], word: str, what: str) -> Word:
+    """The word as one of those known; InputError, with the nearest, where it is none of them."""
+    known = next((one for one in words if one == word), None)
+    if known is None:
+        raise InputError(f"expected {what} {', '.join(words)}, got '{word}'{did_you_mean(word, words)}")
+    return known

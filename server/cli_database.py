@@ -1,9 +1,14 @@
 """`server database`: bring the database to the newest revision, say which one it has, copy it, count anew."""
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
+from experiments.errors import InputError
 from server.cli_common import migrated_services, out
 from server.db import open_database
+from server.identities.repository import rewrap_all
 from server.migrate import current_revision, newest_revision
 from server.operations.cli import copy
 from server.runs.erasure import replay
@@ -35,10 +40,10 @@ def upgrade() -> None:
 def status() -> None:
     """Say which revision the database has, and which this program expects."""
     database = open_database(Settings())
-    found, expected = current_revision(database), newest_revision()
+    revision, expected = current_revision(database), newest_revision()
     database.close()
-    advice = "" if found == expected else "; run `server database upgrade`"
-    out.print(f"found {found or 'no tables'}, expected {expected}{advice}")
+    advice = "" if revision == expected else "; run `server database upgrade`"
+    out.print(f"found {revision or 'no tables'}, expected {expected}{advice}")
 
 
 @app.command("recount")
@@ -51,6 +56,32 @@ def recount() -> None:
     with migrated_services() as services:
         mended, runs = repair(services.database, services.versions)
     out.print(f"{runs} runs counted, {mended} mended")
+
+
+@app.command("rewrap")
+def rewrap(
+    old_key_file: Annotated[
+        Path, typer.Argument(help="The secret key of before, as data/secret_key was.", show_default=False)
+    ],
+) -> None:
+    """Make recruiters' ids readable again after the secret key was changed.
+
+    Their keys are wrapped under the secret key; this wraps them under the one of the settings. Move the
+    key file away from beside your backups afterwards and back up anew, but keep it: the backups made so far
+    open with it alone (server restore FILE --keys).
+    Example: server database rewrap /media/safe/secret_key
+    """
+    try:
+        old = old_key_file.read_bytes().strip()
+    except OSError as error:
+        raise InputError(f"{old_key_file} cannot be read: {error.strerror or error}") from error
+    with migrated_services() as services, services.database.write() as session:
+        done, left = rewrap_all(session, old)
+    out.print(f"{done} keys wrapped anew; {left} are not under that key")
+    out.print(
+        "move palpebra-keys.json away and keep it with the backups made so far, which open with it alone "
+        "(server restore FILE --keys); then back up anew"
+    )
 
 
 @app.command("erase-again")

@@ -13,12 +13,14 @@ from server.db import REQUEST_BUSY_S, Database, open_database
 from server.evidence.clip_bytes import ClipBytes
 from server.evidence.intake import Intake
 from server.group_commit import GroupCommit
+from server.providers.clients import Providers
 from server.rate_limit import RateLimit
 from server.results.cache import ResultsCache
 from server.settings import Settings
 from server.stopping import Stopping
 from server.storage.clips import ClipStore, FolderStore
 from server.storage.s3 import open_s3
+from server.transcoding.preparing import Preparing
 from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
@@ -43,6 +45,8 @@ class Services:
     results: ResultsCache
     intake: Intake
     resume_codes: RateLimit
+    preparing: Preparing
+    providers: Providers
 
     def time_of(self, request: Request) -> datetime:
         """When a participant's request came in: now, but where simulated people say when they act."""
@@ -53,7 +57,10 @@ class Services:
 def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
     """Open database and clip store; nothing is migrated or started.
 
-    rehearses: simulated runs are held to what people are held to, and say what time it is.
+    Parameters
+    ----------
+    rehearses : bool, optional
+        Simulated runs are held to what people are held to, and say what time it is.
     """
     database = open_database(settings, REQUEST_BUSY_S)
     clips = open_s3(settings) if settings.s3_bucket else FolderStore(settings.clip_folder)
@@ -71,23 +78,28 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         results=ResultsCache(),
         intake=Intake(settings, ClipBytes(clips), rehearses=rehearses),
         resume_codes=RateLimit(RESUME_CODES_PER_MINUTE),
+        preparing=Preparing(settings.upload_folder),
+        providers=Providers(settings),
     )
 
 
-# The dependencies are async so that FastAPI does not send them through its thread pool.
-async def _services(request: Request) -> Services:
+def services_of(request: Request) -> Services:
+    """The services of the application that a request is to."""
     services: Services = request.app.state.services
     return services
 
 
+# The dependencies are async so that FastAPI does not send them through its thread pool.
+async def _services(request: Request) -> Services:
+    return services_of(request)
+
+
 async def _settings(request: Request) -> Settings:
-    services: Services = request.app.state.services
-    return services.settings
+    return services_of(request).settings
 
 
 async def _database(request: Request) -> Database:
-    services: Services = request.app.state.services
-    return services.database
+    return services_of(request).database
 
 
 ServicesDep = Annotated[Services, Depends(_services)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import psycopg
-from sqlalchemy import Connection, create_engine, event
+from sqlalchemy import Connection, create_engine
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
@@ -16,10 +16,11 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from server.settings import Settings
+from server.sqlite import sqlite_engines
 
 DRIVERS = ("sqlite", "sqlite+pysqlite", "postgresql+psycopg")
 SIGNING_KEY, SYSLOG = "signing key", "syslog"
-"""What sessions that write carry: a function that gives the secret key, and where the audit log goes."""
+"""What sessions carry: a function that gives the secret key, and where the audit log goes."""
 BUSY_TIMEOUT_S = 30
 """How long a command waits for a turn to write."""
 REQUEST_BUSY_S = 4
@@ -60,22 +61,25 @@ class Database:
     ) -> None:
         self.url = checked_url(url)
         self.is_sqlite = self.url.get_backend_name() == "sqlite"
-        self.engine = _sqlite_engine(url, pool, busy_s) if self.is_sqlite else _postgres_engine(url, pool)
-        self._carried = dict(carried or {})
-        self._write_engine = self.engine.execution_options(immediate=True)
+        self.engine, self.write_engine = (
+            sqlite_engines(self.url, pool, busy_s, BUSY_TIMEOUT_S)
+            if self.is_sqlite
+            else 2 * (_postgres_engine(url, pool),)
+        )
+        self.carried = dict(carried or {})
         # SQLite lets one writer in and makes the others poll; queueing them here keeps the wait short.
         self._writer = _Turns(busy_s) if self.is_sqlite else nullcontext()
 
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session that only reads; rolled back at the end."""
-        with Session(self.engine, autoflush=False) as session:
+        with Session(self.engine, autoflush=False, info=self.carried) as session:
             yield session
 
     @contextmanager
     def snapshot(self) -> Iterator[Session]:
         """As `read()`, but seeing one moment of the database, however long it reads."""
-        with Session(self.engine, autoflush=False) as session:
+        with Session(self.engine, autoflush=False, info=self.carried) as session:
             if not self.is_sqlite:  # SQLite's transactions are snapshots in themselves
                 session.connection(execution_options={"isolation_level": "REPEATABLE READ"})
             yield session
@@ -83,19 +87,70 @@ class Database:
     @contextmanager
     def write(self) -> Iterator[Session]:
         """A session committed at the end, rolled back where an exception leaves the block."""
-        with self._writer, Session(self._write_engine, expire_on_commit=False, info=self._carried) as session:
+        with self._writer, Session(self.write_engine, expire_on_commit=False, info=self.carried) as session:
             yield session
             session.commit()
 
     @contextmanager
     def write_connection(self) -> Iterator[Connection]:
         """As `write()`, without the ORM's session: for the few statements that run all the time."""
-        with self._writer, self._write_engine.begin() as connection:
+        with self._writer, self.write_engine.begin() as connection:
             yield connection
+
+    def secret_key(self) -> bytes:
+        """The installation's key; refused where the database was opened without one."""
+        if SIGNING_KEY not in self.carried:
+            raise InputError(
+                "recruiters' ids are encrypted under the installation's key, which this address was opened "
+                "without; run: server database upgrade"
+            )
+        key: bytes = self.carried[SIGNING_KEY]()
+        return key
+
+    def writer(self) -> "Writer":
+        """Transactions one after the other, for one thread."""
+        return Writer(self.write_engine, self._writer)
 
     def close(self) -> None:
         """Close every pooled connection."""
         self.engine.dispose()
+        self.write_engine.dispose()
+
+
+class Writer:
+    """Transactions of one thread, on a connection that it keeps from one to the next until it rests.
+
+    Taking a connection from the pool and handing it back takes as long as two statements; PostgreSQL is asked
+    each time, besides, whether it is still there.
+    """
+
+    def __init__(self, engine: Engine, turns: "_Turns | nullcontext[None]") -> None:
+        self._engine, self._turns = engine, turns
+        self._connection: Connection | None = None
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the next transaction's connection is one that was not looked at again."""
+        return self._connection is not None
+
+    @contextmanager
+    def transaction(self) -> Iterator[Connection]:
+        """As `Database.write_connection`. One that fails gives its connection back, which may be broken."""
+        with self._turns:
+            try:
+                if self._connection is None:
+                    self._connection = self._engine.connect()
+                with self._connection.begin():
+                    yield self._connection
+            except BaseException:
+                self.rest()
+                raise
+
+    def rest(self) -> None:
+        """Give the connection back to the pool."""
+        kept, self._connection = self._connection, None
+        if kept is not None:
+            kept.close()
 
 
 def checked_url(url: str) -> URL:
@@ -127,6 +182,11 @@ def is_away(error: BaseException) -> bool:
         code = error.orig.sqlstate
         return code is None or code[:2] in ("08", "40", "53", "57")
     return error.connection_invalidated or _sqlite_code(error) in SQLITE_AWAY
+
+
+def is_cut(error: BaseException) -> bool:
+    """True where the connection to the database was found broken."""
+    return isinstance(error, DBAPIError) and error.connection_invalidated
 
 
 def is_busy(error: BaseException) -> bool:
@@ -164,32 +224,3 @@ def _postgres_engine(url: str, pool: int) -> Engine:
         pool_pre_ping=True,
         hide_parameters=True,  # an error must not quote what a person answered
     )
-
-
-def _sqlite_engine(url: str, pool: int, busy_s: float) -> Engine:
-    engine = create_engine(
-        url,
-        pool_size=pool,
-        max_overflow=2 * pool,
-        pool_timeout=BUSY_TIMEOUT_S,
-        hide_parameters=True,
-        connect_args={"timeout": busy_s, "check_same_thread": False},
-    )
-    event.listen(engine, "connect", _prepare_sqlite)
-    event.listen(engine, "begin", _begin_sqlite)
-    return engine
-
-
-def _prepare_sqlite(connection: Any, _record: object) -> None:
-    # The driver's own transaction handling would begin late and not for reads; `_begin_sqlite` does it.
-    connection.isolation_level = None
-    cursor = connection.cursor()
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "temp_store=MEMORY"):
-        cursor.execute(f"PRAGMA {pragma}")
-    cursor.close()
-
-
-def _begin_sqlite(connection: Connection) -> None:
-    immediate = connection.get_execution_options().get("immediate", False)
-    # What reads before it writes must hold the write lock from its start, or it may have to fail.
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if immediate else "BEGIN")

@@ -4,6 +4,7 @@ Written as plain ASGI because Starlette's BaseHTTPMiddleware costs as much as a 
 """
 
 import asyncio
+import re
 import time
 from dataclasses import dataclass
 from typing import Literal
@@ -14,8 +15,8 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.accounts.identity import identify
-from server.context import Services
-from server.errors import ApiError, error_response
+from server.context import services_of
+from server.errors import ApiError, refusal_response
 from server.settings import Settings
 from server.text import body_problem
 from server.workspaces.access import recognise_uploader
@@ -29,6 +30,7 @@ HELD_BYTES = 32 * 1024 * 1024
 BODY_S = 30.0
 UPLOAD_IDLE_S, UPLOAD_GRACE_S, UPLOAD_BYTES_PER_S = 30.0, 60.0, 16 * 1024
 UPLOADS = "/api/admin/uploads"
+_MORE_FILES = re.compile(rf"{UPLOADS}/[0-9a-f]+/files/?")
 ADMIN, ACCOUNTLESS = "/api/admin/", ("/api/admin/session", "/api/admin/invitations/")
 RUN = "/api/run/"
 Kind = Literal["anonymous", "run", "admin", "upload"]
@@ -74,7 +76,7 @@ def too_large(limit: int) -> BodyTooLarge:
 
 def kind_of(method: str, path: str) -> Kind:
     """To which class of limits a request belongs."""
-    if path.rstrip("/") == UPLOADS and method == "POST":
+    if method == "POST" and (path.rstrip("/") == UPLOADS or _MORE_FILES.fullmatch(path)):
         return "upload"
     if path.startswith(ADMIN) and not path.startswith(ACCOUNTLESS):
         return "admin"
@@ -115,15 +117,14 @@ class Door:
             return
         except ApiError as refusal:
             # The rest of the body is not waited for.
-            headers = {**(refusal.headers or {}), "connection": "close"}
-            answer = error_response(refusal.status, refusal.code, refusal.message, refusal.details, headers)
-            await answer(scope, receive, send)
+            await refusal_response(refusal, connection="close")(scope, receive, send)
             return
         await self.app(scope, inner, send)
 
     async def _upload(self, scope: Scope, receive: Receive) -> Receive:
         """Recognise the sender first; then let the body pass, counted and timed."""
-        await run_in_threadpool(recognise_uploader, Request(scope), _services(scope))
+        request = Request(scope)
+        await run_in_threadpool(recognise_uploader, request, services_of(request))
         if _declared(scope) > self.upload_bytes:
             raise too_large(self.upload_bytes)
         return _counted(receive, self.upload_bytes)
@@ -163,15 +164,11 @@ class Door:
     async def _raise_limit(self, scope: Scope, kind: Kind, body: _Body, size: int) -> None:
         """Let an account send more than a stranger; BodyTooLarge where that is not enough or nobody's."""
         if kind == "admin" and body.limit < SIGNED_IN_BYTES:
-            await run_in_threadpool(identify, Request(scope), _services(scope))
+            request = Request(scope)
+            await run_in_threadpool(identify, request, services_of(request))
             body.limit = SIGNED_IN_BYTES
         if size > body.limit:
             raise too_large(body.limit)
-
-
-def _services(scope: Scope) -> Services:
-    services: Services = scope["app"].state.services
-    return services
 
 
 def _declared(scope: Scope) -> int:

@@ -92,6 +92,12 @@ def error_response(
     return JSONResponse(body, status_code=status, headers=headers)
 
 
+def refusal_response(refusal: ApiError, **headers: str) -> JSONResponse:
+    """The answer to a request that was refused, with further headers."""
+    every = {**(refusal.headers or {}), **headers}
+    return error_response(refusal.status, refusal.code, refusal.message, refusal.details, every)
+
+
 def install_error_handlers(app: FastAPI) -> None:
     """Make `app` answer every refusal in the one shape."""
     app.add_exception_handler(ApiError, _refused)
@@ -108,7 +114,7 @@ def install_error_handlers(app: FastAPI) -> None:
 async def _refused(_request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, ApiError):
         raise error
-    return error_response(error.status, error.code, error.message, error.details, error.headers)
+    return refusal_response(error)
 
 
 async def _bad_input(_request: Request, error: Exception) -> JSONResponse:

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection
 
-from server.db import Database, is_busy
+from server.db import Database, Writer, is_busy, is_cut
 from server.errors import ApiError
 
 T = TypeVar("T")
@@ -25,6 +25,8 @@ MAX_LIGHT = 64
 """Pieces of light work that share one commit."""
 MAX_HEAVY = 16
 """Weight of the heavy work among them; a rating weighs 1. One piece goes in though it is heavier."""
+KEPT_S = 1.0
+"""How long a writer without work keeps its connection."""
 POSTGRES_WRITERS = 4
 """Writers of light work; PostgreSQL has one more, for heavy work."""
 
@@ -79,17 +81,21 @@ class _Queue:
             self._ends = True
             self._changed.notify()
 
-    def take(self) -> list[_Work]:
-        """What shares the next commit, light work first; waits for it. Empty at the end."""
+    def take(self, rest: Callable[[], None]) -> list[_Work]:
+        """What shares the next commit, light work first; empty at the end. Waits; rests if that is long."""
         with self._changed:
-            while not (self._light or self._heavy or self._ends):
-                self._changed.wait()
+            if not self._changed.wait_for(self._has_news, KEPT_S):
+                rest()
+                self._changed.wait_for(self._has_news)
             batch = [self._light.popleft() for _ in range(min(MAX_LIGHT, len(self._light)))]
             weight = 0
             while self._heavy and (weight == 0 or weight + self._heavy[0].weight <= MAX_HEAVY):
                 weight += self._heavy[0].weight
                 batch.append(self._heavy.popleft())
             return batch
+
+    def _has_news(self) -> bool:
+        return bool(self._light or self._heavy or self._ends)
 
 
 class GroupCommit:
@@ -104,13 +110,16 @@ class GroupCommit:
     async def run(self, key: str, work: Callable[[Connection], T], weight: int = 1) -> T:
         """Do `work` in a transaction shared with others and return its result once that is committed.
 
-        weight: how many ratings it is worth; work heavier than one waits as the module says.
+        Parameters
+        ----------
+        weight : int, optional
+            How many ratings it is worth; work heavier than one waits as the module says.
         """
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         queues = self._queues or self._start()
-        place = hash(key) % max(1, len(queues) - 1) if weight == 1 else -1
-        queues[place].put(_Work(work, weight, loop, future))
+        queue = hash(key) % max(1, len(queues) - 1) if weight == 1 else -1
+        queues[queue].put(_Work(work, weight, loop, future))
         return await future
 
     def close(self) -> None:
@@ -134,25 +143,33 @@ class GroupCommit:
             return self._queues
 
     def _write(self, queue: _Queue) -> None:
-        while batch := queue.take():
-            self._commit(batch)
+        writer = self.database.writer()
+        while batch := queue.take(writer.rest):
+            _commit(writer, batch)
             for loop in {work.loop for work in batch}:
                 mine = [work for work in batch if work.loop is loop]
                 _tell(loop, mine)
+        writer.rest()
 
-    def _commit(self, batch: list[_Work]) -> None:
-        try:
-            with self.database.write_connection() as connection:
-                for work in batch:
-                    work.attempt(connection)
-        except Exception as error:
-            if len(batch) == 1 or is_busy(error):
-                for work in batch:
-                    work.error = error
-                return
-            # One of them broke the transaction of all: each gets one of its own.
+
+def _commit(writer: Writer, batch: list[_Work]) -> None:
+    was_kept = writer.is_kept
+    try:
+        with writer.transaction() as connection:
             for work in batch:
-                self._commit([work])
+                work.attempt(connection)
+    except Exception as error:
+        if was_kept and is_cut(error):
+            # It may have been cut long ago. All work can be done again: what is stored is stored once.
+            _commit(writer, batch)
+            return
+        if len(batch) == 1 or is_busy(error):
+            for work in batch:
+                work.error = error
+            return
+        # One of them broke the transaction of all: each gets one of its own.
+        for work in batch:
+            _commit(writer, [work])
 
 
 def _tell(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:

@@ -70,10 +70,10 @@ async def healthz() -> Health:
 @router.get("/readyz", responses={503: ERROR_RESPONSES["4XX"]})
 def readyz(services: ServicesDep) -> Health:
     """The database answers, is writable and has the newest revision; the disk has room, clips are read."""
-    found, expected = current_revision(services.database), newest_revision()
-    if found != expected:
+    revision, expected = current_revision(services.database), newest_revision()
+    if revision != expected:
         raise NotReady(
-            f"The database has revision {found}, expected {expected}; run `server database upgrade`."
+            f"The database has revision {revision}, expected {expected}; run `server database upgrade`."
         )
     if problem := no_room(services.settings):
         raise NotReady(problem)

@@ -57,7 +57,7 @@ class PlainLines(logging.Formatter):
         line = f"{record.levelname.lower()}: {record.getMessage()} {fields}".rstrip()
         if record.exc_info and record.exc_info[1] is not None:
             line += f": {described(record.exc_info[1])}"
-            line += "".join(f"\n    {place}" for place in frames(record.exc_info[1].__traceback__))
+            line += "".join(f"\n    {frame}" for frame in frames(record.exc_info[1].__traceback__))
         return line
 
 

@@ -1,6 +1,6 @@
 """Bring a database to the newest revision, or tell which one it has."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,12 +15,15 @@ from server.db import Database
 from server.repository import wait_for_other_migrations
 
 
-def alembic_config(connection: Connection | None = None) -> Config:
-    """Alembic's settings, working on `connection`."""
+def alembic_config(
+    connection: Connection | None = None, secret_key: Callable[[], bytes] | None = None
+) -> Config:
+    """Alembic's settings, working on `connection`; a revision that encrypts asks for the secret key."""
     config = Config()
     config.set_main_option("script_location", str(Path(migrations.__file__).parent))
     config.set_main_option("path_separator", "os")
     config.attributes["connection"] = connection
+    config.attributes["secret_key"] = secret_key
     return config
 
 
@@ -30,7 +33,7 @@ def migrating(database: Database) -> Iterator[Connection]:
 
     Alembic takes SQLite for a database that commits with each change of a table; begun like this it does not.
     """
-    with database.engine.execution_options(immediate=True).begin() as connection:
+    with database.write_engine.begin() as connection:
         if not database.is_sqlite:
             # Workers that start together must not migrate together.
             wait_for_other_migrations(connection)
@@ -41,7 +44,7 @@ def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str
     """Run the missing migrations in one transaction; return the revision before and after."""
     with migrating(database) as connection:
         before = MigrationContext.configure(connection).get_current_revision()
-        command.upgrade(alembic_config(connection), revision)
+        command.upgrade(alembic_config(connection, database.secret_key), revision)
         after = MigrationContext.configure(connection).get_current_revision()
     return before, after
 
@@ -49,7 +52,7 @@ def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str
 def downgrade(database: Database, revision: str = "-1") -> None:
     """Undo migrations down to `revision`."""
     with migrating(database) as connection:
-        command.downgrade(alembic_config(connection), revision)
+        command.downgrade(alembic_config(connection, database.secret_key), revision)
 
 
 def current_revision(database: Database) -> str | None:

@@ -1,17 +1,19 @@
 """The built pages: the participant's page and the admin site, with their hashed assets."""
 
 import mimetypes
+from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
 
 from fastapi import APIRouter, Response
-from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse
 
 from server.context import Services, ServicesDep, SettingsDep
 from server.errors import ApiError, NotFound
 from server.middleware import NONCE_PLACEHOLDER, content_security_policy, new_nonce
 
 router = APIRouter(include_in_schema=False)
+SECURITY_TXT_LASTS = timedelta(days=90)
 IMMUTABLE = "public, max-age=31536000, immutable"
 mimetypes.add_type("text/javascript", ".mjs")
 mimetypes.add_type("application/wasm", ".wasm")
@@ -28,6 +30,20 @@ class PagesNotBuilt(ApiError):
 def home() -> RedirectResponse:
     """Send whoever comes without a link to the admin site."""
     return RedirectResponse("/admin/")
+
+
+@router.get("/.well-known/security.txt")
+def security_txt(settings: SettingsDep) -> PlainTextResponse:
+    """Where weaknesses of this server are reported (RFC 9116); 404 where nobody is named."""
+    if not settings.security_contact:
+        raise NotFound("Nobody is named for reports of weaknesses; set PALPEBRA_SECURITY_CONTACT.")
+    expires = (datetime.now(UTC) + SECURITY_TXT_LASTS).replace(microsecond=0, tzinfo=None)
+    return PlainTextResponse(
+        f"Contact: {settings.security_contact}\n"
+        f"Expires: {expires.isoformat()}Z\n"
+        "Preferred-Languages: en\n"
+        f"Canonical: {settings.public_url}/.well-known/security.txt\n"
+    )
 
 
 @router.get("/run/{link_token}")
@@ -58,12 +74,12 @@ def admin_page(services: ServicesDep, rest: str = "") -> Response:  # noqa: ARG0
 def asset(settings: SettingsDep, site: str, name: str) -> Response:
     """A file of a built page; its name carries a hash, so it may be cached for ever."""
     folder = settings.frontend_folder.resolve()
-    for place in (
+    for candidate in (
         folder / site / "assets" / site / name,
         folder / site / "assets" / name,
         folder / site / name,
     ):
-        path = place.resolve()
+        path = candidate.resolve()
         if path.is_file() and path.is_relative_to(folder):
             kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
             return Response(

@@ -21,12 +21,19 @@ class RateLimit:
 
     def hit(self, key: str) -> None:
         """Count one event; TooManyRequests where `key` has used up its share."""
+        self._take(key, 1)
+
+    def check(self, key: str) -> None:
+        """TooManyRequests where `key` has used up its share; counts nothing."""
+        self._take(key, 0)
+
+    def _take(self, key: str, number: int) -> None:
         with self._lock:
             moment = self._clock()
             left, seen = self._buckets.pop(key, (float(self.per_minute), moment))
             left = min(self.per_minute, left + (moment - seen) * self.per_minute / WINDOW_S)
             # Put back at the end: the dictionary's first key is then the one unused for longest.
-            self._buckets[key] = (left - 1 if left >= 1 else left, moment)
+            self._buckets[key] = (left - number if left >= 1 else left, moment)
             if len(self._buckets) > _MAX_KEYS:
                 del self._buckets[next(iter(self._buckets))]
         if left < 1:

@@ -2,14 +2,16 @@
 
 import os
 import secrets
+from email.utils import parseaddr
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import AliasChoices, Field, field_validator
+from pydantic import AliasChoices, Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from experiments.database_url import with_driver
+from server.providers.declaration import LOCAL_HOSTS, Provider, ProviderId
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -20,7 +22,9 @@ class Settings(BaseSettings):
     Times are minutes, hours or seconds as the name says; sizes are bytes.
     """
 
-    model_config = SettingsConfigDict(env_prefix="PALPEBRA_", validate_by_name=True, extra="ignore")
+    model_config = SettingsConfigDict(
+        env_prefix="PALPEBRA_", env_nested_delimiter="__", validate_by_name=True, extra="ignore"
+    )
 
     data_folder: Path = Field(
         default=Path("data"),
@@ -77,6 +81,23 @@ class Settings(BaseSettings):
     logins_per_minute_overall: int = Field(
         default=120, ge=1, description="Sign-in attempts a minute from browsers not seen before, per worker."
     )
+    oidc: dict[ProviderId, Provider] = Field(
+        default={},
+        description="Services that sign people in (OpenID Connect): LABEL, ISSUER, CLIENT_ID, "
+        "CLIENT_SECRET_FILE and more of each; see docs/sign-in.md.",
+    )
+    smtp_host: str = Field(
+        default="", description="Server that takes mail, for new passwords; empty: none is sent."
+    )
+    smtp_port: int = Field(default=587, ge=1, le=65535, description="Its port; 465 goes with tls.")
+    smtp_security: Literal["starttls", "tls", "none"] = Field(
+        default="starttls", description="How the way there is encrypted; none: on this machine alone."
+    )
+    smtp_user: str = Field(default="", description="Name to sign in with there; empty: without.")
+    smtp_password_file: Path | None = Field(default=None, description="File with the password for it.")
+    mail_from: str = Field(
+        default="", description="Address that letters come from, as 'Palpebra <palpebra@lab.example>'."
+    )
     monitor_stream_minutes: float = Field(
         default=60.0, gt=0, description="After so long the live monitor's browser connects anew."
     )
@@ -93,6 +114,16 @@ class Settings(BaseSettings):
         default=False,
         description="Browsers fetch clips from the store by signed addresses; else through the server.",
     )
+    capsules_kept: int = Field(
+        default=5,
+        ge=1,
+        description="Finished capsules of a study that are kept; a newer one takes the place of the oldest.",
+    )
+    capsule_keep_days: float = Field(
+        default=90.0,
+        gt=0,
+        description="Days after which a capsule, or a failed attempt at one, goes when the next one is done.",
+    )
     log_format: Literal["auto", "json", "text"] = Field(
         default="auto", description="Form of the log on stderr: json, text, or auto (text on a terminal)."
     )
@@ -104,6 +135,28 @@ class Settings(BaseSettings):
     free_megabytes_min: float = Field(
         default=200.0, ge=0, description="With less room on the data folder's disk /readyz says 503."
     )
+    backup_folder: str = Field(
+        default="",
+        description="Folder of the backups, or s3://BUCKET/PREFIX: the newest one's age is told, and it is "
+        "brought back weekly.",
+    )
+    backup_keys: Path | None = Field(
+        default=None,
+        description="Key file of backups that are not encrypted, for `server backup`, `restore` and `drill`; "
+        "palpebra-keys.json beside the backup where not given.",
+    )
+    backup_recipient: str = Field(
+        default="",
+        description="Public key (age1...) for which `server backup --to` encrypts; by server backup-key.",
+    )
+    backup_identity: Path | None = Field(
+        default=None,
+        description="File of the private key of encrypted backups; only where they are to be drilled here.",
+    )
+    security_contact: str = Field(
+        default="",
+        description="Where weaknesses are reported, mailto: or https:; shown in /.well-known/security.txt.",
+    )
     metrics_token: str = Field(
         default="",
         description="Token that /metrics asks for; empty: it answers requests from this machine alone.",
@@ -113,6 +166,28 @@ class Settings(BaseSettings):
     @classmethod
     def _with_driver(cls, value: str) -> str:
         return with_driver(value)
+
+    @field_validator("security_contact")
+    @classmethod
+    def _is_an_address(cls, value: str) -> str:
+        if value and not (value.startswith(("mailto:", "https://")) and value.isprintable()):
+            raise ValueError("expected mailto:name@example.org or https://..., in one line")
+        return value
+
+    @field_validator("mail_from")
+    @classmethod
+    def _is_one_address(cls, value: str) -> str:
+        if value and ("@" not in parseaddr(value)[1] or not value.isprintable()):
+            raise ValueError("expected one address of mail, as 'Palpebra <palpebra@lab.example>'")
+        return value
+
+    @model_validator(mode="after")
+    def _mail_is_private(self) -> Self:
+        if self.smtp_host and self.smtp_security == "none" and self.smtp_host not in LOCAL_HOSTS:
+            raise ValueError("PALPEBRA_SMTP_SECURITY none sends links in the open; only to this machine")
+        if self.smtp_host and not self.mail_from:
+            raise ValueError("PALPEBRA_MAIL_FROM is needed beside PALPEBRA_SMTP_HOST")
+        return self
 
     @field_validator("public_url")
     @classmethod

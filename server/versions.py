@@ -1,8 +1,10 @@
 """Study versions in memory: the declaration and the clips of a version never change, so each is read once."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock
+from typing import Any, TypeVar
 
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
@@ -11,9 +13,10 @@ from experiments.checks import CHECK_CELL, CheckName
 from experiments.definition import Experiment
 from experiments.schema.stored import load_stored
 from server.repository import clips_of_version, version_by_id
-from server.tallies.tally import Place, numbers
+from server.tallies.tally import NumberedClip, numbers
 
 _MAX_KEPT = 64
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -42,16 +45,40 @@ class CheckClip:
 class LoadedVersion:
     """A study version ready for use.
 
-    clips: every clip by its id, those of checks too. places: finds a clip's id by cell and exemplar.
-    numbered: a clip's number and its cell's, for tallies. checks: the clips of motion checks.
+    Attributes
+    ----------
+    clips : mapping of int to PlacedClip
+        Every clip by its id, those of checks too.
+    places : mapping of (str, int) to int
+        Finds a clip's id by cell and exemplar.
+    numbered : mapping of int to NumberedClip
+        A clip's number and its cell's, for tallies.
+    checks : tuple of CheckClip
+        The clips of motion checks.
     """
 
     experiment: Experiment
     inter_ocular_px: float | None
     clips: Mapping[int, PlacedClip]
     places: Mapping[tuple[str, int], int]
-    numbered: Mapping[int, Place]
+    numbered: Mapping[int, NumberedClip]
     checks: tuple[CheckClip, ...] = ()
+
+    @cached_property
+    def lengths(self) -> Mapping[str, float]:
+        """How long each clip lasts, in ms, by its hash."""
+        return {clip.sha256: 1000 * clip.frames / clip.fps for clip in self.clips.values()}
+
+    @cached_property
+    def _made(self) -> dict[Callable[["LoadedVersion"], Any], Any]:
+        return {}
+
+    def once(self, make: Callable[["LoadedVersion"], T]) -> T:
+        """What `make` makes of this version, which never changes: made at its first use and kept."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        made: T = self._made[make]
+        return made
 
     def check_of(self, clip: int) -> CheckClip:
         """The motion check that the clip with this id belongs to."""
@@ -67,15 +94,15 @@ class Versions:
 
     def get(self, source: Session | Connection, version_id: int) -> LoadedVersion:
         """The version with this id, from memory or the database."""
-        found = self._loaded.get(version_id)
-        if found is None:
+        version = self._loaded.get(version_id)
+        if version is None:
             session = source if isinstance(source, Session) else Session(source)
-            found = _load(session, version_id)
+            version = _load(session, version_id)
             with self._lock:
                 while len(self._loaded) >= _MAX_KEPT:
                     del self._loaded[next(iter(self._loaded))]
-                self._loaded[version_id] = found
-        return found
+                self._loaded[version_id] = version
+        return version
 
 
 def _load(session: Session, version_id: int) -> LoadedVersion:
@@ -92,7 +119,7 @@ def _load(session: Session, version_id: int) -> LoadedVersion:
         for (cell, number), clip in places.items()
         if cell == CHECK_CELL
     )
-    places = {place: clip for place, clip in places.items() if place[0] != CHECK_CELL}
+    places = {position: clip for position, clip in places.items() if position[0] != CHECK_CELL}
     experiment = load_stored(version.definition, version.format)
     numbered = numbers([(clip, cell) for (cell, _), clip in places.items()])
     return LoadedVersion(experiment, version.inter_ocular_px, clips, places, numbered, checks)

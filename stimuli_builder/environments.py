@@ -20,10 +20,14 @@ def ensure_environment(folder: Path, python: str, requirements: Path, what: str,
 
     Parameters
     ----------
-    python : version, or path of an interpreter, that uv makes the environment with.
-    requirements : file of pinned packages, hashes included; nothing else is installed.
-    what : what it is for, in words of the error.
-    probe : statement that must run in it.
+    python : str
+        Version, or path of an interpreter, that uv makes the environment with.
+    requirements : Path
+        File of pinned packages, hashes included; nothing else is installed.
+    what : str
+        What it is for, in words of the error.
+    probe : str
+        Statement that must run in it.
 
     Raises
     ------
@@ -51,12 +55,12 @@ def ensure_environment(folder: Path, python: str, requirements: Path, what: str,
 def uv() -> list[str]:
     """The command uv, on the PATH or beside the running Python."""
     beside = Path(sys.executable).with_name("uv")
-    found = shutil.which("uv") or (str(beside) if beside.exists() else None)
-    if found is None:
+    path = shutil.which("uv") or (str(beside) if beside.exists() else None)
+    if path is None:
         raise InputError(
             "uv is not on the PATH: install it (pip install uv); it makes the environment needed"
         )
-    return [found]
+    return [path]
 
 
 def run_step(command: list[str], what: str) -> None:

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.video_clock import read_clock, reason
+from stimuli_builder.video_clock import DamagedFileError, clock_of, read_clock, reason
 
 Picture = NDArray[np.uint8]
 
 BATCH_FRAMES = 8
 WAITING_BATCHES = 6
+REORDERED_FRAMES = 16
+"""Frames that may wait for others by H.264; where the end is missing, so many may be shown out of step."""
 LUMA_FIRST = ("yuv4", "yuvj4", "nv12", "nv21", "gray8", "yuva4")
 
 
@@ -34,6 +36,8 @@ class VideoInfo:
         Width and height as displayed, after the rotation a phone writes into the file.
     fps : float
         Frames divided by time; `variable` says that the steps between frames differ.
+    damaged : bool
+        The file ends, or cannot be read, before what it declares; the frames are those before that.
     """
 
     path: Path
@@ -42,6 +46,7 @@ class VideoInfo:
     times_s: NDArray[np.float64]
     stamps: NDArray[np.int64]
     variable: bool
+    damaged: bool = False
 
     @property
     def frame_count(self) -> int:
@@ -80,6 +85,77 @@ def scan_video(path: Path) -> VideoInfo:
     return VideoInfo(path, size_px, clock.fps, clock.times_s, clock.stamps, clock.variable)
 
 
+def scan_before_damage(path: Path) -> VideoInfo:
+    """Scan a video as far as it can be decoded: all of it is decoded once, up to the first spoilt frame.
+
+    Raises
+    ------
+    InputError
+        The file is missing, no video, or holds no frame before the damage.
+    """
+    damaged = _ends_early(path)
+    stamps: list[int] = []
+    with opened(path) as (container, stream):
+        rate = stream.average_rate or 25
+        tick = stream.time_base
+        try:
+            for frame in container.decode(stream):
+                if frame.pts is None:
+                    damaged = True
+                    break
+                if frame.is_corrupt:
+                    damaged = True
+                    # Frames shown just before a spoilt one may have been predicted from it.
+                    del stamps[-REORDERED_FRAMES:]
+                    break
+                stamps.append(frame.pts)
+        except av.error.FFmpegError:
+            damaged = True
+    if not stamps:
+        raise InputError(f"{path}: no frame can be decoded before the damage; copy the file again")
+    read = np.array(stamps, np.int64)
+    clock = clock_of(_in_step(read) if damaged else read, float(tick), float(1 / rate))
+    size_px = _displayed_size(path)
+    return VideoInfo(path, size_px, clock.fps, clock.times_s, clock.stamps, clock.variable, damaged)
+
+
+def _ends_early(path: Path) -> bool:
+    """Whether the packets break off or are too few for what is declared; decoding may end there silently."""
+    with opened(path) as (container, stream):
+        try:
+            read_clock(path, container, stream)
+        except DamagedFileError:
+            return True
+    return False
+
+
+def declared_frames(info: VideoInfo) -> int:
+    """How many frames a file declares, or its declared duration holds; 0 where it tells neither."""
+    with opened(info.path) as (container, stream):
+        return int(stream.frames or round(_declared_s(container, stream) * info.fps))
+
+
+def _declared_s(container: Any, stream: Any) -> float:
+    """Duration of the video stream in seconds; of the whole file, sound included, where it tells no other."""
+    if stream.duration:
+        return float(stream.duration * stream.time_base)
+    try:
+        hours, minutes, seconds = stream.metadata["DURATION"].split(":")  # Matroska: 00:00:01.240000000
+        return 3600 * int(hours) + 60 * int(minutes) + float(seconds)
+    except (KeyError, ValueError):
+        return float((container.duration or 0) / av.time_base)
+
+
+def _in_step(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Leave out the last frames from where one that should come between them is missing."""
+    steps = np.diff(stamps)
+    if not len(steps):
+        return stamps
+    tail = max(0, len(steps) - REORDERED_FRAMES)
+    gaps = np.flatnonzero(steps[tail:] > 1.5 * np.median(steps))
+    return stamps[: tail + int(gaps[0]) + 1] if len(gaps) else stamps
+
+
 def _displayed_size(path: Path) -> tuple[int, int]:
     first = next(iter(_decode(path)), None)
     if first is None:
@@ -114,23 +190,23 @@ def _decode(path: Path, read: Callable[[Any], Picture] = grey) -> Iterator[tuple
             for frame in container.decode(stream):
                 yield frame.pts, read(frame)
         except av.error.FFmpegError as error:
-            raise InputError(
+            raise DamagedFileError(
                 f"{path}: truncated or damaged ({reason(error)}); copy the file again"
             ) from error
 
 
-def read_frames(info: VideoInfo, wanted: Sequence[int]) -> dict[int, Picture]:
+def read_frames(info: VideoInfo, numbers: Sequence[int]) -> dict[int, Picture]:
     """Decode the frames with the given numbers, seeking to each; memory holds only these."""
-    outside = [number for number in wanted if not 0 <= number < info.frame_count]
+    outside = [number for number in numbers if not 0 <= number < info.frame_count]
     if outside:
         raise InputError(
             f"{info.path}: frame {outside[0]} is asked for, the video has frames 0 to {info.frame_count - 1}"
         )
-    found: dict[int, Picture] = {}
+    pictures: dict[int, Picture] = {}
     with opened(info.path) as (container, stream):
-        for number in sorted(set(wanted)):
-            found[number] = _seek(info, container, stream, number)
-    return found
+        for number in sorted(set(numbers)):
+            pictures[number] = _seek(info, container, stream, number)
+    return pictures
 
 
 def _seek(info: VideoInfo, container: Any, stream: Any, number: int) -> Picture:
@@ -192,6 +268,7 @@ def _produce(
         _put(waiting, batch, stop)
         _put(waiting, None, stop)
     except Exception as error:
+        _put(waiting, batch, stop)
         _put(waiting, error, stop)
 
 

@@ -22,6 +22,10 @@ MISSING_S = 0.1
 MISSING_STEPS = 3
 
 
+class DamagedFileError(InputError):
+    """A file holds less than it declares, or breaks off; what comes before the damage may be read."""
+
+
 @dataclass(frozen=True)
 class Clock:
     """Presentation stamps (frames,) ascending, times in seconds from 0, rate, and whether steps differ."""
@@ -43,13 +47,13 @@ def read_clock(path: Path, container: Any, stream: Any) -> Clock:
     stamps, tick_s, reached_s = _packets(path, container, stream)
     declared = int(stream.frames or 0)
     if declared and len(stamps) < declared:
-        raise InputError(
+        raise DamagedFileError(
             f"{path}: truncated, it declares {declared} frames and holds {len(stamps)}; copy the file again"
         )
     clock = clock_of(stamps, tick_s, float(1 / (stream.average_rate or 25)))
     declared_s = (container.duration or 0) / av.time_base
     if not declared and declared_s - reached_s > max(MISSING_S, MISSING_STEPS / clock.fps):
-        raise InputError(
+        raise DamagedFileError(
             f"{path}: truncated, it declares {declared_s:.1f} s and ends after {reached_s:.1f}; "
             "copy the file again"
         )
@@ -64,7 +68,8 @@ def clock_of(stamps: Stamps, tick_s: float, usual_step_s: float) -> Clock:
 
     Parameters
     ----------
-    stamps : (frames,) ascending.
+    stamps : int64 array (frames,)
+        Ascending.
     usual_step_s : float
         Step of a video of one frame.
     """
@@ -83,7 +88,7 @@ def clock_of(stamps: Stamps, tick_s: float, usual_step_s: float) -> Clock:
 
 def _packets(path: Path, container: Any, stream: Any) -> tuple[Stamps, float, float]:
     """Stamps of the video's frames, seconds a tick, and where the last packet of any stream ends."""
-    found, timeless = array("q"), False
+    times, timeless = array("q"), False
     reached_s = 0.0
     begun_s = (container.start_time or 0) / av.time_base
     try:
@@ -93,14 +98,16 @@ def _packets(path: Path, container: Any, stream: Any) -> tuple[Stamps, float, fl
                 reached_s = max(reached_s, float(end) - begun_s)
             if packet.stream_index == stream.index and packet.size and not packet.is_discard:
                 timeless |= packet.pts is None
-                found.append(packet.pts or 0)
+                times.append(packet.pts or 0)
     except av.error.FFmpegError as error:
-        raise InputError(f"{path}: truncated or damaged ({reason(error)}); copy the file again") from error
-    if not found:
-        raise InputError(f"{path}: holds no video frame")
+        raise DamagedFileError(
+            f"{path}: truncated or damaged ({reason(error)}); copy the file again"
+        ) from error
+    if not times:
+        raise InputError(f"{path}: holds no video frame; it is empty or damaged: copy the file again")
     if timeless:
-        return np.arange(len(found)), float(1 / (stream.average_rate or Fraction(25))), reached_s
-    return np.sort(np.frombuffer(found, np.int64)), float(stream.time_base), reached_s
+        return np.arange(len(times)), float(1 / (stream.average_rate or Fraction(25))), reached_s
+    return np.sort(np.frombuffer(times, np.int64)), float(stream.time_base), reached_s
 
 
 def reason(error: Exception) -> str:

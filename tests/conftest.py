@@ -4,27 +4,83 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+from xdist.remote import Producer
+from xdist.scheduler import LoadFileScheduling
 
 # Most tests answer at once and without clips; those of evidence ask for refusals by their settings.
 os.environ.setdefault("PALPEBRA_EVIDENCE", "record")
 
+# The same examples in every run, however slow the machine: `--hypothesis-profile=default` looks for new ones.
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("repeatable")
+
 REPOSITORY = Path(__file__).resolve().parent.parent
-# These draw on a screen and measure when: they run last, one after another, with the cores to themselves.
-SCREEN_FOLDERS = ("tests/browser/", "tests/scope/")
-SCREEN_MARKERS = ("browser", "firefox")
+# These compare moments on a screen: they run last, one after another.
+TIMED_FILES = (
+    "tests/browser/participant/test_long_clips.py",
+    "tests/browser/participant/test_playback.py",
+    "tests/browser/participant/test_scope.py",
+    "tests/browser/participant/test_sync_patch.py",
+)
+
+# Of the other browser files the longest, longest first: then the processes end at about the same time.
+LONGEST_FILES = tuple(
+    f"tests/browser/{name}.py"
+    for name in (
+        "participant/test_screens",
+        "participant/test_flow",
+        "participant/test_offline_reload",
+        "participant/test_resume",
+        "participant/test_gates",
+        "participant/test_views",
+        "admin/test_walk",
+        "participant/test_devices",
+        "test_playground",
+        "participant/test_faults",
+        "participant/test_thresholds",
+        "participant/test_ways",
+        "participant/test_timing_studies",
+        "participant/test_screened_out",
+    )
+)
+
+# A server draws orders, seeds and tokens by chance, a browser shares its machine with strangers: a defect
+# fails each try.
+RERUNS, RERUNS_TIMED = 1, 2
+
+
+class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
+    """A file's tests run in one process, and the timed files in one, so that no two are timed at once.
+
+    Not xdist's own groups: it writes them to `_nodeid`, which pytest 9.2 does not read.
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        path = str(super()._split_scope(nodeid))
+        return "timed" if path in TIMED_FILES else path
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> FileScheduling:
+    """For any number of processes."""
+    return FileScheduling(config, log)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests for any number of processes: a file is a group; those of a screen are one, the last."""
-    items.sort(key=on_screen)
+    """Those of a screen run after the others, the timed ones last; a failed test is run again."""
+    items.sort(key=lambda item: rank(source_file(item)))
     for item in items:
-        item.add_marker(pytest.mark.xdist_group("screen" if on_screen(item) else source_file(item)))
+        tries = RERUNS_TIMED if source_file(item) in TIMED_FILES else RERUNS
+        item.add_marker(pytest.mark.flaky(reruns=tries))
 
 
-def on_screen(item: pytest.Item) -> bool:
-    """Whether a test needs a browser or a screen."""
-    marked = any(item.get_closest_marker(name) is not None for name in SCREEN_MARKERS)
-    return marked or source_file(item).startswith(SCREEN_FOLDERS)
+def rank(path: str) -> tuple[bool, bool, int]:
+    """By what the files are sorted: files of the same rank stay as pytest has them."""
+    length = LONGEST_FILES.index(path) if path in LONGEST_FILES else len(LONGEST_FILES)
+    return path in TIMED_FILES, path.startswith("tests/browser/"), length
 
 
 def source_file(item: pytest.Item) -> str:

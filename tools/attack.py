@@ -84,15 +84,15 @@ def attacker(target: attacks.Target) -> Iterator[Pipe]:
 
 def peak_mb(server: LoadServer, *, reset: bool = False) -> float:
     """Highest resident memory of any process of the server since the last reset (Linux)."""
-    found = 0.0
+    highest = 0.0
     for process in server.processes():
         folder = Path(f"/proc/{process.pid}")
         with suppress(OSError):
             if reset:
                 (folder / "clear_refs").write_text("5")
             status = (folder / "status").read_text()
-            found = max(found, int(status.partition("VmHWM:")[2].split()[0]) / 1024)
-    return found
+            highest = max(highest, int(status.partition("VmHWM:")[2].split()[0]) / 1024)
+    return highest
 
 
 async def measured(name: str, seconds: float, server: LoadServer, tally: Tally, pipe: Pipe) -> Line:
@@ -109,8 +109,8 @@ async def measured(name: str, seconds: float, server: LoadServer, tally: Tally, 
     await asyncio.sleep(SETTLE_S)
     said = ", ".join(f"{number} x {what}" for what, number in sorted(answers.items()))
     clips, ratings = (
-        _p95(values, [mark[place] for mark in marks])
-        for place, values in enumerate((tally.clip_ms, tally.rating_ms))
+        _p95(values, [mark[row] for mark in marks])
+        for row, values in enumerate((tally.clip_ms, tally.rating_ms))
     )
     return Line(name, clips, ratings, memory, said)
 

@@ -31,7 +31,7 @@ class Outcome:
     """What is said of one ecosystem, and whether a weakness was found."""
 
     said: str
-    found: bool = False
+    weak: bool = False
 
 
 def python_outcome(answer: str) -> Outcome:
@@ -41,11 +41,11 @@ def python_outcome(answer: str) -> Outcome:
     asked = [package for package in packages if "skip_reason" not in package]
     if not asked:
         return Outcome(f"Python: {NO_ANSWER}")
-    found = list(_weaknesses(asked))
+    weaknesses = list(_weaknesses(asked))
     unknown = len(packages) - len(asked)
     rest = f", {unknown} unknown to it" if unknown else ""
-    if found:
-        return Outcome("\n".join(["Python: weaknesses are known:", *found]), found=True)
+    if weaknesses:
+        return Outcome("\n".join(["Python: weaknesses are known:", *weaknesses]), weak=True)
     return Outcome(f"Python: {len(asked)} packages asked about{rest}, no weakness known")
 
 
@@ -63,11 +63,13 @@ def npm_outcome(answer: str) -> Outcome:
     report = _json(answer)
     if report is None or "vulnerabilities" not in report:
         return Outcome(f"npm: {NO_ANSWER}")
-    found = [
+    weaknesses = [
         f"  {name}: {weakness['severity']}" for name, weakness in sorted(report["vulnerabilities"].items())
     ]
-    if found:
-        return Outcome("\n".join(["npm: weaknesses are known (npm audit tells more):", *found]), found=True)
+    if weaknesses:
+        return Outcome(
+            "\n".join(["npm: weaknesses are known (npm audit tells more):", *weaknesses]), weak=True
+        )
     return Outcome("npm: no weakness known")
 
 
@@ -96,7 +98,7 @@ def main() -> int:
     else:
         outcomes.append(Outcome("npm: skipped: there is no npm"))
     print("\n".join(f"audit: {outcome.said}" for outcome in outcomes))
-    return int(any(outcome.found for outcome in outcomes))
+    return int(any(outcome.weak for outcome in outcomes))
 
 
 if __name__ == "__main__":

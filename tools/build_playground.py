@@ -33,8 +33,10 @@ PLAYGROUND = """<p>Blinks as the engine draws them, beside the uniform timer tha
 Everything on this page happens on your computer.</p>
 <div id="playground" class="playground"></div>
 <script type="application/json" id="strips">{strips}</script>"""
-VRM = """<canvas width="640" height="480" aria-label="An avatar that blinks"></canvas>
-<p id="said" role="status"></p>"""
+VRM = """<canvas width="640" height="480" role="img" aria-label="An avatar that blinks"></canvas>
+<p id="said" role="status"></p>
+<p><label>Your avatar: <input type="file" accept=".vrm"></label></p>
+<p>The model stays on your computer.</p>"""
 
 
 def playground_page(strips: Path) -> str:

@@ -80,14 +80,14 @@ def copy(step: Step, roots: dict[str, Path], root: Path, folder: Path) -> None:
     """COPY: of folders the content, as Docker does it."""
     target = inside(root, folder, step.words[-1])
     for source in step.sources:
-        found = inside(roots[step.stage], roots[step.stage], source) if step.stage else ROOT / source
-        if found.is_dir():
+        copied = inside(roots[step.stage], roots[step.stage], source) if step.stage else ROOT / source
+        if copied.is_dir():
             left = shutil.ignore_patterns("node_modules", "dist", "__pycache__") if not step.stage else None
-            shutil.copytree(found, target, ignore=left, symlinks=True, dirs_exist_ok=True)
+            shutil.copytree(copied, target, ignore=left, symlinks=True, dirs_exist_ok=True)
         else:
-            folder_wanted = step.words[-1].endswith("/") or len(step.sources) > 1
-            (target if folder_wanted else target.parent).mkdir(parents=True, exist_ok=True)
-            shutil.copy2(found, target / found.name if folder_wanted else target)
+            into_folder = step.words[-1].endswith("/") or len(step.sources) > 1
+            (target if into_folder else target.parent).mkdir(parents=True, exist_ok=True)
+            shutil.copy2(copied, target / copied.name if into_folder else target)
 
 
 def play(stage: Stage, roots: dict[str, Path], base: Path) -> tuple[Path, dict[str, str]]:

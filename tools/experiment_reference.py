@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import tomllib
 import types
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -17,6 +19,7 @@ from pydantic_core import PydanticUndefined
 from experiments.base import Language, LevelName, Name
 from experiments.definition import Experiment
 from experiments.definition.forms import Form, Question
+from experiments.definition.groups import Answer, GroupName
 from experiments.load import parse_experiment
 from experiments.rendering import ProfileName
 from experiments.schema.keys import Key, is_tag, keys, models_inside
@@ -69,7 +72,16 @@ def heading(key: Key, model: type[BaseModel]) -> str:
     path = f"{key.path}.en" if get_origin(key.field.annotation) is dict else key.path
     written = f"[[{path}]]" if get_origin(key.field.annotation) is tuple else f"[{path}]"
     tag = next((name for name, field in model.model_fields.items() if _tells_apart(key, field)), None)
+    if tag is None and key.path in _of_several_kinds():
+        model, tag = key.model, "kind"
     return f"`{written}`" + (f" with `{tag} = {toml(model.model_fields[tag].default)}`" if tag else "")
+
+
+@cache
+def _of_several_kinds() -> frozenset[str]:
+    """Paths of tables of which each kind of trial has its own."""
+    named = Counter(key.path for key in keys() if key.tables and issubclass(key.model, TrialDeclaration))
+    return frozenset(path for path, kinds in named.items() if kinds > 1)
 
 
 def _tells_apart(key: Key, field: FieldInfo) -> bool:
@@ -98,6 +110,7 @@ def type_of(key: Key) -> str:
 
 
 NAMED = {Name: "name", LevelName: "level name", Language: "language tag", ProfileName: "profile or file"}
+KEYS = {GroupName: "group", Answer: "answer", LevelName: "level", Name: "factor"}
 
 
 def spoken(annotation: Any, marks: list[Any] | None = None) -> str:
@@ -114,12 +127,27 @@ def spoken(annotation: Any, marks: list[Any] | None = None) -> str:
         inner = [argument for argument in arguments if argument is not type(None)]
         return "table" if _is_model(inner[0]) else spoken(inner[0])
     if origin is tuple:
-        return "tables" if spoken(arguments[0]) == "table" else f"list of {spoken(arguments[0])}s"
+        return "tables" if spoken(arguments[0]) == "table" else f"list of {plural(spoken(arguments[0]))}"
     if origin is dict:
-        return "tables by language" if _is_model(arguments[1]) else "text by language"
+        return _spoken_mapping(*arguments)
     if _is_model(annotation):
         return "table"
     return {str: "text", int: "whole number", float: "number", bool: "true or false"}[annotation]
+
+
+def _spoken_mapping(key: Any, value: Any) -> str:
+    if key == Language:
+        return "tables by language" if _is_model(value) else "text by language"
+    return f"{spoken(value)} by {KEYS.get(key, 'name')}"
+
+
+def plural(words: str) -> str:
+    """The plural of a type in words, by its first noun."""
+    if words == "one of":
+        return "any of"
+    head, _, rest = words.partition(" of " if " of " in words else " by ")
+    joint = " of " if " of " in words else " by "
+    return f"{head}s{joint}{rest}" if rest else f"{words}s"
 
 
 def _marks_of(alias: Any) -> set[str]:

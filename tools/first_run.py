@@ -33,26 +33,26 @@ def sources() -> str:
     return sha.hexdigest()
 
 
-def prepare(study: str, wanted: str) -> None:
-    """Build a study's clips and take it into the server; nothing where the stamp says `wanted`."""
+def prepare(study: str, stamp_text: str) -> None:
+    """Build a study's clips and take it into the server; nothing where the stamp says `stamp_text`."""
     folder = DATA / "stimuli" / study
     stamp = folder / ".first_run"
     has_database = bool(os.environ.get("DATABASE_URL")) or (DATA / "palpebra.sqlite").is_file()
-    if has_database and stamp.is_file() and stamp.read_text() == wanted:
+    if has_database and stamp.is_file() and stamp.read_text() == stamp_text:
         return
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
     call("server", "study", "add", study, "--clips", str(folder), "--open")
-    stamp.write_text(wanted)
+    stamp.write_text(stamp_text)
 
 
-def draw_strips(wanted: str) -> None:
-    """The characters for the dashboard's blinks page; nothing where the stamp says `wanted`."""
+def draw_strips(stamp_text: str) -> None:
+    """The characters for the dashboard's blinks page; nothing where the stamp says `stamp_text`."""
     folder = DATA / "stimuli" / "strips"
     stamp = folder / ".first_run"
-    if stamp.is_file() and stamp.read_text() == wanted:
+    if stamp.is_file() and stamp.read_text() == stamp_text:
         return
     call("stimuli", "strips", "--out", str(folder))
-    stamp.write_text(wanted)
+    stamp.write_text(stamp_text)
 
 
 def main() -> None:
@@ -61,10 +61,10 @@ def main() -> None:
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")
     call("server", "database", "upgrade")
-    wanted = sources()
+    stamp_text = sources()
     for study in STUDIES:
-        prepare(study, wanted)
-    draw_strips(wanted)
+        prepare(study, stamp_text)
+    draw_strips(stamp_text)
     os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
 
 

@@ -74,7 +74,10 @@ class Connection:
     async def call(self, method: str, path: str, body: Any = None, *, keep: bool = True) -> tuple[int, bytes]:
         """Status and content (empty where not kept); OSError where the connection broke.
 
-        body: bytes are sent as a form, all else as JSON.
+        Parameters
+        ----------
+        body : Any, optional
+            Bytes are sent as a form, all else as JSON.
         """
         try:
             protocol = self._protocol
@@ -92,7 +95,8 @@ class Connection:
         form = isinstance(body, bytes)
         content = body if form else json.dumps(body).encode() if body is not None else b""
         kind = "application/x-www-form-urlencoded" if form else "application/json"
-        token = f"authorization: Bearer {self.token}\r\n" if self.token else ""
+        as_page = f"accept: application/json;clips=hash\r\nauthorization: Bearer {self.token}\r\n"
+        token = as_page if self.token else ""
         head = (
             f"{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-length: {len(content)}\r\n"
             f"{token}content-type: {kind}\r\n\r\n"

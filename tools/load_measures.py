@@ -51,8 +51,8 @@ class Clocks:
 
     def rows(self, ratings: int) -> list[Row]:
         """Processor time per rating, and the share of all cores each has used."""
-        each = [self.used[who] / max(1, ratings) for who in ("server", "database", "raters")]
-        shares = [self.used[who] / self.cores_s for who in ("server", "database", "raters", "others")]
+        each = [self.used[process] / max(1, ratings) for process in ("server", "database", "raters")]
+        shares = [self.used[process] / self.cores_s for process in ("server", "database", "raters", "others")]
         said = " / ".join(f"{1000 * cost:.2f}" for cost in each)
         split = " / ".join(f"{100 * share:.0f}" for share in shares)
         return [
@@ -65,14 +65,14 @@ def stored(server: LoadServer, tally: Tally) -> tuple[int, int]:
     """Acknowledged ratings that are not in the database as sent, and ratings stored twice."""
     with server.services.database.read() as session:
         answers = session.execute(select(Rating.rating_id, Rating.payload))
-        found = {rating_id: payload["response"] for rating_id, payload in answers}
+        responses = {rating_id: payload["response"] for rating_id, payload in answers}
         plays = session.execute(
             text(
                 "SELECT count(*) FROM (SELECT 1 FROM trial_ratings "
                 "GROUP BY study_run_id, trial_index, play HAVING count(*) > 1) AS twice"
             )
         ).scalar_one()
-    lost = sum(found.get(rating_id, "none") != value for rating_id, value in tally.acknowledged.items())
+    lost = sum(responses.get(rating_id, "none") != value for rating_id, value in tally.acknowledged.items())
     return lost, int(plays)
 
 
@@ -84,6 +84,6 @@ def quantiles(values: list[float], *shares: float) -> str:
 def saved(server: LoadServer, tally: Tally) -> Row:
     """Whether everything acknowledged is there, once."""
     lost, twice = stored(server, tally)
-    found = (lost, twice, tally.given_up)
-    said = "; ".join(map(str, found))
-    return Row("", "lost; stored twice; given up", said, "0; 0; 0", found == (0, 0, 0))
+    counts = (lost, twice, tally.given_up)
+    said = "; ".join(map(str, counts))
+    return Row("", "lost; stored twice; given up", said, "0; 0; 0", counts == (0, 0, 0))

@@ -124,10 +124,10 @@ def _project(folder: Path) -> None:
 def _session(port: int, count: int) -> list[str]:
     """Make a session; return its participants' codes."""
     address, ends = f"http://127.0.0.1:{port}/api/sessions", time.monotonic() + START_S
-    wanted = json.dumps({"session_config_name": "ratings", "num_participants": count}).encode()
+    body = json.dumps({"session_config_name": "ratings", "num_participants": count}).encode()
     while True:
         try:
-            request = urllib.request.Request(address, wanted, {"content-type": "application/json"})
+            request = urllib.request.Request(address, body, {"content-type": "application/json"})
             with urllib.request.urlopen(request, timeout=START_S) as answer:
                 code = json.load(answer)["code"]
             with urllib.request.urlopen(f"{address}/{code}", timeout=START_S) as answer:

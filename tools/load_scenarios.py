@@ -166,8 +166,8 @@ def starts(kind: str, count: int, newcomers: int, seconds: float, workers: int, 
     ]
 
 
-def _shown(found: int, wanted: int) -> tuple[str, str, bool]:
-    return str(found), str(wanted), found == wanted
+def _shown(kills: int, needed: int) -> tuple[str, str, bool]:
+    return str(kills), str(needed), kills == needed
 
 
 def _orders(rows: Iterable[Any], count: int) -> list[Row]:
@@ -206,9 +206,9 @@ def under_fire(count: int, seconds: float, workers: int) -> list[Row]:
         all_there = saved(server, tally)
     said = ", ".join(f"{number} x {what}" for what, number in kills.items())
     complete = kills == {"worker": WORKER_KILLS, "PostgreSQL": DATABASE_KILLS}
-    wanted = f"{WORKER_KILLS}, {DATABASE_KILLS}"
+    needed = f"{WORKER_KILLS}, {DATABASE_KILLS}"
     return [
-        Row(f"kill -9, {count} raters, postgres, {seconds:.0f} s", "killed", said, wanted, complete),
+        Row(f"kill -9, {count} raters, postgres, {seconds:.0f} s", "killed", said, needed, complete),
         Row("", "acknowledged; requests sent again", f"{len(tally.acknowledged)}; {tally.retries}"),
         all_there,
     ]

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from inspect import getdoc
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from numpydoc.docscrape import NumpyDocString  # noqa: E402
 from pydantic_core import PydanticUndefined  # noqa: E402
 from sqlalchemy import Table  # noqa: E402
 
@@ -46,10 +48,16 @@ def stored(of: Table) -> Iterator[str]:
     model = next(mapper.class_ for mapper in Base.registry.mappers if mapper.local_table is of)
     yield f"### {of.name}"
     yield ""
-    yield " ".join((model.__doc__ or "").split())
+    told = NumpyDocString(getdoc(model) or "")
+    yield " ".join([*told["Summary"], *told["Extended Summary"]]).strip()
     yield ""
-    names = [f"`{column.name}`" + ("" if column.nullable else "*") for column in of.columns]
-    yield "Columns (* never empty): " + ", ".join(names) + "."
+    if told["Attributes"]:
+        yield from (
+            f"- `{entry.name.replace(', ', '`, `')}`: {' '.join(entry.desc)}" for entry in told["Attributes"]
+        )
+        yield ""
+    columns = [f"`{column.name}`" + ("" if column.nullable else "*") for column in of.columns]
+    yield "Columns (* never empty): " + ", ".join(columns) + "."
     yield ""
 
 
@@ -83,6 +91,8 @@ def setting_row(name: str, field: Any) -> tuple[str, ...]:
     default = "" if field.default is PydanticUndefined else field.default
     if isinstance(default, Path):
         default = default.relative_to(ROOT) if default.is_absolute() else default
+    if get_origin(field.annotation) is dict:
+        return f"`{variable}__NAME__KEY`", "table", "none", field.description
     kind = " or ".join(map(str, get_args(field.annotation))) or field.annotation.__name__
     return f"`{variable}`", kind, f"`{default}`" if default != "" else "empty", field.description
 

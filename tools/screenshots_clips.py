@@ -1,5 +1,12 @@
-"""Pictures of the characters and of a blink for docs/images: `python tools/screenshots_clips.py [FOLDER]`."""
+"""Pictures of the characters and of a blink for docs/images.
 
+Examples:
+  python tools/screenshots_clips.py                            all characters, into docs/images
+
+  python tools/screenshots_clips.py /tmp/sheets alder hazel    two characters, elsewhere
+"""
+
+import argparse
 import sys
 from pathlib import Path
 
@@ -12,14 +19,17 @@ from PIL import Image, ImageDraw, ImageFont
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from experiments.errors import InputError  # noqa: E402
 from experiments.rendering import RenderSettings  # noqa: E402
 from stimuli_builder.blinks.blink_model import default_model  # noqa: E402
 from stimuli_builder.blinks.profile import resample, to_full_closure  # noqa: E402
 from stimuli_builder.blinks.textbook import textbook_profile  # noqa: E402
 from stimuli_builder.characters.colour import linear_to_srgb  # noqa: E402
-from stimuli_builder.clips.characters import find_character, shipped_names  # noqa: E402
-from stimuli_builder.clips.curves import Timing, clip_curve  # noqa: E402
+from stimuli_builder.clips.characters import find_character, geometry, shipped_names  # noqa: E402
+from stimuli_builder.clips.curves import ClipCurve, Timing, clip_curve  # noqa: E402
 from stimuli_builder.clips.exemplars import exemplar  # noqa: E402
+from stimuli_builder.clips.face_movement.amounts import Movement  # noqa: E402
+from stimuli_builder.clips.face_movement.warp import moved_levels  # noqa: E402
 from stimuli_builder.clips.frames import FramePainter  # noqa: E402
 from stimuli_builder.clips.kernels import FULL_SCALE  # noqa: E402
 from stimuli_builder.clips.levels import LevelSet  # noqa: E402
@@ -27,19 +37,87 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
+MOVED = "hazel"
+"""Whose brow, cheek, squint and gaze are shown moved."""
 LIMIT_BYTES = 400_000
 Rgb = NDArray[np.uint8]
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
+    asked = arguments()
+    folder: Path = asked.folder
     folder.mkdir(parents=True, exist_ok=True)
-    for name in shipped_names():
-        character = find_character(name).levels(SIZE)
-        levels = np.vstack([character.picture(w) for w in CLOSURES])
-        save(levels, folder / f"{name}-closures.jpg")
-        save(blink_sheet(character), folder / f"{name}-blink.jpg")
-    profile_curves(folder / "profiles.png")
+    for name in asked.names or shipped_names():
+        whole = find_character(name).geometry.size_px
+        tall = whole[1] > whole[0]
+        character = find_character(name).levels(whole if tall else SIZE)
+        save(closures_sheet(character, tall), folder / f"{name}-closures.jpg")
+        if not tall:
+            save(blink_sheet(character), folder / f"{name}-blink.jpg")
+        if character.read_lower is not None:
+            save(lower_lid_sheet(character), folder / f"{name}-lower-lid.jpg")
+        if name == MOVED:
+            save(movement_sheet(character, name), folder / "face-movement.jpg")
+    if not asked.names:
+        profile_curves(folder / "profiles.png")
+
+
+def arguments() -> argparse.Namespace:
+    """Folder and names; a name that is none ends in one line before anything is drawn."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=ROOT / "docs" / "images", help="where to write (docs/images)"
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="characters, or their folders (all that ship)"
+    )
+    asked = parser.parse_args()
+    try:
+        for name in asked.names:
+            find_character(name)
+    except InputError as error:
+        parser.error(str(error))
+    return asked
+
+
+def closures_sheet(character: LevelSet, tall: bool) -> Rgb:
+    """Eyes one below the other at actual size; whole faces side by side at half of it."""
+    if tall:
+        return np.hstack([_reduced(character.picture(w), 2) for w in CLOSURES[::2]])
+    return np.vstack([character.picture(w) for w in CLOSURES])
+
+
+def lower_lid_sheet(character: LevelSet) -> Rgb:
+    """The lower lid at rest, 1 mm up, 5 mm nasally and both: open at the left, half shut at the right."""
+    columns = []
+    for closure in (0.0, 0.5):
+        rows = []
+        for mm in ((0.0, 0.0), (1.0, 0.0), (0.0, 5.0), (1.0, 5.0)):
+            up, nasal = (np.full(10, value) for value in mm)
+            curve = ClipCurve(np.full(10, closure), 0, lower_vertical_mm=up, lower_horizontal_mm=nasal)
+            light = character.base.astype(np.float32)
+            light[character.window.slices] = FramePainter(character).light(
+                curve, np.arange(10), np.full(10, 0.1)
+            )
+            picture = _reduced(linear_to_srgb(np.clip(light / np.float32(FULL_SCALE), 0, 1)), 2)
+            rows.append(_titled(picture, f"closure {closure:g}, {mm[0]:g} mm up, {mm[1]:g} mm nasal"))
+        columns.append(np.vstack(rows))
+    return np.hstack(columns)
+
+
+def movement_sheet(character: LevelSet, name: str) -> Rgb:
+    """Brow, cheek, squint and gaze by the greatest amounts: without at the left, with at the right."""
+    moved = moved_levels(character, geometry(name), Movement(brow=1.0, cheek=1.0, squint=1.0, gaze=1.0))
+    columns = []
+    for shown, title in (
+        (character, "nothing declared"),
+        (moved, "brow, cheek, squint and gaze 1 mm"),
+    ):
+        rows = [_reduced(shown.picture(closure), 2) for closure in (0.0, 0.5, 1.0)]
+        columns.append(_titled(np.vstack(rows), title))
+    return np.hstack(columns)
 
 
 def blink_sheet(character: LevelSet) -> Rgb:

@@ -4,7 +4,6 @@ python tools/screenshots_performance.py [FOLDER]
 """
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +22,10 @@ from stimuli_builder.clips.motion_blur import frame_windows  # noqa: E402
 from stimuli_builder.clips.performances import performance_curve  # noqa: E402
 from tools.screenshots_clips import SIZE, Rgb, save  # noqa: E402
 
-FPS, SEED, EXEMPLAR = 30, 2011, 1
+FPS, SEED, EXEMPLAR = 30, 2011, 5
 COLUMNS, CELL_PX = 11, (160, 60)
-BLINKS = 3
+CHOSEN = (0, 1, -2)
+"""The first, the second and the last but one blink."""
 SETTINGS = RenderSettings(
     performance="intervals", seconds=20, state="listening", amplitude="natural", eyes="separate"
 )
@@ -35,20 +35,14 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
     curve = performance_curve(SETTINGS, "", EXEMPLAR, SEED)
     print("blinks at", ", ".join(f"{one:.2f}" for one in curve.blinks_s), "s")
-    starts = [int(FPS * onset_s) for onset_s in chosen(curve.blinks_s)]
-    characters = [name for name in ("photorealistic", "cartoon") if name in shipped_names()]
+    starts = [int(FPS * curve.blinks_s[index]) for index in CHOSEN]
+    characters = [name for name in ("alder", "cartoon") if name in shipped_names()]
     painters = [FramePainter(find_character(name).levels(SIZE)) for name in characters]
     rows = []
     for start in starts:
         rows.append(numbered(range(start, start + COLUMNS)))
         rows += [strip(painter, curve, start) for painter in painters]
     save(np.vstack(rows), folder / "performance-blinks.jpg")
-
-
-def chosen(blinks_s: Sequence[float]) -> list[float]:
-    """The first, the middle and the last but one blink."""
-    places = np.unique(np.linspace(0, max(0, len(blinks_s) - 2), BLINKS).round().astype(int))
-    return [blinks_s[place] for place in places]
 
 
 def strip(painter: FramePainter, curve: ClipCurve, start: int) -> Rgb:
@@ -67,8 +61,8 @@ def numbered(frames: range) -> Rgb:
     """A line with the numbers of the frames."""
     line = Image.new("RGB", (CELL_PX[0] * COLUMNS, 18), "white")
     draw, font = ImageDraw.Draw(line), ImageFont.load_default(12)
-    for place, frame in enumerate(frames):
-        draw.text((CELL_PX[0] * place + 4, 2), str(frame), fill="black", font=font)
+    for index, frame in enumerate(frames):
+        draw.text((CELL_PX[0] * index + 4, 2), str(frame), fill="black", font=font)
     return np.asarray(line)
 
 

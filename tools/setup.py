@@ -24,6 +24,24 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 STAMPS = VENV / "stamps"
 FRONTEND = ROOT / "frontend"
 MINIMUM_NODE = 20
+# What the three programs import when they do their work, and what every figure and report needs.
+STARTED = (
+    "analysis.cli",
+    "analysis.models.mixed",
+    "analysis.models.ordinal",
+    "analysis.plans.clip_rating",
+    "analysis.plans.prepare",
+    "analysis.plans.sensitivity",
+    "analysis.read.database",
+    "analysis.report.figures",
+    "analysis.report.within_contents",
+    "analysis.report.write",
+    "analysis.robust.companions",
+    "pingouin",
+    "server.cli",
+    "server.app",
+    "stimuli_builder.cli",
+)
 
 
 def say(text: str) -> None:
@@ -53,13 +71,13 @@ def digest(paths: Iterable[Path]) -> str:
 def step(name: str, inputs: Iterable[Path], work: Callable[[], None], *outputs: Path) -> None:
     """Do `work` unless its stamp holds the hash of `inputs` and every output is there."""
     stamp = STAMPS / name
-    wanted = digest(inputs)
-    if stamp.is_file() and stamp.read_text() == wanted and all(output.exists() for output in outputs):
+    current = digest(inputs)
+    if stamp.is_file() and stamp.read_text() == current and all(output.exists() for output in outputs):
         return
     started = time.monotonic()
     work()
     STAMPS.mkdir(parents=True, exist_ok=True)
-    stamp.write_text(wanted)
+    stamp.write_text(current)
     say(f"{name} ready ({time.monotonic() - started:.0f} s)")
 
 
@@ -87,6 +105,18 @@ def install_python(lock: str) -> None:
     else:  # platforms without a wheel of uv
         call(BIN / "python", "-m", "pip", "install", "-q", "--require-hashes", "-r", lock)
         call(BIN / "python", "-m", "pip", "install", "-q", "--no-deps", "-e", ".")
+
+
+def keep_bytecode() -> None:
+    """Import once what the programs import, so that its bytecode is kept.
+
+    Where PYTHONDONTWRITEBYTECODE is set and the installer compiles nothing, every start of a program would
+    compile each module it imports anew: most of the processor time of a short command.
+    """
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    code = f"import {', '.join(STARTED)}"
+    if subprocess.run([BIN / "python", "-c", code], cwd=ROOT, env=environment, check=False).returncode:
+        say("bytecode could not be kept: programs start more slowly, nothing else differs")
 
 
 def node_is_new_enough() -> bool:
@@ -169,6 +199,7 @@ def main() -> None:
     with_tests = purpose == "test" or (STAMPS / "python-test").is_file()
     lock, name = (test_lock, "python-test") if with_tests else (run_lock, "python")
     step(name, [lock, ROOT / "pyproject.toml"], lambda: install_python(lock.name), BIN / "server")
+    step("bytecode", [lock, ROOT / "pyproject.toml"], keep_bytecode)
     provide_node()
     npm_inputs = [FRONTEND / "package.json", FRONTEND / "package-lock.json"]
     step("npm", npm_inputs, install_npm, FRONTEND / "node_modules")

@@ -40,9 +40,12 @@ class Agreement:
 
     Attributes
     ----------
-    krippendorff_alpha : over all ratings, missing ones allowed; `ci_low`, `ci_high` by resampling items.
-    icc : all forms, over the items that everybody rated; empty with `icc_reason` where there are too few.
-    n_complete_items : items that everybody rated.
+    krippendorff_alpha : float
+        Over all ratings, missing ones allowed; `ci_low`, `ci_high` by resampling items.
+    icc : tuple of IntraclassCorrelation
+        All forms, over the items that everybody rated; empty with `icc_reason` where there are too few.
+    n_complete_items : int
+        Items that everybody rated.
     """
 
     level: Level

@@ -38,9 +38,12 @@ class ItemStatistics:
 
     Attributes
     ----------
-    item_rest_correlation : Pearson's r with the sum of the other items.
-    alpha_without : Cronbach's alpha of the others; None for two items, or others whose sum does not vary.
-    loading : on the one factor, standardised; None where omega is not defined.
+    item_rest_correlation : float
+        Pearson's r with the sum of the other items.
+    alpha_without : float or None
+        Cronbach's alpha of the others; None for two items, or others whose sum does not vary.
+    loading : float or None
+        On the one factor, standardised; None where omega is not defined.
     """
 
     name: str

@@ -76,24 +76,24 @@ def _short(text: str) -> str:
 
 def _numbers(name: str, was: str, now: str) -> Compared:
     try:
-        place = _differs(json.loads(was), json.loads(now), "")
+        difference = _differs(json.loads(was), json.loads(now), "")
     except ValueError:
         return Compared(name, "table", "no JSON")
-    if place is None:
+    if difference is None:
         return Compared(name, "rounding", f"numbers are equal to {RELATIVE:g}")
-    return Compared(name, "table", place)
+    return Compared(name, "table", difference)
 
 
 def _differs(was: Any, now: Any, path: str) -> str | None:
     """The first place where two JSON values differ by more than rounding; None where there is none."""
     if isinstance(was, dict) and isinstance(now, dict):
         keys = list(dict.fromkeys((*was, *now)))
-        found = (_differs(was.get(key), now.get(key), f"{path}.{key}".lstrip(".")) for key in keys)
-        return next((place for place in found if place), None)
+        differences = (_differs(was.get(key), now.get(key), f"{path}.{key}".lstrip(".")) for key in keys)
+        return next((difference for difference in differences if difference), None)
     if isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
         pairs = enumerate(zip(was, now, strict=True))
-        found = (_differs(old, new, f"{path}[{number}]") for number, (old, new) in pairs)
-        return next((place for place in found if place), None)
+        differences = (_differs(old, new, f"{path}[{number}]") for number, (old, new) in pairs)
+        return next((difference for difference in differences if difference), None)
     if _are_numbers(was, now) and math.isclose(was, now, rel_tol=RELATIVE, abs_tol=1e-12):
         return None
     return None if was == now else f"{path}: {_short(str(was))} became {_short(str(now))}"

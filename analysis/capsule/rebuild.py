@@ -23,7 +23,8 @@ def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress =
 
     Parameters
     ----------
-    folder: of the capsule's files, checked.
+    folder : Path
+        Of the capsule's files, checked.
     """
     table, report = work / ANSWERS, work / "report"
     report_input(folder / source.answers, table, source.renamed)

@@ -1,5 +1,6 @@
 """`analysis anova`: anyone's long table."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -58,6 +59,9 @@ def anova(
         str | None,
         typer.Option(help="Bounds within which pairs count as equal, in rating units: 0.5 or -0.3,0.5."),
     ] = None,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Add permutation tests, aligned ranks and trimmed means.")
+    ] = False,
     contrast: Annotated[
         list[str] | None,
         typer.Option(help="Weights of a factor's levels in their order: face:1,-1,0. Repeatable."),
@@ -72,6 +76,8 @@ def anova(
       analysis anova ratings.csv --participant id --rating score --within face,blur --json results.json
 
       analysis anova long.csv --participant id --rating score --within phase --between group --covariate age
+
+      analysis anova ratings.csv --participant id --rating score --within face --robust
 
     The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants: docs/analysis.md.
     """
@@ -108,6 +114,12 @@ def anova(
             planned_contrasts=[_contrast(text) for text in contrast or ()],
             decisions=data.decisions,
         )
+    if robust:
+        # scipy.stats takes a second to import, which only those who ask for it pay
+        from analysis.robust.companions import companions_of
+
+        with saying("permutations"):
+            analysis = replace(analysis, robust=companions_of(analysis.anova))
     contents = contents_of(analysis)
     show(contents)
     save_json(json, contents.numbers)

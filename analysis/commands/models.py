@@ -56,6 +56,13 @@ class SlopesChoice(StrEnum):
     NONE = "none"
 
 
+class DfChoice(StrEnum):
+    """Denominator df of the linear mixed model's tests."""
+
+    SATTERTHWAITE = "satterthwaite"
+    KENWARD_ROGER = "kenward-roger"
+
+
 class OrdinalSlopesChoice(StrEnum):
     """By-participant slopes of the ordinal model, which do not correlate."""
 
@@ -89,9 +96,17 @@ def mixed(
             "and intercept with all correlations; none: intercepts only (anti-conservative)."
         ),
     ] = SlopesChoice.ALL,
+    df: Annotated[
+        DfChoice,
+        typer.Option(help="Denominator df; kenward-roger also widens standard errors, for few participants."),
+    ] = DfChoice.SATTERTHWAITE,
+    intervals: Annotated[
+        bool,
+        typer.Option("--intervals", help="Add profile likelihood intervals of coefficients and SDs."),
+    ] = False,
     json: JsonOption = None,
 ) -> None:
-    """Linear mixed model: participants crossed with clips, slopes, Satterthwaite tests.
+    """Linear mixed model: participants crossed with clips, slopes, Satterthwaite or Kenward-Roger tests.
 
     Examples:
 
@@ -100,19 +115,37 @@ def mixed(
       analysis mixed table.csv --participant id --rating score --within face,blur --item clip --slopes main
 
       analysis mixed table.csv --within blur --between group --covariate age --item clip --random face,lab
+
+      analysis mixed ratings.csv --df kenward-roger --intervals
     """
     from analysis.models.mixed import fit_mixed
-    from analysis.report.model_tables import mixed_components_table, mixed_effects_table, mixed_text
+    from analysis.report.model_tables import (
+        mixed_coefficients_table,
+        mixed_components_table,
+        mixed_effects_table,
+        mixed_text,
+    )
 
     groups, numbers, further = names_in(between), names_in(covariate), names_in(random)
     data = _read(file, participant, rating, within, item, groups, numbers, further)
     with saying("fitting"):
         result = fit_mixed(
-            data.rows, participant, rating, data.within, data.item, slopes.value, groups, numbers, further
+            data.rows,
+            participant,
+            rating,
+            data.within,
+            data.item,
+            slopes.value,
+            groups,
+            numbers,
+            further,
+            df_method=df.value,
+            intervals=intervals,
         )
     _show(file, data, mixed_text(result))
     named = (result, file.stem, data.synthetic)
-    show_tables(mixed_effects_table(*named), mixed_components_table(*named))
+    tables = [mixed_effects_table(*named), mixed_components_table(*named)]
+    show_tables(*tables, *([mixed_coefficients_table(*named)] if intervals else []))
     save_json(json, asdict(result), data.synthetic)
 
 
@@ -131,6 +164,15 @@ def ordinal(
             "(anti-conservative where people differ in an effect)."
         ),
     ] = OrdinalSlopesChoice.NONE,
+    quadrature: Annotated[
+        int,
+        typer.Option(
+            help="Nodes of adaptive Gauss-Hermite quadrature, for participants' intercepts alone (the "
+            "item of an export is then left out); 1 is Laplace's approximation.",
+            min=1,
+            max=100,
+        ),
+    ] = 1,
     json: JsonOption = None,
 ) -> None:
     """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed effects, slopes, Laplace.
@@ -140,6 +182,8 @@ def ordinal(
       analysis ordinal ratings.csv
 
       analysis ordinal table.csv --participant id --rating score --within face,blur --item clip --slopes main
+
+      analysis ordinal table.csv --participant id --rating score --within face --quadrature 10
     """
     from analysis.models.ordinal import fit_ordinal
     from analysis.report.model_tables import (
@@ -151,9 +195,10 @@ def ordinal(
 
     groups, numbers = names_in(between), names_in(covariate)
     data = _read(file, participant, rating, within, item, groups, numbers)
+    clips = data.item if quadrature == 1 or item else ()
     with saying("fitting"):
         result = fit_ordinal(
-            data.rows, participant, rating, data.within, data.item, slopes.value, groups, numbers
+            data.rows, participant, rating, data.within, clips, slopes.value, groups, numbers, quadrature
         )
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
@@ -166,7 +211,13 @@ def ordinal(
 def _read(
     file: Path, participant: str, rating: str, within: str, item: str, *further: list[str]
 ) -> "ModelInput":
-    """`further`: factors between participants, covariates, and more groupings."""
+    """What a model is fitted to, from a file of any kind that is read.
+
+    Parameters
+    ----------
+    further : list of str
+        Factors between participants, covariates, and more groupings.
+    """
     from analysis.read.model_csv import read_model_input
 
     with saying("reading ratings"):

@@ -68,13 +68,13 @@ def show(contents: "Contents") -> None:
 
 def check_folder(folder: Path) -> None:
     """Refuse, before the work, a folder that could not be made or written to."""
-    place = folder
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    if not place.is_dir():
-        raise InputError(f"{folder}: expected a folder, {place} is a file")
-    if not os.access(place, os.W_OK):
-        raise InputError(f"{folder}: the folder {place} cannot be written to")
+    ancestor = folder
+    while not ancestor.exists() and ancestor != ancestor.parent:
+        ancestor = ancestor.parent
+    if not ancestor.is_dir():
+        raise InputError(f"{folder}: expected a folder, {ancestor} is a file")
+    if not os.access(ancestor, os.W_OK):
+        raise InputError(f"{folder}: the folder {ancestor} cannot be written to")
 
 
 def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None = None) -> None:

@@ -68,6 +68,7 @@ def pairs(
     from analysis.pairs.comparisons import read_comparisons
     from analysis.pairs.factors import read_item_factors
     from analysis.pairs.likelihood import Method
+    from analysis.report.formats import wrap
     from analysis.report.pairs_tables import abilities_table, contrasts_table, factors_table, pairs_text
 
     with saying("reading comparisons"):
@@ -77,7 +78,7 @@ def pairs(
     chosen: Method = method.value if method else usual
     with saying("fitting"):
         result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
-    typer.echo(pairs_text(result, file.stem, comparisons.synthetic))
+    typer.echo("\n".join(wrap(pairs_text(result, file.stem, comparisons.synthetic))))
     show_tables(abilities_table(result, file.stem, comparisons.synthetic))
     if design is not None:
         show_tables(factors_table(result, file.stem, comparisons.synthetic))

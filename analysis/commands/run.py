@@ -106,11 +106,10 @@ def run(
     from analysis.errors import NoRatingsError
     from analysis.plans.plan import plan_of
     from analysis.plans.prepare import study_contents
-    from analysis.read.database import default_url
     from analysis.read.pool import Origin as PoolOrigin
     from analysis.read.pool import Pool
     from analysis.read.runs_file import read_runs
-    from analysis.read.study_answers import load_csv, load_database
+    from analysis.read.study_answers import load_csv, load_database, stored_at
     from analysis.report.contents import held_against
     from experiments.load import load_experiment
     from experiments.seal import read_clips_sha256, read_seal
@@ -130,9 +129,7 @@ def run(
             answers = (
                 load_csv(csv, declared, reading, study)
                 if csv is not None
-                else load_database(
-                    database or default_url(), declared, reading, study, report and sensitivity
-                )
+                else load_database(database or stored_at(), declared, reading, study, report and sensitivity)
             )
             contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None, scale)
     except NoRatingsError as error:

@@ -20,11 +20,17 @@ if TYPE_CHECKING:
 
 MeanOption = Annotated[
     list[str] | None,
-    typer.Option(help="Another mean: profile.real=4.80 or blur.MB,amplitude.FC=4.9. Repeatable."),
+    typer.Option(
+        help="Another mean: profile.real=4.80 or blur.MB,amplitude.FC=4.9; of one scale of several: "
+        "eeriness/character.cartoon=60. Repeatable."
+    ),
 ]
 EffectOption = Annotated[
     list[str] | None,
-    typer.Option(help="Another effect size, as its F: blur:amplitude=12.5; =0 for none. Repeatable."),
+    typer.Option(
+        help="Another effect size, as its F: blur:amplitude=12.5; =0 for none; on one scale of several: "
+        "eeriness/character=9. Repeatable."
+    ),
 ]
 
 
@@ -42,12 +48,18 @@ def register(app: typer.Typer) -> None:
 
 
 def power(
-    experiment: Annotated[str, typer.Argument(help="exp1, exp2 or exp3.")],
+    experiment: Annotated[
+        str, typer.Argument(help="exp1 to exp3; or another study of ratings, with --effect.")
+    ],
     n: Annotated[str, typer.Option("--n", help="Sample sizes: first:last:step, or 20,30,43.")] = "10:60:5",
     simulations: Annotated[int, typer.Option(help="Data sets a sample size.")] = 1000,
     alpha: Annotated[float, typer.Option(help="Level of the tests.")] = 0.05,
     statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = StatisticChoice.MULTIVARIATE,
-    wanted: Annotated[float, typer.Option(help="Power to look for.")] = 0.8,
+    scale: Annotated[
+        str | None,
+        typer.Option(help="Scale of the ratings, where there are several; the first if not given."),
+    ] = None,
+    target: Annotated[float, typer.Option("--wanted", help="Power to look for.")] = 0.8,
     seed: Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)] = 1,
     mean: MeanOption = None,
     effect: EffectOption = None,
@@ -64,27 +76,31 @@ def power(
       analysis power exp1 --n 10:60:5
 
       analysis power exp2 --n 20,30,43 --effect profile=6.5 --plot power.svg
+
+      analysis power sliders-demo --scale eeriness --effect character=9 --effect blink=4
     """
     from analysis.power.figure import save_power_figure
     from analysis.power.simulate import sample_sizes, simulate_power
     from analysis.synthetic.synthesise import make_plan
 
     sizes = sample_sizes(n)
-    plan = make_plan(experiment, means=mean or (), effects=effect or ())
-    target = plot or Path("out") / "analysis" / experiment / "power.png"
+    plan = make_plan(experiment, means=mean or (), effects=effect or (), scale=scale)
+    figure = plot or Path("out") / "analysis" / experiment / "power.png"
     if plot is None:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    with _bar("simulating", len(sizes) * simulations) as advance:
+        figure.parent.mkdir(parents=True, exist_ok=True)
+    with bar("simulating", len(sizes) * simulations) as advance:
         result = simulate_power(plan, sizes, simulations, alpha, seed, statistic.value, advance)
-    _say_power(result, wanted)
-    save_power_figure(result, target, wanted)
-    typer.echo(f"\nwritten: {target}")
+    say_power(result, target)
+    save_power_figure(result, figure, target)
+    typer.echo(f"\nwritten: {figure}")
     numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
-    save_json(json, numbers | {"smallest_n": result.smallest_n(wanted)}, True)
+    save_json(json, numbers | {"smallest_n": result.smallest_n(target)}, True)
 
 
 def synthesise_command(
-    experiment: Annotated[str, typer.Argument(help="exp1, exp2 or exp3.")],
+    experiment: Annotated[
+        str, typer.Argument(help="exp1 to exp3; or another study of ratings, with --effect.")
+    ],
     seed: Annotated[int, typer.Option(help="Same seed, same file.", min=0)] = 1,
     out: Annotated[
         Path, typer.Option(help="CSV file to write, with the columns of the server's export.")
@@ -105,43 +121,48 @@ def synthesise_command(
       analysis synthesise exp1 --seed 7 --out ratings.csv
 
       analysis synthesise exp3 --effect lower_lid=6 --mean lower_lid.both=4.90 --out larger.csv
+
+      analysis synthesise sliders-demo --effect character=9 --effect eeriness/blink=4 --out scales.csv
     """
-    from analysis.synthetic.synthesise import make_plan, synthesise, write_ratings
+    from analysis.synthetic.synthesise import make_plans, synthesise, write_ratings
 
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder {out.parent} does not exist; make it first")
-    plan = make_plan(experiment, n, mean or (), effect or ())
+    plans = make_plans(experiment, n, mean or (), effect or ())
     with saying("searching"):
-        made = synthesise(plan, seed)
-    rows = write_ratings(made, out)
-    _say_synthetic(made, len(plan.published.invented_means))
-    typer.echo(f"written: {out} ({rows} synthetic ratings of {len(made.sums)} synthetic participants)")
-    if made.missed:
+        scales = [synthesise(plan, seed) for plan in plans]
+    rows = write_ratings(scales, out)
+    for plan, made in zip(plans, scales, strict=True):
+        _say_synthetic(made, len(plan.published.invented_means), several=len(scales) > 1)
+    typer.echo(f"written: {out} ({rows} synthetic ratings of {len(scales[0].sums)} synthetic participants)")
+    if any(made.missed for made in scales):
         raise typer.Exit(1)
 
 
-def _say_power(result: "PowerResult", wanted: float) -> None:
+def say_power(result: "PowerResult", target: float) -> None:
+    """Print power at up to six sample sizes, and the smallest that reaches the target."""
     from analysis.report.formats import Table
     from analysis.report.numbers import fixed
 
-    smallest = result.smallest_n(wanted)
+    smallest = result.smallest_n(target)
     shown = list(range(0, len(result.n), max(1, -(-len(result.n) // 6))))
     rows = tuple(
         (effect, *(fixed(float(row[i])) for i in shown), str(smallest[effect] or f">{result.n[-1]}"))
         for effect, row in zip(result.effects, result.power, strict=True)
     )
-    header = ("Effect", *(f"n={result.n[i]}" for i in shown), f"n for {wanted:g}")
-    title = f"Power, {result.experiment}, {result.statistic}, {result.simulations} synthetic data sets a size"
-    show_tables(Table("power", title, header, rows, 1))
+    header = ("Effect", *(f"n={result.n[i]}" for i in shown), f"n for {target:g}")
+    notes = (f"Test: {result.statistic}. {result.simulations} synthetic data sets a size.",)
+    show_tables(Table("power", f"Power, {result.experiment}", header, rows, 1, notes))
 
 
-def _say_synthetic(made: "Synthetic", invented: int) -> None:
+def _say_synthetic(made: "Synthetic", invented: int, several: bool) -> None:
     from analysis.report.formats import wrap
 
     hit = sum(r.hit for r in made.reached)
-    typer.echo(
-        f"SYNTHETIC {made.experiment.name}, seed {made.seed}: {hit} of {len(made.reached)} figures reached"
-    )
+    of = f"{made.experiment.name}, scale {made.scale.name}" if several else made.experiment.name
+    typer.echo(f"SYNTHETIC {of}, seed {made.seed}: {hit} of {len(made.reached)} figures reached")
+    if not made.reached:
+        typer.echo("- no effect was named for this scale; what it shows is chance")
     if invented:
         said = f"- invented: {invented} means that the paper does not print; they only make whole data"
         typer.echo("\n".join(wrap(said)))
@@ -154,7 +175,7 @@ def _say_synthetic(made: "Synthetic", invented: int) -> None:
 
 
 @contextmanager
-def _bar(what: str, total: int) -> Iterator[Any]:
+def bar(what: str, total: int) -> Iterator[Any]:
     """A progress bar with the time left on a terminal, silence elsewhere."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())

@@ -73,7 +73,9 @@ def thresholds(
 
       analysis thresholds trials.csv --x duration --second asymmetry --response correct --participant id
     """
+    from analysis.report.formats import wrap
     from analysis.report.threshold_tables import (
+        means_table,
         people_table,
         population_table,
         threshold_table,
@@ -96,10 +98,12 @@ def thresholds(
         result = fit_thresholds(answers, function.value, guess, upper)
         if hierarchical:
             result = with_population(result, answers, function.value, guess, upper)
-    typer.echo(threshold_text(result, file.stem, answers.synthetic))
-    show_tables(threshold_table(result, file.stem, answers.synthetic))
+    typer.echo("\n".join(wrap(threshold_text(result, file.stem, answers.synthetic))))
     if result.population:
         show_tables(population_table(result, file.stem, answers.synthetic))
+    if result.means:
+        show_tables(means_table(result, file.stem, answers.synthetic))
+    show_tables(threshold_table(result, file.stem, answers.synthetic))
     if result.people:
         show_tables(people_table(result, file.stem, answers.synthetic))
     save_json(json, asdict(result), answers.synthetic)

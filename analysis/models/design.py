@@ -1,7 +1,7 @@
 """Long rows as what the mixed and ordinal models need: codes, sum-coded cells, covariates, groupings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.models.columns import Grouping, covariate_columns, groupings, ratings, refuse_unknown_columns
-from analysis.models.terms import Term
+from analysis.models.terms import Term, intercept_term
 from analysis.within.cell_means import natural_order
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from experiments.errors import InputError
@@ -18,6 +18,7 @@ from experiments.errors import InputError
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Slopes = Literal["none", "main", "all", "correlated"]
+RandomSlopes = Literal["none", "main", "all"]
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,24 @@ class ModelTerms:
 class ModelData:
     """Trials in coded form.
 
-    `cell` are codes (n,), `rating` the responses (n,). `fixed` (cells, cells) is the sum-coded full factorial
-    of `factors`, those between participants first; `spread` (cells, cells) the same effects as orthonormal
-    contrasts scaled to unit variance; `effect_of` names the effect of each column, `intercept` first.
-    `numbers` (n, k) are centred covariates. `groups`: participants, items (if any), further groupings.
+    Attributes
+    ----------
+    factors : tuple of str
+        Those between participants first.
+    cell : int64 array (n,)
+        Codes of the cells.
+    rating : float64 array (n,)
+        Responses.
+    fixed : float64 array (cells, cells)
+        Sum-coded full factorial of `factors`.
+    spread : float64 array (cells, cells)
+        The same effects as orthonormal contrasts scaled to unit variance.
+    effect_of : tuple of str
+        The effect of each column, `intercept` first.
+    numbers : float64 array (n, k)
+        Centred covariates.
+    groups : tuple of Grouping
+        Participants, items (if any), further groupings.
     """
 
     terms: ModelTerms
@@ -119,8 +134,19 @@ class ModelData:
         contrasts = rows @ self.fixed
         return np.hstack([contrasts, np.zeros((len(contrasts), width - contrasts.shape[1]))])
 
-    def random_terms(self, slopes: Slopes, effects: Sequence[str]) -> list[Term]:
-        """Participants with slopes of `effects` (`intercept` first), then intercepts of every other group."""
+    def random_effects(self, slopes: RandomSlopes) -> list[str]:
+        """What differs between levels of a further grouping, `intercept` first; covariates do not."""
+        every = list(dict.fromkeys(self.effect_of))
+        return [name for name in every if slopes == "all" or name == "intercept" or name in self.factors]
+
+    def has_slopes(self, group: Grouping) -> bool:
+        """Whether a grouping may have slopes: the outer ones of `terms.random`."""
+        return group.name in {name.split("/")[0] for name in self.terms.random}
+
+    def random_terms(
+        self, slopes: Slopes, effects: Sequence[str], random_slopes: RandomSlopes = "none"
+    ) -> list[Term]:
+        """Participants with slopes of `effects` (`intercept` first), then every other group."""
         of_column = [effect for effect in effects for _ in self.columns(effect)]
         columns = np.concatenate([self.columns(effect) for effect in effects])
         p = len(columns)
@@ -132,8 +158,17 @@ class ModelData:
             patterns = np.stack([np.diag([float(e == name) for name in of_column]) for e in effects])
         people = self.participants
         terms = [Term(people.codes, len(people.names), self.spread[:, columns][self.cell], patterns)]
-        ones = np.ones((len(self.rating), 1))
-        return terms + [Term(g.codes, len(g.names), ones, np.ones((1, 1, 1))) for g in self.groups[1:]]
+        return terms + [self._further_term(group, random_slopes) for group in self.groups[1:]]
+
+    def _further_term(self, group: Grouping, slopes: RandomSlopes) -> Term:
+        """Independent slopes, one variance an effect, as participants have them; or an intercept."""
+        if slopes == "none" or not self.has_slopes(group):
+            return intercept_term(group.codes, len(group.names))
+        effects = self.random_effects(slopes)
+        of_column = [name for name in self.effect_of if name in effects]
+        z = self.spread[:, np.isin(self.effect_of, effects)][self.cell]
+        patterns = np.stack([np.diag([float(name == e) for name in of_column]) for e in effects])
+        return Term(group.codes, len(group.names), z, patterns)
 
 
 def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
@@ -214,15 +249,7 @@ def _by_participant(
     if not constant:
         return terms, ()
     within = tuple(name for name in terms.within if name not in constant)
-    moved = ModelTerms(
-        terms.participant,
-        terms.rating,
-        within,
-        terms.item,
-        (*terms.between, *constant),
-        terms.covariates,
-        terms.random,
-    )
+    moved = replace(terms, within=within, between=(*terms.between, *constant))
     said = f"{', '.join(constant)}: one level for each participant, taken as between participants"
     return moved, (said,)
 

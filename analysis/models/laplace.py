@@ -54,7 +54,7 @@ class Parameters:
     log_sd: Floats
 
 
-class _Trials:
+class Trials:
     """Each trial's likelihood and derivatives; u (people, c) and v (items,) are the random effects."""
 
     def __init__(self, data: OrdinalData, p: Parameters, u: Floats, v: Floats) -> None:
@@ -74,10 +74,12 @@ class _Trials:
 
     @property
     def curve_upper(self) -> Floats:
+        """Derivative of `f_upper` by the edge above, (n,)."""
         return np.asarray(self.f_upper * (self.above - self.upper))
 
     @property
     def curve_lower(self) -> Floats:
+        """Derivative of `f_lower` by the edge below, (n,)."""
         return np.asarray(self.f_lower * (1 - 2 * self.lower))
 
 
@@ -167,10 +169,10 @@ class LaplaceLikelihood:
         of_items = np.asarray(sd_item * np.bincount(d.item, values, d.n_items), np.float64)
         return np.stack(columns, axis=1), of_items
 
-    def _modes(self, p: Parameters, scaled: Floats, sd_item: float) -> tuple[_Trials, _Hessian]:
+    def _modes(self, p: Parameters, scaled: Floats, sd_item: float) -> tuple[Trials, _Hessian]:
         """Newton with halved steps: the joint density is log-concave, so it always arrives."""
         u, v = self.u, self.v
-        t = _Trials(self.data, p, u, v)
+        t = Trials(self.data, p, u, v)
         value = t.log_likelihood - ((u**2).sum() + v @ v) / 2
         for _ in range(NEWTON_STEPS):
             hessian = _Hessian(self.data, scaled, sd_item, t.weight)
@@ -187,16 +189,22 @@ class LaplaceLikelihood:
 
     def _step(
         self, p: Parameters, at: tuple[Floats, Floats], step: tuple[Floats, Floats], value: float
-    ) -> tuple[Floats, Floats, _Trials, float]:
+    ) -> tuple[Floats, Floats, Trials, float]:
         """A Newton step, halved until the joint density does not fall."""
         length = 1.0
         while True:
             u, v = at[0] + length * step[0], at[1] + length * step[1]
-            trial = _Trials(self.data, p, u, v)
+            trial = Trials(self.data, p, u, v)
             reached = trial.log_likelihood - ((u**2).sum() + v @ v) / 2
             if reached >= value - 1e-9 * abs(value) or length < 1e-6:
                 return u, v, trial, reached
             length /= 2
+
+    def intercepts(self, p: Parameters) -> tuple[Floats, Floats, Trials]:
+        """Modes of participants' first coefficient (people,), roots of its entries in H^-1, trials there."""
+        sd = np.exp(p.log_sd)
+        trials, hessian = self._modes(p, self.data.z * sd[self.data.term], float(sd[-1]))
+        return self.u[:, 0], np.sqrt(hessian.blocks()[0][:, 0, 0]), trials
 
     def evaluate(self, p: Parameters) -> tuple[float, Parameters]:
         """Laplace log-likelihood, and its gradient in the form of Parameters."""

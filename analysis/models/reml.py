@@ -16,7 +16,7 @@ from scipy import sparse
 
 from analysis.models.crossing import Crossing, crossing, summed_product
 from analysis.models.schur import Rest
-from analysis.models.terms import Block, Term, placed
+from analysis.models.terms import Block, Term, intercept_term, placed
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def cross_products(x: Floats, y: Floats, terms: Sequence[Term]) -> CrossProducts
     rest = sparse.hstack(matrices, format="csr") if matrices else sparse.csr_matrix((len(y), 0))
     z = first.matrix()
     pairs = first.z[:, :, None] * first.z[:, None, :]
-    indicator = Term(first.codes, first.levels, np.ones((len(y), 1)), first.patterns).matrix()
+    indicator = intercept_term(first.codes, first.levels).matrix()
     pp = np.asarray(indicator.T @ pairs.reshape(len(y), -1)).reshape(first.levels, first.p, first.p)
     return CrossProducts(
         len(y),

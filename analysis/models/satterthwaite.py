@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from analysis.models.reml import Criterion, CrossProducts, criterion, unscaled_gradient
 
@@ -24,6 +24,21 @@ class Uncertainty:
     covariance: Floats = field(repr=False)
     gradient: Floats = field(repr=False)
     parameters: Floats = field(repr=False)
+
+    def f_test(self, beta: Floats, contrasts: Floats) -> tuple[float, int, float, float]:
+        """F, its two df and p of `contrasts` (q, f) @ beta = 0.
+
+        One df per eigenvector of the contrasts' covariance, pooled by the mean of F (Fai & Cornelius 1996).
+        """
+        covariance = contrasts @ self.covariance @ contrasts.T
+        values, vectors = np.linalg.eigh(covariance)
+        rotated = vectors.T @ contrasts
+        t2 = (rotated @ beta) ** 2 / values
+        f_value, q = float(t2.mean()), len(values)
+        slopes = np.einsum("qa,kab,qb->qk", rotated, self.gradient, rotated, optimize=True)
+        each = 2 * values**2 / np.einsum("qk,kl,ql->q", slopes, self.parameters, slopes, optimize=True)
+        df = _pooled(each)
+        return f_value, q, df, float(special.fdtrc(q, df, f_value))
 
 
 def uncertainty(c: CrossProducts, theta: Floats, at: Criterion) -> Uncertainty:
@@ -63,22 +78,6 @@ def _derivative(c: CrossProducts, theta: Floats, k: int, sigma: float) -> Floats
     if c.cc.shape[0] > COSTLY:
         return slope(step / 2)
     return (4 * slope(step / 2) - slope(step)) / 3
-
-
-def f_test(beta: Floats, found: Uncertainty, contrasts: Floats) -> tuple[float, int, float, float]:
-    """F, its two df and p of `contrasts` (q, f) @ beta = 0.
-
-    One df per eigenvector of the contrasts' covariance, pooled by the mean of F (Fai & Cornelius 1996).
-    """
-    covariance = contrasts @ found.covariance @ contrasts.T
-    values, vectors = np.linalg.eigh(covariance)
-    rotated = vectors.T @ contrasts
-    t2 = (rotated @ beta) ** 2 / values
-    f_value, q = float(t2.mean()), len(values)
-    slopes = np.einsum("qa,kab,qb->qk", rotated, found.gradient, rotated, optimize=True)
-    each = 2 * values**2 / np.einsum("qk,kl,ql->q", slopes, found.parameters, slopes, optimize=True)
-    df = _pooled(each)
-    return f_value, q, df, float(stats.f.sf(f_value, q, df))
 
 
 def _pooled(each: Floats) -> float:

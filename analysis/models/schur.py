@@ -51,12 +51,14 @@ class Rest:
 
     def _left(self, values: Floats) -> Floats:
         """L' values."""
-        parts = [b.applied(f.T, values[b.columns]) for b, f in zip(self._blocks, self._factors, strict=True)]
-        return np.concatenate(parts) if len(parts) > 1 else parts[0] if parts else values.copy()
+        return self._applied([factor.T for factor in self._factors], values)
 
     def _spread(self, values: Floats) -> Floats:
         """L values."""
-        parts = [b.applied(f, values[b.columns]) for b, f in zip(self._blocks, self._factors, strict=True)]
+        return self._applied(self._factors, values)
+
+    def _applied(self, factors: Sequence[Floats], values: Floats) -> Floats:
+        parts = [b.applied(f, values[b.columns]) for b, f in zip(self._blocks, factors, strict=True)]
         return np.concatenate(parts) if len(parts) > 1 else parts[0] if parts else values.copy()
 
     def _solved(self, values: Floats, transposed: bool = False) -> Floats:

@@ -51,7 +51,7 @@ def _descend(c: CrossProducts, start: Floats, bounded: list[bool], least_fall: f
         at = criterion(c, theta)
         return at.value, at.gradient
 
-    found = optimize.minimize(
+    optimum = optimize.minimize(
         objective,
         start,
         jac=True,
@@ -59,7 +59,7 @@ def _descend(c: CrossProducts, start: Floats, bounded: list[bool], least_fall: f
         bounds=[(0.0, None) if b else (None, None) for b in bounded],
         options={"maxiter": 1000, "maxfun": 3000, "ftol": least, "gtol": 1e-8, "maxcor": 30},
     )
-    return np.asarray(found.x, dtype=np.float64)
+    return np.asarray(optimum.x, dtype=np.float64)
 
 
 def _lifted(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats | None:

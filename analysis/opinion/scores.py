@@ -91,11 +91,11 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
         table.decisions.append(f"{int((~keep).sum())} rows without a rating left out ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
-    people, who = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
+    people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
     items, which = np.unique(table.columns[item].astype(str).to_numpy()[keep], return_inverse=True)
     totals, counts = np.zeros((people.size, items.size)), np.zeros((people.size, items.size))
-    np.add.at(totals, (who, which), values[keep])
-    np.add.at(counts, (who, which), 1.0)
+    np.add.at(totals, (person, which), values[keep])
+    np.add.at(counts, (person, which), 1.0)
     scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
     return Votes(
         scores,

@@ -11,7 +11,17 @@ from statsmodels.stats.multitest import multipletests
 from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons
 from analysis.pairs.connected import refuse_disconnected, separated
 from analysis.pairs.factors import FactorTest, ItemFactors, factor_tests
-from analysis.pairs.likelihood import Counts, Fit, Method, Model, counted, fit, free_abilities, scores
+from analysis.pairs.likelihood import (
+    Counts,
+    Fit,
+    Method,
+    Model,
+    counted,
+    fit,
+    free_abilities,
+    sandwich,
+    scores,
+)
 from analysis.pairs.transitivity import Transitivity, transitivity
 from experiments.errors import InputError
 
@@ -40,7 +50,11 @@ class Item:
 
 @dataclass(frozen=True)
 class Contrast:
-    """Difference of two abilities, and its Holm-corrected p."""
+    """Difference of two abilities, and its Holm-corrected p.
+
+    `se_robust` has raters as clusters, `p_robust` is its t test on as many df as raters less one,
+    `p_robust_holm` corrected like the model's.
+    """
 
     first: str
     second: str
@@ -49,6 +63,9 @@ class Contrast:
     z: float
     p: float
     p_holm: float
+    se_robust: float | None = None
+    p_robust: float | None = None
+    p_robust_holm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -137,12 +154,13 @@ def fit_abilities(
     fitted = fit(model, counts, firth=firth)
     full = np.zeros((len(comparisons.items), model.names))
     full[:, : design.shape[1]] = design
+    robust = _robust(comparisons, model, fitted, counts)
     return PairsResult(
         method,
         SCALES[method],
         comparisons.items[0],
-        _items(comparisons, model, fitted, full, counts),
-        _contrasts(comparisons.items, full, fitted),
+        _items(comparisons, fitted, full, robust),
+        _contrasts(comparisons, full, fitted, robust),
         tuple(tuple(row) for row in (full @ fitted.covariance @ full.T).tolist()),
         comparisons.outcome.size,
         comparisons.ties,
@@ -182,14 +200,11 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
         )
 
 
-def _items(
-    comparisons: Comparisons, model: Model, fitted: Fit, full: Array, counts: Counts
-) -> tuple[Item, ...]:
+def _items(comparisons: Comparisons, fitted: Fit, full: Array, robust: Array | None) -> tuple[Item, ...]:
     abilities = full @ fitted.parameters
     standard = np.sqrt(np.clip(np.diag(full @ fitted.covariance @ full.T), 0.0, None))
     centring = full - full.mean(axis=0)
     centred = np.sqrt(np.clip(np.diag(centring @ fitted.covariance @ centring.T), 0.0, None))
-    robust = _robust(comparisons, model, fitted, counts)
     spread = None if robust is None else np.sqrt(np.clip(np.diag(full @ robust @ full.T), 0.0, None))
     ranks = stats.rankdata(-np.round(abilities, 10), method="min").astype(int)
     return tuple(
@@ -223,7 +238,7 @@ def _record(comparisons: Comparisons, item: int) -> tuple[int, int, int]:
 
 
 def _robust(comparisons: Comparisons, model: Model, fitted: Fit, counts: Counts) -> Array | None:
-    """Sandwich covariance, raters as clusters, times G / (G - 1): Liang & Zeger 1986, Biometrika 73, 13."""
+    """The sandwich covariance, raters as clusters; None without raters to tell apart."""
     if comparisons.participant is None or len(comparisons.participants) < 2:
         return None
     z = scores(model, counts.left, counts.right)
@@ -244,21 +259,44 @@ def _robust(comparisons: Comparisons, model: Model, fitted: Fit, counts: Counts)
     count = len(comparisons.participants)
     clusters = np.zeros((count, rows.shape[1]))
     np.add.at(clusters, comparisons.participant, rows)
-    sandwich: Array = fitted.covariance @ (clusters.T @ clusters) @ fitted.covariance * count / (count - 1)
-    return sandwich
+    return sandwich(fitted, clusters)
 
 
-def _contrasts(items: tuple[str, ...], full: Array, fitted: Fit) -> tuple[Contrast, ...]:
-    rows = []
+def _contrasts(
+    comparisons: Comparisons, full: Array, fitted: Fit, robust: Array | None
+) -> tuple[Contrast, ...]:
+    items, rows = comparisons.items, []
+    clustered: list[tuple[float | None, float | None]] = []
     for first, second in combinations(range(len(items)), 2):
         contrast = full[first] - full[second]
         se = float(np.sqrt(max(0.0, contrast @ fitted.covariance @ contrast)))
         difference = float(contrast @ fitted.parameters)
         z = difference / se if se > 0 else float("nan")
         rows.append((items[first], items[second], difference, se, z, _two_sided(difference, se)))
-    told = [row[-1] for row in rows if np.isfinite(row[-1])]
-    holm = iter(multipletests(told, method="holm")[1].tolist() if told else [])
-    return tuple(Contrast(*row, next(holm) if np.isfinite(row[-1]) else float("nan")) for row in rows)
+        clustered.append(_clustered(difference, contrast, robust, len(comparisons.participants)))
+    p = _holm([row[-1] if np.isfinite(row[-1]) else None for row in rows])
+    robust_p = _holm([p for _, p in clustered])
+    return tuple(
+        Contrast(*row, float("nan") if own is None else own, *more, of_raters)
+        for row, own, more, of_raters in zip(rows, p, clustered, robust_p, strict=True)
+    )
+
+
+def _holm(p: list[float | None]) -> list[float | None]:
+    """Those that there are, corrected for their number."""
+    told = [value for value in p if value is not None]
+    corrected = iter(multipletests(told, method="holm")[1].tolist() if told else [])
+    return [None if value is None else next(corrected) for value in p]
+
+
+def _clustered(
+    difference: float, contrast: Array, robust: Array | None, raters: int
+) -> tuple[float | None, float | None]:
+    """The standard error with raters as clusters and its p; None without raters, p None without variance."""
+    if robust is None:
+        return None, None
+    se = float(np.sqrt(max(0.0, float(contrast @ robust @ contrast))))
+    return se, float(2 * stats.t.sf(abs(difference) / se, raters - 1)) if se > 0 else None
 
 
 def _parameter(fitted: Fit, index: int) -> Parameter:

@@ -42,9 +42,14 @@ class Findings:
 
     Attributes
     ----------
-    abilities: free abilities of the items. equal: whether they are all equal.
-    order: advantage of the left (first) side, beside free abilities.
-    factors: abilities as the sum of the effects of the items' factors; the last test is the lack of fit.
+    abilities : PairsResult or None
+        Free abilities of the items.
+    equal : LikelihoodRatio or None
+        Whether they are all equal.
+    order : Parameter or None
+        Advantage of the left (first) side, beside free abilities.
+    factors : PairsResult or None
+        Abilities as the sum of the effects of the items' factors; the last test is the lack of fit.
     """
 
     abilities: PairsResult | None

@@ -143,6 +143,25 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
     raise no_maximum()
 
 
+def sandwich(fitted: Fit, clusters: Array) -> Array:
+    r"""Covariance of parameters robust to what comparisons of one rater share.
+
+    Parameters
+    ----------
+    fitted : Fit
+    clusters : (G, p) array
+        Gradients :math:`s_g` of the log-likelihood, summed over the comparisons of each of G raters.
+
+    Notes
+    -----
+    :math:`C \big( \sum_g s_g s_g' \big) C \cdot G / (G - 1)` with C the model's covariance. Source:
+    Liang & Zeger (1986), Biometrika 73, 13.
+    """
+    raters = len(clusters)
+    robust: Array = fitted.covariance @ (clusters.T @ clusters) @ fitted.covariance * raters / (raters - 1)
+    return robust
+
+
 def no_maximum() -> InputError:
     """The likelihood grows without end."""
     return InputError(

@@ -14,8 +14,13 @@ class Transitivity:
     """Triples of items a, b, c with P(a over b) >= .5 and P(b over c) >= .5, all three compared.
 
     Weak transitivity asks P(a over c) >= .5, moderate >= the smaller, strong >= the greater of the two
-    (Coombs 1964). `circular_triads`: circles a > b > c > a within raters who judged every pair once without
-    a tie (Kendall & Babington Smith 1940, Biometrika 31, 324), with the most that could be.
+    (Coombs 1964).
+
+    Attributes
+    ----------
+    circular_triads : int
+        Circles a > b > c > a within raters who judged every pair once without a tie (Kendall & Babington
+        Smith 1940, Biometrika 31, 324), with the most that could be.
     """
 
     triples: int
@@ -36,9 +41,9 @@ def transitivity(comparisons: Comparisons) -> Transitivity:
         if all(compared[one, other] for one, other in combinations(triple, 2)):
             triples += 1
             violations += _violations(shares, triple)
-    raters, circles, most = _circles(comparisons)
+    raters, circles, greatest = _circles(comparisons)
     weak, moderate, strong = violations.tolist()
-    return Transitivity(triples, weak, moderate, strong, raters, circles, most)
+    return Transitivity(triples, weak, moderate, strong, raters, circles, greatest)
 
 
 def _violations(shares: NDArray[np.float64], triple: tuple[int, ...]) -> NDArray[np.int64]:

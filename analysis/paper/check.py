@@ -52,7 +52,7 @@ def forms(study: PrintedStudy, effect: str) -> dict[str, tuple[int, int]]:
 
 def _degrees_of_freedom(study: PrintedStudy) -> Iterator[Finding]:
     """Multivariate (q, N - q) or univariate (q, q (N - 1)); with one contrast the two are one."""
-    found: dict[str, list[PrintedTest]] = {"multivariate": [], "univariate": []}
+    by_form: dict[str, list[PrintedTest]] = {"multivariate": [], "univariate": []}
     for test in study.test:
         if test.df is None:
             continue
@@ -64,12 +64,12 @@ def _degrees_of_freedom(study: PrintedStudy) -> Iterator[Finding]:
             )
             yield Finding(study.name, "contradiction", "df", test.name, why)
         elif both["multivariate"] != both["univariate"]:
-            found["multivariate" if test.df == both["multivariate"] else "univariate"].append(test)
-    for form, tests in found.items():
+            by_form["multivariate" if test.df == both["multivariate"] else "univariate"].append(test)
+    for form, tests in by_form.items():
         if tests:
             yield _form(study, form, tests)
-    if all(found.values()):
-        names = ", ".join(test.name for test in found["univariate"])
+    if all(by_form.values()):
+        names = ", ".join(test.name for test in by_form["univariate"])
         yield Finding(study.name, "doubt", "df", names, "univariate among multivariate tests")
 
 
@@ -103,14 +103,14 @@ def _said(p: str) -> str:
 def _p_fits(test: PrintedTest, df: tuple[int, int]) -> bool:
     """Whether some F that rounds to the printed one has a p that rounds (or is cut) to the printed one."""
     f = Rounded.of(test.f)
-    least, most = _p(float(f.high), df), _p(float(f.low), df)
+    least, greatest = _p(float(f.high), df), _p(float(f.low), df)
     p = test.p or ""
     if p.startswith("<"):
         return least < float(p[1:])
     if p.startswith(">"):
-        return most > float(p[1:])
+        return greatest > float(p[1:])
     printed = Rounded.of(p)
-    return least < float(printed.high) and most >= float(printed.low)
+    return least < float(printed.high) and greatest >= float(printed.low)
 
 
 def _printed_twice(study: PrintedStudy) -> Iterator[Finding]:

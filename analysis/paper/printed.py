@@ -70,8 +70,8 @@ class PrintedTest(Declaration):
     def name(self) -> str:
         """The test in words."""
         df = f"({self.df[0]}, {self.df[1]})" if self.df else ""
-        place = f" [{self.where}]" if self.where else ""
-        return f"{self.effect} F{df} = {self.f}{place}"
+        bracketed = f" [{self.where}]" if self.where else ""
+        return f"{self.effect} F{df} = {self.f}{bracketed}"
 
 
 class Corrected(Declaration):
@@ -141,14 +141,14 @@ def load_figures(path: Path) -> PrintedPaper:
 
 def _first(error: ValidationError) -> str:
     detail = error.errors()[0]
-    place = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in detail["loc"])
+    path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in detail["loc"])
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
         known = {name for model in _MODELS for name in model.model_fields}
         message = f"unknown key{did_you_mean(str(detail['loc'][-1]), sorted(known))}"
     elif detail["type"] == "string_pattern_mismatch":
         message = f"expected a number as printed, in quotes, got {detail['input']!r}"
-    return f"{place}: {message}"
+    return f"{path}: {message}"
 
 
 _MODELS = (PrintedPaper, PrintedStudy, PrintedMean, PrintedTest, Corrected)

@@ -86,19 +86,19 @@ class TextCheck:
 def check_text(text: str) -> TextCheck:
     """Read and check every statistic of `text` (plain signs, see `analysis.paper.document.plain`)."""
     matches = list(_STATISTIC.finditer(text))
-    found, covered = [], []
+    statistics, covered = [], []
     for match, following in zip_longest(matches, matches[1:]):
         end = min(match.end() + REACH, following.start() if following else len(text))
         tail = text[match.end() : end].split("\n\n")[0]
         reported, used = _reported(match, tail)
-        found.append(reported)
+        statistics.append(reported)
         covered.append((match.start(), match.end() + used))
     unread = [
         " ".join(text[m.start() : m.start() + 60].split())
         for m in _LOOKS_LIKE.finditer(text)
         if not any(start <= m.start() < end for start, end in covered)
     ]
-    return TextCheck(tuple(found), tuple(unread))
+    return TextCheck(tuple(statistics), tuple(unread))
 
 
 def _reported(match: re.Match[str], tail: str) -> tuple[ReportedStatistic, int]:
@@ -142,9 +142,10 @@ def _corners(printed: str, whole_is_exact: bool = False) -> tuple[float, ...]:
 
 def p_range(kind: Kind, df: tuple[str, ...], value: str) -> tuple[float, float]:
     """Smallest and largest p that a printed statistic allows, two-sided for t, r and z."""
-    values = [abs(v) for v in _corners(value.lstrip("-"))]
+    low, high = _corners(value.lstrip("-"))
+    values = [max(low, 0.0), high]  # 0.00 can have been anything from 0 on
     degrees = product(*(_corners(d, whole_is_exact=True) for d in df))
-    p = [_p(kind, at, max(v, 0.0)) for at in degrees for v in values]
+    p = [_p(kind, at, v) for at in degrees for v in values]
     return min(p), max(p)
 
 
@@ -206,10 +207,14 @@ def _eta_problems(df: tuple[str, ...], value: str, eta: re.Match[str]) -> Iterat
     if eta["low"] is None or not partial:
         return
     low, high = float(eta["low"]), float(eta["high"])
-    f, df1, df2 = (np.array([float(n)]) for n in (value, *df))
-    (bounds,) = partial_eta_squared_ci(f, df1, df2, float(eta["level"]) / 100)
+    f = np.maximum([float(value), *_corners(value)], 0.0)
+    df1, df2 = (np.full(3, float(n)) for n in df)
+    bounds, *rounded = partial_eta_squared_ci(f, df1, df2, float(eta["level"]) / 100)
     # with few error df the interval of the noncentral F may end below the size, which is biased upwards
-    if max(abs(bounds[0] - low), abs(bounds[1] - high)) <= INTERVAL_TOLERANCE:
+    if all(
+        min(ends) - INTERVAL_TOLERANCE <= printed <= max(ends) + INTERVAL_TOLERANCE
+        for printed, ends in zip((low, high), zip(bounds, *rounded, strict=True), strict=True)
+    ):
         return
     if not low <= float(eta["eta"]) <= high:
         yield f"the interval [{eta['low']}, {eta['high']}] does not hold its own η² = {eta['eta']}"

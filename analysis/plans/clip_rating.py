@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,11 +16,14 @@ from analysis.read.pool import Pool
 from analysis.read.reading import Reading
 from analysis.read.study_answers import StudyAnswers
 from analysis.report.contents import Contents, Progress, Section
-from analysis.within.between import BetweenDesign, between_design
-from analysis.within.cell_means import cell_table
+from analysis.within.anova import AnovaResult, linear_anova
+from analysis.within.between import BetweenDesign, between_design, no_groups
+from analysis.within.cell_means import CellTable, cell_table
 from experiments.definition import Experiment
+from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
+from experiments.trials.clip_rating.declaration import clip_rating_of
 from experiments.trials.scales import RatedScale, scale_called, scales_of
 
 READING = Reading(RATINGS, numbers=("response",), further=("exemplar",), beside=("scale", "not_applicable"))
@@ -32,6 +36,18 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     for factor in experiment.factors:
         known = [level.name for level in factor.levels]
         refuse_unknown(rows, factor.name, known, f"level of '{factor.name}'", source)
+        _refuse_unrated(rows, factor.name, set(known) - {*rated_levels(experiment, factor.name)}, source)
+
+
+def _refuse_unrated(rows: pd.DataFrame, factor: str, unrated: set[str], source: str) -> None:
+    """Refuse a rating of a clip that is only shown as a reference; a row without one says nothing."""
+    off = rows[factor].isin(unrated).to_numpy() & rows["response"].notna().to_numpy()
+    if off.any():
+        at = int(np.argmax(off))
+        raise InputError(
+            f"{source}: {where(rows, at)}: a rating of the reference's level '{rows[factor].iloc[at]}' of "
+            f"'{factor}', which is not rated; leave the row out, or set rate_itself = true"
+        )
 
 
 def on_scale(experiment: Experiment, rows: pd.DataFrame, name: str) -> pd.DataFrame:
@@ -61,14 +77,36 @@ def analyse_study(experiment: Experiment, answers: StudyAnswers, pool: Pool = Po
     return analyse(prepare(experiment, PLAN, answers, pool))
 
 
-def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
-    """Average and test; `rating` names what was rated."""
+class Tested(NamedTuple):
+    """Cell means of prepared rows, and every effect."""
+
+    cells: CellTable
+    anova: AnovaResult
+
+
+def tested(prepared: Prepared) -> Tested:
+    """Average and test, and no more: what each choice of a multiverse needs."""
+    cells, design = _averaged(prepared)
+    return Tested(
+        cells, linear_anova(cells.y, cells.factors, cells.levels, design or no_groups(len(cells.y)))
+    )
+
+
+def _averaged(prepared: Prepared) -> tuple[CellTable, BetweenDesign | None]:
+    """Cell means, and the groups where the design has some."""
     experiment, rows = prepared.experiment, prepared.rows
-    factors = experiment.analysis.factors or experiment.factor_names
-    levels = {f.name: [level.name for level in f.levels] for f in experiment.factors}
+    factors = experiment.compared_factors
+    levels = {f.name: rated_levels(experiment, f.name) for f in experiment.factors}
     within = [name for name in factors if not experiment.factor(name).between]
     cells = cell_table(rows, "participant", "response", within, levels)
     between = [name for name in factors if name not in within]
+    return cells, groups_of(rows, cells.participants, between, levels) if between else None
+
+
+def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
+    """Average and test; `rating` names what was rated."""
+    experiment = prepared.experiment
+    cells, groups = _averaged(prepared)
     return analyse_cells(
         cells,
         name=experiment.name,
@@ -78,7 +116,7 @@ def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
         synthetic=prepared.synthetic,
         decisions=prepared.decisions,
         labels=labels_of(experiment),
-        between=groups_of(rows, cells.participants, between, levels) if between else None,
+        between=groups,
         experiment=experiment,
         exclusions=prepared.exclusions,
     )
@@ -86,6 +124,15 @@ def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
 
 def contents(prepared: Prepared) -> Contents:
     """What the report says."""
+    reported = _ratings(prepared)
+    if clip_rating_of(prepared.experiment).reference is None:
+        return reported
+    from analysis.plans.degradation import with_degradation
+
+    return with_degradation(reported, prepared)
+
+
+def _ratings(prepared: Prepared) -> Contents:
     from analysis.report.within_contents import contents_of
 
     if prepared.scale is not None:
@@ -96,19 +143,31 @@ def contents(prepared: Prepared) -> Contents:
         prepared = replace(prepared, exclusions=replace(prepared.exclusions, rows=rows))
         said = f"the scale {named.name} alone, of {len(scales_of(prepared.experiment))}"
         analysis = analyse(replace(prepared, decisions=(*prepared.decisions, said)), named.name)
-        return contents_of(analysis, partial(_more, analysis))
+        return contents_of(analysis, partial(further_sections, analysis, prepared))
     if len(scales_of(prepared.experiment)) > 1:
         from analysis.plans.several_scales import contents_of_scales
 
         return contents_of_scales(prepared)
     analysis = analyse(prepared)
-    return contents_of(analysis, partial(_more, analysis))
+    return contents_of(analysis, partial(further_sections, analysis, prepared))
 
 
-def _more(analysis: Analysis, progress: Progress) -> tuple[Section, ...]:
+def further_sections(analysis: Analysis, prepared: Prepared, progress: Progress) -> tuple[Section, ...]:
+    """Sensitivity analyses and the multiverse of one scale: the one `prepared` names, or the only one."""
+    from analysis.plans.multiverse import multiverse_section
     from analysis.plans.sensitivity import sensitivity_sections
 
-    return sensitivity_sections(analysis, progress)
+    sections = sensitivity_sections(analysis, progress)
+    progress("multiverse of exclusions")
+    return (*sections, multiverse_section(analysis, prepared, _tested_named))
+
+
+def _tested_named(prepared: Prepared) -> Tested:
+    """The tests of one scale: the named one, or the only one."""
+    if prepared.scale is None:
+        return tested(prepared)
+    rows = on_scale(prepared.experiment, prepared.rows, prepared.scale)
+    return tested(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)))
 
 
 def groups_of(
@@ -122,13 +181,13 @@ def groups_of(
     for column, name in enumerate(factors):
         level_of: dict[str, str] = {}
         pairs = rows[["participant", name]].astype(str).drop_duplicates()
-        for who, level in pairs.itertuples(index=False):
-            if level_of.setdefault(who, level) != level:
+        for participant, level in pairs.itertuples(index=False):
+            if level_of.setdefault(participant, level) != level:
                 raise InputError(
-                    f"participant {who} has ratings of '{level_of[who]}' and '{level}', but '{name}' is "
-                    "declared between participants"
+                    f"participant {participant} has ratings of '{level_of[participant]}' and '{level}', but "
+                    f"'{name}' is declared between participants"
                 )
-        codes[:, column] = [levels[name].index(level_of[who]) for who in participants]
+        codes[:, column] = [levels[name].index(level_of[participant]) for participant in participants]
     return between_design(factors, [levels[name] for name in factors], codes)
 
 

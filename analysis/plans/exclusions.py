@@ -1,6 +1,6 @@
 """Apply the exclusion rules an experiment declared before its data; every one named with its reason."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
@@ -44,12 +44,76 @@ class Exclusions:
     rows: pd.DataFrame = field(repr=False)
 
 
+@dataclass(frozen=True)
+class Judged:
+    """What every declared rule says of a study's rows; any choice among the rules is then quickly applied.
+
+    Attributes
+    ----------
+    people : dict
+        Participant of every run.
+    by_hand : tuple of (str, str)
+        Runs excluded by hand, and why; whatever the choice, they are left out.
+    runs : tuple of tuple of (str, str), one a rule
+        Runs that the rule leaves out, and why; empty for a rule about trials.
+    trials : tuple of (n,) bool arrays, one a rule
+        Rated main trials that the rule leaves out; None for a rule about runs.
+    lacking : tuple of str, one a rule
+        Why the rule cannot be applied; empty where it can.
+    main : DataFrame
+        The n rated main trials.
+    """
+
+    rules: tuple[rules.ExclusionRule, ...]
+    people: dict[str, str]
+    by_hand: tuple[tuple[str, str], ...]
+    runs: tuple[tuple[tuple[str, str], ...], ...]
+    trials: tuple[NDArray[np.bool_] | None, ...]
+    lacking: tuple[str, ...]
+    set_aside: tuple[str, ...]
+    first_seen: Mapping[str, str]
+    main: pd.DataFrame = field(repr=False)
+
+    def under(self, chosen: Sequence[bool]) -> Exclusions:
+        """Apply the chosen rules, one truth value a declared rule."""
+        at = [rule for rule, applies in enumerate(chosen) if applies]
+        reasons: dict[str, list[str]] = {}
+        for run, why in (*self.by_hand, *(said for rule in at for said in self.runs[rule])):
+            reasons.setdefault(run, []).append(why)
+        _later_runs(self.people, reasons, self.first_seen)
+        excluded = tuple(
+            ExcludedRun(str(self.people[run]), str(run), tuple(reasons[run]))
+            for run in sorted(reasons)
+            if run in self.people
+        )
+        kept = ~self.main["run"].isin(list(reasons)).to_numpy()
+        dropped: list[DroppedTrials] = []
+        for rule in at:
+            marked = self.trials[rule]
+            if marked is None:
+                continue
+            bad = kept & marked
+            if bad.any():
+                runs = int(self.main["run"][bad].nunique())
+                dropped.append(DroppedTrials(self.rules[rule].rule, n_plays(self.main[bad]), runs))
+            kept &= ~marked
+        order = sorted(at, key=lambda rule: isinstance(self.rules[rule], LeavesOutTrials))
+        missing = tuple(self.lacking[rule] for rule in order if self.lacking[rule])
+        n_runs = len(self.people)
+        return Exclusions(excluded, tuple(dropped), self.set_aside, missing, n_runs, self.main[kept])
+
+
 def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusions:
     """Set aside what is no main trial, then apply every declared rule.
 
     Rules about participants see all their main trials; rules about trials see those of who remains. A
     participant's second run is left out, the first that no rule excludes counts.
     """
+    return judged(experiment, ratings).under([True] * len(experiment.exclusions))
+
+
+def judged(experiment: Experiment, ratings: StudyAnswers) -> Judged:
+    """Set aside what is no main trial, and ask every declared rule."""
     rows, aside = _with_run(ratings.rows), list[str]()
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
     main, attention = rows[(kind == "main").to_numpy()], rows[(kind == "attention").to_numpy()]
@@ -63,17 +127,20 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
     aside += [f"{silent} plays without a rating"] if silent else []
     aside += [f"{not_applicable.sum()} answers that the scale does not apply"] if not_applicable.any() else []
     plays, main = main, main[~unrated]
-    people = _people(main, rows)
-    reasons, not_applied = _participant_reasons(experiment, rows, plays, attention)
-    _later_runs(people, reasons, ratings)
-    excluded = tuple(
-        ExcludedRun(str(people[run]), str(run), tuple(reasons[run]))
-        for run in sorted(reasons)
-        if run in people
+    sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
+    lacking = tuple(_lacking(rule, rows) for rule in experiment.exclusions)
+    usable = list(zip(experiment.exclusions, lacking, strict=True))
+    return Judged(
+        rules=tuple(experiment.exclusions),
+        people=_people(main, rows),
+        by_hand=tuple(_by_hand(rows)),
+        runs=tuple(() if without else _runs_left_out(rule, sources) for rule, without in usable),
+        trials=tuple(None if without else _trials_left_out(rule, main) for rule, without in usable),
+        lacking=lacking,
+        set_aside=tuple(aside),
+        first_seen=ratings.first_seen,
+        main=main,
     )
-    kept = main[~main["run"].isin(list(reasons)).to_numpy()]
-    kept, dropped, missing = _drop_trials(experiment, kept)
-    return Exclusions(excluded, dropped, tuple(aside), (*not_applied, *missing), len(people), kept)
 
 
 def n_plays(rows: pd.DataFrame) -> int:
@@ -99,29 +166,37 @@ def _with_run(rows: pd.DataFrame) -> pd.DataFrame:
 def _people(main: pd.DataFrame, rows: pd.DataFrame) -> dict[str, str]:
     """Participant of every run."""
     pairs = rows[["run", "participant"]].drop_duplicates()
-    return {str(run): str(who) for run, who in pairs.itertuples(index=False)} if len(main) else {}
+    return (
+        {str(run): str(participant) for run, participant in pairs.itertuples(index=False)}
+        if len(main)
+        else {}
+    )
 
 
-def _participant_reasons(
-    experiment: Experiment, rows: pd.DataFrame, plays: pd.DataFrame, attention: pd.DataFrame
-) -> tuple[dict[str, list[str]], list[str]]:
-    reasons: dict[str, list[str]] = {}
-    not_applied: list[str] = []
-    for run, why in _by_hand(rows):
-        reasons.setdefault(run, []).append(why)
-    sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
-    for rule in experiment.exclusions:
-        if not isinstance(rule, LeavesOutRuns):
-            continue
-        missing = next((name for name in rule.needed if name not in rows.columns), None)
-        if missing is not None:
-            not_applied.append(f"{rule.rule}: the data have no column '{missing}'")
-            continue
-        for run, trials in _by_run(sources[rule.source], rule.needed):
-            reason = _why(rule, trials)
-            if reason is not None:
-                reasons.setdefault(run, []).append(f"{rule.rule}: {reason}")
-    return reasons, not_applied
+def _lacking(rule: rules.ExclusionRule, rows: pd.DataFrame) -> str:
+    """Why a rule cannot be applied to these columns, or nothing."""
+    needed: tuple[str, ...] = ()
+    if isinstance(rule, LeavesOutRuns):
+        needed = rule.needed
+    elif isinstance(rule, LeavesOutTrials):
+        needed = (rule.needed,)
+    missing = next((name for name in needed if name not in rows.columns), None)
+    return "" if missing is None else f"{rule.rule}: the data have no column '{missing}'"
+
+
+def _runs_left_out(
+    rule: rules.ExclusionRule, sources: Mapping[Source, pd.DataFrame]
+) -> tuple[tuple[str, str], ...]:
+    if not isinstance(rule, LeavesOutRuns):
+        return ()
+    said = ((run, _why(rule, trials)) for run, trials in _by_run(sources[rule.source], rule.needed))
+    return tuple((run, f"{rule.rule}: {reason}") for run, reason in said if reason is not None)
+
+
+def _trials_left_out(rule: rules.ExclusionRule, main: pd.DataFrame) -> NDArray[np.bool_] | None:
+    if not isinstance(rule, LeavesOutTrials):
+        return None
+    return np.array([rule.drops(value) for value in main[rule.needed].tolist()], dtype=bool)
 
 
 def _by_run(rows: pd.DataFrame, names: tuple[str, ...]) -> Iterator[tuple[str, RunTrials]]:
@@ -151,31 +226,13 @@ def _by_hand(rows: pd.DataFrame) -> list[tuple[str, str]]:
     ]
 
 
-def _later_runs(people: dict[str, str], reasons: dict[str, list[str]], ratings: StudyAnswers) -> None:
+def _later_runs(
+    people: Mapping[str, str], reasons: dict[str, list[str]], first_seen: Mapping[str, str]
+) -> None:
     """Of several runs of a participant that no rule excludes, keep the first."""
-    order = sorted(
-        (run for run in people if run not in reasons), key=lambda r: (ratings.first_seen.get(r, ""), r)
-    )
+    order = sorted((run for run in people if run not in reasons), key=lambda r: (first_seen.get(r, ""), r))
     seen: set[str] = set()
     for run in order:
         if people[run] in seen:
             reasons[run] = ["a later run of the same participant"]
         seen.add(people[run])
-
-
-def _drop_trials(
-    experiment: Experiment, rows: pd.DataFrame
-) -> tuple[pd.DataFrame, tuple[DroppedTrials, ...], list[str]]:
-    dropped: list[DroppedTrials] = []
-    missing: list[str] = []
-    for rule in experiment.exclusions:
-        if not isinstance(rule, LeavesOutTrials):
-            continue
-        if rule.needed not in rows.columns:
-            missing.append(f"{rule.rule}: the data have no column '{rule.needed}'")
-            continue
-        bad = np.array([rule.drops(value) for value in rows[rule.needed].tolist()], dtype=bool)
-        if bad.any():
-            dropped.append(DroppedTrials(rule.rule, n_plays(rows[bad]), int(rows["run"][bad].nunique())))
-        rows = rows[~bad]
-    return rows, tuple(dropped), missing

@@ -64,7 +64,7 @@ def analyse(prepared: Prepared) -> Contents:
 
     comparisons = comparisons_of(prepared)
     factors = factors_of(prepared.experiment, comparisons.items)
-    return contents_of(prepared, comparisons, findings_of(comparisons, factors))
+    return contents_of(prepared, comparisons, findings_of(comparisons, factors), factors)
 
 
 def comparisons_of(prepared: Prepared) -> Comparisons:
@@ -79,14 +79,14 @@ def comparisons_of(prepared: Prepared) -> Comparisons:
     decisions += _arrangements(rows)
     shown = {*rows["left_cell"].astype(str), *rows["right_cell"].astype(str)}
     items = tuple(name for name, _ in cells_of(prepared.experiment) if name in shown)
-    place = {name: index for index, name in enumerate(items)}
-    people, who = np.unique(rows["participant"].astype(str).to_numpy(), return_inverse=True)
+    position = {name: index for index, name in enumerate(items)}
+    people, person = np.unique(rows["participant"].astype(str).to_numpy(), return_inverse=True)
     return Comparisons(
         items,
-        _looked_up(rows["left_cell"], place, -1).astype(np.int64),
-        _looked_up(rows["right_cell"], place, -1).astype(np.int64),
+        _looked_up(rows["left_cell"], position, -1).astype(np.int64),
+        _looked_up(rows["right_cell"], position, -1).astype(np.int64),
         _looked_up(rows["winner"], _OUTCOMES, -1).astype(np.int64),
-        who.astype(np.int64),
+        person.astype(np.int64),
         tuple(str(name) for name in people),
         prepared.source,
         prepared.synthetic,

@@ -17,7 +17,7 @@ from analysis.plans.result import labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data
+from analysis.report.json_output import exclusions_data, study_data
 from analysis.report.left_out import left_out
 from analysis.report.numbers import apa_p, fixed, p_value
 from experiments import design
@@ -86,7 +86,7 @@ def _agreement(
     """
     if len(every) < 2:
         return None, "one group alone has comparisons"
-    within = [place for place, factor in enumerate(experiment.factors) if not factor.between]
+    within = [index for index, factor in enumerate(experiment.factors) if not factor.between]
     named = [_without_groups(one, within) for one in every]
     if any(set(one.items) != set(named[0].items) for one in named):
         return None, "the groups compared different cells"
@@ -105,7 +105,7 @@ def _agreement(
 def _without_groups(one: Comparisons, within: list[int]) -> Comparisons:
     """The cells named by their levels in factors within participants."""
     return replace(
-        one, items=tuple("/".join(item.split("/")[place] for place in within) for item in one.items)
+        one, items=tuple("/".join(item.split("/")[index] for index in within) for item in one.items)
     )
 
 
@@ -143,14 +143,8 @@ def _numbers(
     test: LikelihoodRatio | None,
     reason: str | None,
 ) -> dict[str, Any]:
-    experiment = prepared.experiment
     return {
-        "name": experiment.name,
-        "title": experiment.title,
-        "kind": experiment.trial.kind,
-        "source": prepared.source,
-        "synthetic": prepared.synthetic,
-        "n_participants": people,
+        **study_data(prepared, people),
         "groups": [{"group": name, **contents.numbers} for name, contents in of_groups],
         "agreement": None if test is None else {"chi2": test.chi2, "df": test.df, "p": test.p},
         "agreement_reason": reason,

@@ -30,12 +30,17 @@ class Plan:
 
     Attributes
     ----------
-    reading: the columns it needs of the kind's view.
-    check: refuses main rows that the declaration does not allow, by participant and trial; the last argument
+    reading : Reading
+        The columns it needs of the kind's view.
+    check : callable
+        Refuses main rows that the declaration does not allow, by participant and trial; the last argument
         names the source.
-    analyse: the tests, and what the report says of them.
-    numbered: adds `response`, the answer as a number, which exclusion rules and attention checks go by.
-    keys: columns that tell apart the rows of one play, where a play has several.
+    analyse : callable
+        The tests, and what the report says of them.
+    numbered : callable
+        Adds `response`, the answer as a number, which exclusion rules and attention checks go by.
+    keys : tuple of str
+        Columns that tell apart the rows of one play, where a play has several.
     """
 
     reading: Reading
@@ -47,11 +52,11 @@ class Plan:
 
 def plan_of(kind: str) -> Plan:
     """The plan of a kind of trial; InputError where it has none."""
-    place = f"analysis.plans.{kind}"
+    module = f"analysis.plans.{kind}"
     try:
-        plan: Plan = import_module(place).PLAN
+        plan: Plan = import_module(module).PLAN
     except ModuleNotFoundError as error:
-        if error.name != place:
+        if error.name != module:
             raise
         raise InputError(
             f"trials of the kind {kind} have no analysis yet; export their data (server export)"

@@ -1,6 +1,6 @@
 """From a study's rows to those that count, whatever the kind of trial: one pool, declared exclusions."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ from analysis.read.study_answers import StudyAnswers
 from analysis.report.evidence import evidence_section
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
+from experiments.schema.canonical import definition_sha256
 from experiments.trials.scales import scale_called
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ class Prepared:
     synthetic: bool
     exclusions: Exclusions
     decisions: tuple[str, ...]
+    checked: StudyAnswers = field(repr=False)
+    """The answers before exclusion."""
     scale: str | None = None
     """The scale to analyse, where not all are."""
 
@@ -55,7 +58,8 @@ def study_contents(
         scale_called(experiment, scale)
     answers = with_verdicts(answers, runs) if runs else answers
     contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
-    evidence, numbers = evidence_section(pooled(answers.rows, pool, answers.source)[0], runs)
+    chosen, _ = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
+    evidence, numbers = evidence_section(chosen, runs)
     if evidence is None:
         return contents
     return replace(contents, evidence=evidence, numbers=contents.numbers | {"evidence": numbers})
@@ -71,7 +75,7 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     InputError
         An answer that the declaration does not allow, a trial stored twice with different data.
     """
-    chosen, pooling = pooled(answers.rows, pool, answers.source)
+    chosen, pooling = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
     rows, repeats = _without_repeats(chosen, plan.keys, answers.source)
     rows = plan.numbered(rows)
     main = _main(rows)
@@ -84,7 +88,7 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     exclusions = apply_exclusions(experiment, checked)
     _refuse_nobody(exclusions, answers.source, pool)
     decisions = (*answers.decisions, *pooling, *repeats)
-    return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions)
+    return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions, checked)
 
 
 def _main(rows: pd.DataFrame) -> pd.DataFrame:
@@ -114,8 +118,8 @@ def _without_repeats(
     """Count a trial stored twice once where its data agree; refuse it where they do not."""
     if "trial_index" not in rows.columns:
         return rows, ()
-    who = "run" if "run" in rows.columns else "participant"
-    keys = [who, "trial_index", *(name for name in ("play", *within) if name in rows.columns)]
+    unit = "run" if "run" in rows.columns else "participant"
+    keys = [unit, "trial_index", *(name for name in ("play", *within) if name in rows.columns)]
     again = rows.duplicated(keys).to_numpy()
     if not again.any():
         return rows, ()
@@ -131,8 +135,8 @@ def _without_repeats(
 def _refuse_nobody(exclusions: Exclusions, source: str, pool: Pool) -> None:
     if not exclusions.n_runs:
         aside = f" (set aside: {'; '.join(exclusions.set_aside)})" if exclusions.set_aside else ""
-        wanted = f" of origin '{pool.origin}'" if pool.origin else ""
-        raise NoRatingsError(f"{source} has no ratings{wanted} yet{aside}")
+        of_origin = f" of origin '{pool.origin}'" if pool.origin else ""
+        raise NoRatingsError(f"{source} has no ratings{of_origin} yet{aside}")
     if exclusions.rows.empty:
-        who = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
-        raise NoRatingsError(f"{source}: no participant remains after the declared exclusions: {who}")
+        excluded = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
+        raise NoRatingsError(f"{source}: no participant remains after the declared exclusions: {excluded}")

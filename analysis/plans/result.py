@@ -15,6 +15,7 @@ from analysis.within.simple_effects import SimpleEffect, simple_effects
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
+    from analysis.robust.companions import Companions
     from experiments.definition import Experiment
 
 
@@ -66,6 +67,7 @@ class Analysis:
     equivalence: tuple[Equivalence, ...] = ()
     experiment: "Experiment | None" = None
     exclusions: "Exclusions | None" = None
+    robust: "Companions | None" = None
 
     @property
     def n_participants(self) -> int:
@@ -136,7 +138,10 @@ def cell_decisions(cells: CellTable) -> tuple[str, ...]:
     low, high = int(cells.counts.min()), int(cells.counts.max())
     if low != high:
         said.append(f"cells hold {low} to {high} ratings; every cell mean weighs the same")
-    said += [f"participant {who} gave one and the same rating throughout; kept" for who in cells.constant]
+    said += [
+        f"participant {participant} gave one and the same rating throughout; kept"
+        for participant in cells.constant
+    ]
     return tuple(said)
 
 

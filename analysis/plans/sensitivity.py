@@ -1,19 +1,19 @@
-"""Sensitivity analyses beside the ANOVA: Bayes factors of pairs, the mixed and the ordinal model."""
+"""Sensitivity analyses beside the ANOVA: Bayes factors, robust companions, mixed and ordinal models."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import isfinite
 from typing import Any
 
+from analysis.plans.random_factors import fit_with_random, holds_for, said_of_random
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
 from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
+from analysis.report.r_models import model_files
+from analysis.within.bayes_factor import bayes_factor
 from experiments.errors import InputError
-
-PRIOR_SCALE = 2**0.5 / 2
-"""Scale r of the Cauchy prior on effect sizes."""
-
 
 MAX_RATINGS = 50_000
 """Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
@@ -27,7 +27,7 @@ def sensitivity_sections(
 ) -> tuple[Section, ...]:
     """Every sensitivity analysis the data allow, as sections; what they do not allow says why."""
     progress("Bayes factors")
-    sections = [bayes_factors(analysis)]
+    sections = [bayes_factors(analysis), robust_companions(analysis, progress)]
     reason = _no_models(analysis)
     if reason is not None:
         return (*sections, Section("Mixed and ordinal models", f"Not fitted: {reason}."))
@@ -38,6 +38,15 @@ def sensitivity_sections(
         except InputError as error:
             sections.append(Section(title, f"Not fitted: {error}."))
     return tuple(sections)
+
+
+def robust_companions(analysis: Analysis, progress: Callable[[str], None] = lambda _: None) -> Section:
+    """Permutations, aligned ranks and trimmed means beside the ANOVA."""
+    from analysis.report.robust_tables import robust_section
+    from analysis.robust.companions import companions_of
+
+    progress("robust companions")
+    return robust_section(analysis, analysis.robust or companions_of(analysis.anova))
 
 
 def _no_models(analysis: Analysis) -> str | None:
@@ -67,19 +76,25 @@ def _model_arguments(analysis: Analysis) -> dict[str, Any]:
     }
 
 
+def _random_factors(analysis: Analysis) -> list[str]:
+    declared = analysis.experiment.factors if analysis.experiment is not None else ()
+    return [factor.name for factor in declared if factor.random]
+
+
 def mixed_model(analysis: Analysis) -> Section:
     """The linear mixed model's tests beside those of the ANOVA."""
-    from analysis.models.mixed import fit_mixed
-
     every = len(analysis.cells.cells) <= MAX_CELLS
-    result = fit_mixed(**_model_arguments(analysis), slopes="all" if every else "main")
+    random = _random_factors(analysis)
+    arguments = _model_arguments(analysis)
+    result, random_slopes = fit_with_random(arguments, random, every)
     rows = []
     for effect in result.effects:
         ours = analysis.anova.effect(effect.effect)
         df = f"{effect.df_effect}, {fixed(effect.df_error, 1)}"
         cells = (fixed(effect.f_value, 3), df, p_value(effect.p_value), p_value(ours.univariate.p_gg))
-        rows.append((ours.effect, *cells))
-    header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)")
+        holds = (holds_for(effect.effect, random, random_slopes),) if random else ()
+        rows.append((ours.effect, *cells, *holds))
+    header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)", *(("holds for",) if random else ()))
     notes = (result.formula, *_parts(result.components), *result.notes)
     table = Table(
         "mixed",
@@ -95,12 +110,18 @@ def mixed_model(analysis: Analysis) -> Section:
         f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
         f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
     )
+    if random:
+        text += f" {said_of_random(random, random_slopes)}"
     if not every:
         text += (
             f" With more than {MAX_CELLS} cells slopes for every effect take minutes (analysis mixed fits "
             "them); without them the p of interactions are too small where people differ in them."
         )
-    return Section("Linear mixed model", text, (table,))
+    if random:
+        return Section("Linear mixed model", text, (table,))
+    return Section(
+        "Linear mixed model", text, (table,), (), partial(model_files, analysis, arguments, result)
+    )
 
 
 def _parts(components: Sequence[Any]) -> tuple[str, ...]:
@@ -112,7 +133,10 @@ def ordinal_model(analysis: Analysis) -> Section:
     """The cumulative-link mixed model's tests beside those of the ANOVA."""
     from analysis.models.ordinal import fit_ordinal
 
-    result = fit_ordinal(**_model_arguments(analysis), slopes="main")
+    arguments = _model_arguments(analysis)
+    random = [name for name in _random_factors(analysis) if name not in arguments["item"]]
+    arguments["item"] = [*random, *arguments["item"]]
+    result = fit_ordinal(**arguments, slopes="main")
     rows = []
     for effect in result.effects:
         ours = analysis.anova.effect(effect.effect)
@@ -139,26 +163,28 @@ def ordinal_model(analysis: Analysis) -> Section:
         "blinks, by-participant slopes for the main effects, Laplace approximation, joint Wald tests. "
         "Without slopes of interactions their p are too small where people differ in them."
     )
-    return Section("Ordinal mixed model", text, (table,))
+    if named := _random_factors(analysis):
+        text += (
+            f" Items are the blinks of each {' and '.join(named)}; effects are not let differ between these, "
+            "so that the tests hold for those shown: the linear mixed model says what holds for others."
+        )
+    return Section(
+        "Ordinal mixed model", text, (table,), (), partial(model_files, analysis, arguments, result)
+    )
 
 
 def bayes_factors(analysis: Analysis) -> Section:
     """JZS Bayes factors of the planned pairs (all one-factor pairs where none are planned).
 
-    Source: Rouder et al. (2009), doi:10.3758/PBR.16.2.225; computed by pingouin.
+    Source: Rouder et al. (2009), doi:10.3758/PBR.16.2.225.
     """
-    # pingouin takes seconds to import, which only the report pays
-    from pingouin import bayesfactor_ttest
-
     planned = analysis.experiment.analysis.pairs if analysis.experiment else ()
     # The test is that of differences within participants; pairs of groups have none.
     within = [name for name in planned or analysis.anova.factors if name in analysis.anova.factors]
     pairs = [p for p in analysis.pairs if p.effect in within]
     rows = []
     for pair in pairs:
-        bf = float("nan")
-        if isfinite(pair.t):
-            bf = float(bayesfactor_ttest(pair.t, analysis.n_participants, paired=True, r=PRIOR_SCALE))
+        bf = bayes_factor(pair.t, analysis.n_participants, pair.df)
         name = f"{pair.effect}: {pair.level_a} - {pair.level_b}"
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
     header = ("Margin: pair", "t", "BF10", "BF01", "evidence")

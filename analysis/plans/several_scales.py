@@ -2,19 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from analysis.plans.clip_rating import analyse, on_scale
+from analysis.plans.clip_rating import analyse, further_sections, on_scale
 from analysis.plans.prepare import Prepared
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Progress, Section
 from analysis.report.formats import Table
-from analysis.report.json_output import as_data, exclusions_data
+from analysis.report.json_output import as_data, exclusions_data, study_data
 from analysis.report.left_out import left_out
 from analysis.report.numbers import DASH, fixed
 from analysis.report.within_contents import methods_of, part_of
@@ -33,7 +32,7 @@ def contents_of_scales(prepared: Prepared) -> Contents:
     analyses = [(scale, _of_scale(prepared, scale)) for scale in scales]
     alpha = cronbach_alpha(scale_cases(prepared, scales))
     people = prepared.rows["participant"].astype(str).nunique()
-    parts = [_part(scale, analysis) for scale, analysis in analyses]
+    parts = [_part(scale, analysis, replace(prepared, scale=scale.name)) for scale, analysis in analyses]
     return Contents(
         name=experiment.name,
         title=experiment.title,
@@ -46,12 +45,7 @@ def contents_of_scales(prepared: Prepared) -> Contents:
         parts=(*parts, _reliability(alpha, len(scales), experiment.name, prepared.synthetic)),
         methods=METHODS + methods_of(analyses[0][1]),
         numbers={
-            "name": experiment.name,
-            "title": experiment.title,
-            "kind": experiment.trial.kind,
-            "source": prepared.source,
-            "synthetic": prepared.synthetic,
-            "n_participants": people,
+            **study_data(prepared, people),
             "scales": [
                 {"scale": scale.name, "reverse": scale.reverse, **as_data(one)} for scale, one in analyses
             ],
@@ -67,16 +61,14 @@ def _of_scale(prepared: Prepared, scale: RatedScale) -> Analysis:
     return analyse(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)), scale.name)
 
 
-def _part(scale: RatedScale, analysis: Analysis) -> Part:
+def _part(scale: RatedScale, analysis: Analysis, prepared: Prepared) -> Part:
+    """The part of one scale; `prepared` names it."""
     title = f"{scale.name}{' (reverse-keyed)' if scale.reverse else ''}"
-    return part_of(analysis, partial(_more, analysis), title).under(scale.name, title)
 
+    def more(progress: Progress) -> tuple[Section, ...]:
+        return further_sections(analysis, prepared, lambda step: progress(f"{scale.name}: {step}"))
 
-def _more(analysis: Analysis, progress: Progress) -> tuple[Section, ...]:
-    from analysis.plans.sensitivity import bayes_factors
-
-    progress("Bayes factors")
-    return (bayes_factors(analysis),)
+    return part_of(analysis, more, title).under(scale.name, title)
 
 
 def scale_cases(prepared: Prepared, scales: Sequence[RatedScale]) -> pd.DataFrame:

@@ -7,11 +7,11 @@ from analysis.plans.prepare import Prepared
 from analysis.plans.threshold import Difference, answers_of, differences, series_labels
 from analysis.report.contents import Contents
 from analysis.thresholds.people import Answers
-from analysis.thresholds.plane import Points, counted_points
-from analysis.thresholds.plane_people import PlanesResult, fit_planes
+from analysis.thresholds.plane import Points
+from analysis.thresholds.plane_people import PlanesResult, fit_planes, points_of
 from experiments.errors import InputError
 from experiments.trials.threshold.declaration import Threshold, threshold_of
-from experiments.trials.threshold.grid import seconds
+from experiments.trials.threshold.grid import model
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,7 @@ def analyse(prepared: Prepared) -> Contents:
 
     trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
     # The declared middle, as the server has it: series that lack a level are compared with the others.
-    across = list(seconds(prepared.experiment))
-    middle = (across[0] + across[-1]) / 2
+    middle = model(prepared.experiment).middle
     fits = tuple(_fit(name, labels[name], mine, trial, middle) for name, mine in answers_of(prepared).items())
     compared: tuple[Difference, ...] = ()
     for what in ("threshold", "tilt"):
@@ -41,8 +40,7 @@ def analyse(prepared: Prepared) -> Contents:
 
 
 def _fit(name: str, label: str, answers: Answers, trial: Threshold, middle: float) -> SeriesPlane:
-    across = answers.x if answers.second is None else answers.second
-    points, falling = counted_points(answers.x, across, answers.response), trial.direction == "falling"
+    points, falling = points_of(answers), trial.direction == "falling"
     try:
         result = fit_planes(answers, "normal", trial.task.guess, trial.lapse, falling=falling, middle=middle)
     except InputError as error:

@@ -9,27 +9,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analysis.power.simulate import PowerResult
-from analysis.report.pictures import COLOURS, MARKERS
+from analysis.report.letters import further_letters
+from analysis.report.pictures import COLOURS, MARKERS, STYLE
 from experiments.errors import InputError
 from experiments.files import whole_file
 
 FORMATS = (".png", ".svg", ".pdf")
-_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "svg.hashsalt": "palpebra",
-}
 
 
-def draw_power(result: PowerResult, wanted: float = 0.8) -> Figure:
+def draw_power(result: PowerResult, target: float = 0.8) -> Figure:
     """Power against n, a line an effect, with two standard errors of the simulation either side."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 4.2), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        axes.axhline(wanted, color="#888888", linewidth=0.8, linestyle="--")
+        axes.axhline(target, color="#888888", linewidth=0.8, linestyle="--")
         axes.axhline(result.alpha, color="#888888", linewidth=0.8, linestyle=":")
         for i, effect in enumerate(result.effects):
             colour, row, se = COLOURS[i % len(COLOURS)], result.power[i], result.se[i]
@@ -50,7 +44,7 @@ def draw_power(result: PowerResult, wanted: float = 0.8) -> Figure:
     return figure
 
 
-def save_power_figure(result: PowerResult, path: Path, wanted: float = 0.8) -> None:
+def save_power_figure(result: PowerResult, path: Path, target: float = 0.8) -> None:
     """Write the figure as PNG, SVG or PDF by the file's ending, whole or not at all."""
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"{path}: expected a name ending in {', '.join(FORMATS)}")
@@ -59,6 +53,6 @@ def save_power_figure(result: PowerResult, path: Path, wanted: float = 0.8) -> N
         ".pdf": {"CreationDate": None},
         ".png": {"Software": None},
     }
-    figure = draw_power(result, wanted)
-    with whole_file(path) as temporary, mpl.rc_context(_STYLE):
+    figure = draw_power(result, target)
+    with whole_file(path) as temporary, mpl.rc_context(STYLE), further_letters(figure):
         figure.savefig(temporary, dpi=200, metadata=undated[path.suffix.lower()])

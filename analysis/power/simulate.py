@@ -11,7 +11,6 @@ from scipy import special
 from analysis.synthetic.population import Population
 from analysis.synthetic.synthesise import Plan, population_of
 from experiments.errors import InputError
-from experiments.trials.scales import scale_called
 
 Floats = NDArray[np.float64]
 Statistic = Literal["multivariate", "greenhouse-geisser"]
@@ -25,7 +24,7 @@ class PowerResult:
     """Share of significant tests, (effects, sample sizes), with standard errors; NaN where no test exists."""
 
     experiment: str
-    statistic: Statistic
+    statistic: str
     alpha: float
     simulations: int
     seed: int
@@ -34,14 +33,14 @@ class PowerResult:
     power: Floats = field(repr=False)
     se: Floats = field(repr=False)
 
-    def smallest_n(self, wanted: float) -> dict[str, int | None]:
-        """Of every effect the smallest simulated n from which on the power stays at `wanted` or above."""
-        found: dict[str, int | None] = {}
+    def smallest_n(self, target: float) -> dict[str, int | None]:
+        """Of every effect the smallest simulated n from which on the power stays at `target` or above."""
+        smallest: dict[str, int | None] = {}
         for effect, row in zip(self.effects, self.power, strict=True):
-            enough = np.nan_to_num(row) >= wanted
+            enough = np.nan_to_num(row) >= target
             start = len(row) - int(np.argmin(enough[::-1])) if not enough.all() else 0
-            found[effect] = self.n[start] if start < len(row) else None
-        return found
+            smallest[effect] = self.n[start] if start < len(row) else None
+        return smallest
 
 
 def sample_sizes(text: str) -> tuple[int, ...]:
@@ -83,7 +82,7 @@ def simulate_power(
         raise InputError(f"expected at least 10 simulations, got {simulations}")
     rng = np.random.default_rng(seed)
     population = population_of(plan, rng)
-    known = [t.name.removeprefix("F ") for t in plan.targets.tests if t.wanted is not None]
+    known = [t.name.removeprefix("F ") for t in plan.targets.tests if t.start is not None]
     effects = tuple(e for e in plan.space.effects if e in known)
     contrasts = [plan.space.effects[e] for e in effects]
     power = np.empty((len(effects), len(sizes)))
@@ -109,8 +108,7 @@ def _draw(plan: Plan, population: Population, count: int, n: int, rng: np.random
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     y = population.means + rng.normal(size=(count, n, len(values))) @ root.T
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
-    scale = scale_called(plan.experiment)
-    return np.asarray(np.rint(np.clip(y, scale.minimum, scale.maximum) * trials) / trials)
+    return np.asarray(np.rint(np.clip(y, plan.scale.minimum, plan.scale.maximum) * trials) / trials)
 
 
 def _significant(z: Floats, alpha: float, statistic: Statistic) -> float:

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from os import environ
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +20,6 @@ from experiments.errors import InputError
 PORTION = 20_000
 KINDS = ("main", "attention")
 """Practice trials are never fetched: nobody analyses them."""
-
-
-def default_url() -> str:
-    """DATABASE_URL, or the SQLite file in the server's data folder (PALPEBRA_DATA_FOLDER, else `data`)."""
-    if environ.get("DATABASE_URL"):
-        return environ["DATABASE_URL"]
-    folder = environ.get("PALPEBRA_DATA_FOLDER") or "data"
-    return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
 
 
 class AnswersQuery:
@@ -91,25 +82,25 @@ class AnswersQuery:
         there = self._reading.view.names
         texts, flags = ([name for name in names if name in there] for names in (RUN_TEXTS, RUN_FLAGS))
         names = ["run", *texts, *flags]
-        found = [
+        rows_of_runs = [
             row
             for rows in self._portions(f"DISTINCT {', '.join(names)} FROM {self._view} WHERE {self._where}")
             for row in rows
         ]
-        of_run = {str(row[0]): row[1:] for row in found}
-        wanted = [of_run[name] for name in run.categories]
+        of_run = {str(row[0]): row[1:] for row in rows_of_runs}
+        of_category = [of_run[name] for name in run.categories]
         taken = run.codes.astype(np.int64)
         columns: dict[str, Any] = {}
         for i, name in enumerate(texts):
-            columns[name] = categorical(taken, ["" if row[i] is None else str(row[i]) for row in wanted])
+            columns[name] = categorical(taken, ["" if row[i] is None else str(row[i]) for row in of_category])
         for i, name in enumerate(flags, len(texts)):
-            columns[name] = np.array([bool(row[i]) for row in wanted], dtype=bool)[taken]
+            columns[name] = np.array([bool(row[i]) for row in of_category], dtype=bool)[taken]
         return columns
 
     def first_seen(self) -> dict[str, str]:
         """When the first row of each run was stored."""
-        found = self._portions(f"run, MIN(saved_at) FROM {self._view} WHERE {self._where} GROUP BY run")
-        return {str(run): str(moment) for rows in found for run, moment in rows}
+        portions = self._portions(f"run, MIN(saved_at) FROM {self._view} WHERE {self._where} GROUP BY run")
+        return {str(run): str(moment) for rows in portions for run, moment in rows}
 
     def _portions(self, selection: str) -> Iterator[Sequence[Any]]:
         # the driver's own cursor: SQLAlchemy's row objects cost a second a million rows
@@ -136,9 +127,9 @@ class _Codes:
         self._portions.append(np.array([code.setdefault(value, len(code)) for value in values], np.int32))
 
     def column(self) -> "pd.Categorical[str]":
-        found = ["" if name is None else str(name) for name in self._code]
+        texts = ["" if name is None else str(name) for name in self._code]
         codes = np.concatenate(self._portions) if self._portions else np.empty(0, np.int32)
-        return categorical(codes, found)
+        return categorical(codes, texts)
 
 
 class _Numbers:
@@ -159,9 +150,9 @@ def _factor_columns(levels: "pd.Categorical[str]", factors: Sequence[str]) -> di
     parsed = [json.loads(level) if level else {} for level in levels.categories]
     columns: dict[str, Any] = {}
     for factor in factors:
-        found = [str((row or {}).get(factor, "")) for row in parsed]
-        names = sorted(set(found))
-        lookup = np.array([names.index(name) for name in found], np.int32)
+        texts = [str((row or {}).get(factor, "")) for row in parsed]
+        names = sorted(set(texts))
+        lookup = np.array([names.index(name) for name in texts], np.int32)
         columns[factor] = pd.Categorical.from_codes(
             lookup[levels.codes], categories=pd.Index(names, dtype=object)
         )

@@ -63,9 +63,9 @@ def read_long_table(
         As `read_text_table`; a column in two roles; ratings that are text or outside `scale`; one trial
         with two ratings.
     """
-    wanted = [participant, rating, *within, *between, *covariates, *([trial] if trial else [])]
-    refuse_shared_roles(wanted)
-    table = read_text_table(path, wanted, ("synthetic",))
+    needed = [participant, rating, *within, *between, *covariates, *([trial] if trial else [])]
+    refuse_shared_roles(needed)
+    table = read_text_table(path, needed, ("synthetic",))
     for name in (participant, *within, *between):
         texts_required(table, name)
     values = numbers(table, rating)
@@ -79,7 +79,7 @@ def read_long_table(
     if trial is not None:
         keep &= ~_repeats(table, [participant, trial], values, within)
     else:
-        _report_copies(table, wanted, values)
+        _report_copies(table, needed, values)
     measured = {name: numbers(table, name) for name in covariates}
     for name, given in measured.items():
         keep &= _with_covariate(table, participant, name, given)
@@ -94,12 +94,12 @@ def _with_covariate(
     table: TextTable, participant: str, name: str, given: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Rows of participants whose covariate is known; the others are named."""
-    who = table.columns[participant].to_numpy()
-    lacking = list(dict.fromkeys(who[np.isnan(given)]))
+    people_of_rows = table.columns[participant].to_numpy()
+    lacking = list(dict.fromkeys(people_of_rows[np.isnan(given)]))
     if lacking:
         people = f"participant{'s' if len(lacking) > 1 else ''} {', '.join(map(str, lacking))}"
         table.decisions.append(f"left out for want of '{name}': {people}")
-    return np.asarray(~np.isin(who, lacking), dtype=bool)
+    return np.asarray(~np.isin(people_of_rows, lacking), dtype=bool)
 
 
 def refuse_out_of_scale(

@@ -102,8 +102,8 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
         return
     pairs = table.columns[[participant, *item]].drop_duplicates()
     what = pairs[list(item)].astype(str).agg("/".join, axis=1)
-    who = pairs[participant].astype(str)
-    if len(pairs) > 1 and len(pairs) == who.nunique() == what.nunique():
+    people = pairs[participant].astype(str)
+    if len(pairs) > 1 and len(pairs) == people.nunique() == what.nunique():
         raise InputError(
             f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one: "
             "these are the participants again; name the column of clips, or leave --item out"

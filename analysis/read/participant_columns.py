@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.within.between import BetweenDesign, Covariate, between_design
-from analysis.within.cell_means import natural_order
+from analysis.within.cell_means import factorized, natural_order
 from experiments.errors import InputError
 
 
@@ -57,13 +57,16 @@ def design_of(
 
 def one_value_each(rows: pd.DataFrame, participant: str, name: str) -> dict[str, object]:
     """Each participant's value of a column; refused where a participant has two."""
-    pairs = rows[[participant, name]].drop_duplicates()
-    twice = pairs[participant].duplicated().to_numpy()
+    person, people = factorized(rows[participant])
+    value, values = factorized(rows[name])
+    first = np.zeros(len(people), np.int64)
+    first[person[::-1]] = value[::-1]
+    twice = value != first[person]
     if twice.any():
-        who = pairs[participant].iloc[int(np.argmax(twice))]
-        two = [str(value) for value in pairs[name][(pairs[participant] == who).to_numpy()]][:2]
+        at = int(np.argmax(twice))
+        two = f"{values[first[person[at]]]} and {values[value[at]]}"
         raise InputError(
-            f"'{name}' differs within participant {who} ({two[0]} and {two[1]}); a group or covariate has "
+            f"'{name}' differs within participant {people[person[at]]} ({two}); a group or covariate has "
             "one value for each participant, what changes within a participant belongs in --within"
         )
-    return dict(zip(pairs[participant].astype(str), pairs[name], strict=True))
+    return {str(one): values[at] for one, at in zip(people, first.tolist(), strict=True)}

@@ -1,5 +1,6 @@
 """Whose answers are analysed together: one origin, one data series."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -7,6 +8,9 @@ import numpy as np
 import pandas as pd
 
 from experiments.errors import InputError
+
+DECLARATION = "definition_sha256"
+"""The column with the hash of the declaration under which an answer was given."""
 
 
 class Origin(StrEnum):
@@ -27,12 +31,15 @@ class Pool:
     version: int | None = None
 
 
-def pooled(rows: pd.DataFrame, pool: Pool, source: str) -> tuple[pd.DataFrame, tuple[str, ...]]:
+def pooled(
+    rows: pd.DataFrame, pool: Pool, source: str, declaration_sha256: str
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """The rows of this pool, and in words which they are and what was left aside.
 
     Without a wish the origin is the first of participant, pilot and simulated that there is, and the series
-    the latest; rows of others are left aside and counted. Sources without these columns (exports of older
-    programs) tell the origin by `phase` and `synthetic`, and have one series.
+    the latest that has answers given under the declaration with this hash, else the latest; rows of others
+    are left aside and counted. Sources without these columns (exports of older programs) tell the origin by
+    `phase` and `synthetic`, and have one series.
 
     Raises
     ------
@@ -42,53 +49,82 @@ def pooled(rows: pd.DataFrame, pool: Pool, source: str) -> tuple[pd.DataFrame, t
     said: list[str] = []
     rows = _of_origin(rows, pool.origin, said)
     rows = _of_number(rows, "study_version", pool.version, source, said)
-    latest = pool.series
-    if latest is None and "data_series" in rows.columns and len(numbers := _numbers(rows["data_series"])) > 1:
-        latest = max(numbers)
-    return _of_number(rows, "data_series", latest, source, said), tuple(said)
+    series = _series_of(rows, declaration_sha256) if pool.series is None else pool.series
+    rows = _of_number(rows, "data_series", series, source, said)
+    return rows, (*_named(rows), *said, *_declarations(rows, declaration_sha256))
+
+
+def _named(rows: pd.DataFrame) -> Iterator[str]:
+    if "data_series" in rows.columns and len(series := _numbers(rows["data_series"])) == 1:
+        yield f"answers of data series {series[0]}, origin {', '.join(pd.unique(origins(rows)))}"
+
+
+def _series_of(rows: pd.DataFrame, declaration_sha256: str) -> int | None:
+    if "data_series" not in rows.columns:
+        return None
+    series = rows["data_series"]
+    if DECLARATION in rows.columns:
+        own = _numbers(series[(rows[DECLARATION] == declaration_sha256).to_numpy()])
+        if own:
+            return own[-1]
+    return max(_numbers(series), default=None)
+
+
+def _declarations(rows: pd.DataFrame, declaration_sha256: str) -> Iterator[str]:
+    """What is to be said of the declarations under which these answers were given."""
+    hashes = (
+        {str(name) for name in pd.unique(rows[DECLARATION])} - {""} if DECLARATION in rows.columns else set()
+    )
+    if len(hashes) > 1:
+        yield f"{len(hashes)} versions of the experiment's declaration were used; analysed together"
+    if hashes and declaration_sha256 not in hashes:
+        yield (
+            "the answers were given under another declaration than the one given here, by which they are "
+            "read; the study's Design page has theirs"
+        )
 
 
 def origins(rows: pd.DataFrame) -> np.ndarray:
     """The origin of every row."""
     if "run_origin" in rows.columns and not (rows["run_origin"] == "").all():
         return np.asarray(rows["run_origin"], dtype=object)
-    found = np.full(len(rows), Origin.PARTICIPANT.value, dtype=object)
+    origin = np.full(len(rows), Origin.PARTICIPANT.value, dtype=object)
     if "phase" in rows.columns:
-        found[(rows["phase"] == "pilot").to_numpy()] = Origin.PILOT.value
+        origin[(rows["phase"] == "pilot").to_numpy()] = Origin.PILOT.value
     if "synthetic" in rows.columns:
-        found[rows["synthetic"].to_numpy(dtype=bool)] = Origin.SIMULATED.value
-    return found
+        origin[rows["synthetic"].to_numpy(dtype=bool)] = Origin.SIMULATED.value
+    return origin
 
 
-def _of_origin(rows: pd.DataFrame, wanted: Origin | None, said: list[str]) -> pd.DataFrame:
-    found = origins(rows)
-    there = [origin for origin in Origin if (found == origin.value).any()]
-    if wanted is Origin.ALL:
+def _of_origin(rows: pd.DataFrame, chosen: Origin | None, said: list[str]) -> pd.DataFrame:
+    origin_of_row = origins(rows)
+    there = [origin for origin in Origin if (origin_of_row == origin.value).any()]
+    if chosen is Origin.ALL:
         if len(there) > 1:
             said.append(f"answers of {len(there)} origins pooled: {', '.join(there)}")
         return rows
-    origin = wanted or (there[0] if there else Origin.PARTICIPANT)
-    mine = found == origin.value
+    origin = chosen or (there[0] if there else Origin.PARTICIPANT)
+    mine = origin_of_row == origin.value
     if not mine.all():
         said.append(f"origin {origin}: {(~mine).sum()} rows of other origins left aside")
     return rows if mine.all() else rows[mine]
 
 
 def _of_number(
-    rows: pd.DataFrame, column: str, wanted: int | None, source: str, said: list[str]
+    rows: pd.DataFrame, column: str, chosen: int | None, source: str, said: list[str]
 ) -> pd.DataFrame:
     what = column.replace("_", " ")
-    if wanted is None or rows.empty:
+    if chosen is None or rows.empty:
         return rows
     there = _numbers(rows[column]) if column in rows.columns else []
     if not there:
         raise InputError(f"{source} does not say the {what} of its rows; leave the choice of one out")
-    if wanted not in there:
-        raise InputError(f"{source} has no {what} {wanted}, but {', '.join(map(str, there))}")
+    if chosen not in there:
+        raise InputError(f"{source} has no {what} {chosen}, but {', '.join(map(str, there))}")
     if len(there) == 1:
         return rows
-    mine = (rows[column].astype(str) == str(wanted)).to_numpy()
-    said.append(f"{what} {wanted}: {(~mine).sum()} rows of others left aside")
+    mine = (rows[column].astype(str) == str(chosen)).to_numpy()
+    said.append(f"{what} {chosen}: {(~mine).sum()} rows of others left aside")
     return rows[mine]
 
 

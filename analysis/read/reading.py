@@ -21,14 +21,18 @@ TRIAL_PLACES = ("trial_index", "play")
 
 @dataclass(frozen=True)
 class Reading:
-    """The columns a plan needs beside those of every study.
+    """The columns a plan needs beside those of every study; all but `beside` must be there.
 
     Attributes
     ----------
-    view: of the kind. Its columns beside, that each must be there:
-    texts, numbers: read as names, and as numbers with NaN for none.
-    beside: names that a table may lack.
-    further: numbers that only the slow parts of a report need; absent from a database unless asked for.
+    view : View
+        Of the kind of trial, whose columns they are.
+    texts, numbers : tuple of str
+        Columns that are read as names, and as numbers with NaN for none.
+    beside : tuple of str
+        Names that a table may lack.
+    further : tuple of str
+        Numbers that only the slow parts of a report need; absent from a database unless asked for.
     """
 
     view: View

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from os import environ
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,14 @@ def load_csv(path: Path, experiment: Experiment, reading: Reading, study: str | 
     rows = rows.drop(columns="saved_at", errors="ignore")
     rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
     return StudyAnswers(rows, path.name, (*table.decisions, *chosen), seen)
+
+
+def stored_at() -> str:
+    """DATABASE_URL, or the SQLite file in the server's data folder (PALPEBRA_DATA_FOLDER, else `data`)."""
+    if environ.get("DATABASE_URL"):
+        return environ["DATABASE_URL"]
+    folder = environ.get("PALPEBRA_DATA_FOLDER") or "data"
+    return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
 
 
 def load_database(
@@ -126,9 +135,6 @@ def _of_one_study(
         rows = _only(rows, "study", study, source, decisions)
     elif "study" in rows.columns and len(names := _names(rows["study"])) > 1:
         raise InputError(f"{source} holds {len(names)} studies; choose one with --study: {', '.join(names)}")
-    if "definition_sha256" in rows.columns and len(_names(rows["definition_sha256"])) > 1:
-        count = len(_names(rows["definition_sha256"]))
-        decisions.append(f"{count} versions of the experiment's declaration were used; analysed together")
     return rows, tuple(decisions)
 
 

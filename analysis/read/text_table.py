@@ -49,8 +49,8 @@ class TextTable:
         return int(self.lines[row])
 
 
-def read_text_table(path: Path, wanted: Sequence[str] | None, optional: Sequence[str] = ()) -> TextTable:
-    """Read the `wanted` columns (all must exist; None: every one) and those of `optional` there, as text.
+def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence[str] = ()) -> TextTable:
+    """Read the `needed` columns (all must exist; None: every one) and those of `optional` there, as text.
 
     The file may be CSV (comma, semicolon or tab, taken from the header line), an Excel workbook
     (`book.xlsx#Sheet` names a sheet), SPSS, a JSON list of trials, or a Psych-DS folder. Of data of jsPsych,
@@ -64,8 +64,8 @@ def read_text_table(path: Path, wanted: Sequence[str] | None, optional: Sequence
     """
     reader = reader_of(path)
     header = reader.header()
-    names = _names_to_read(path.name, header, header if wanted is None else wanted, optional)
-    cells = trials_only(reader.cells(names), list(wanted or ()), _sorts(reader, header))
+    names = _names_to_read(path.name, header, header if needed is None else needed, optional)
+    cells = trials_only(reader.cells(names), list(needed or ()), _sorts(reader, header))
     if cells.rows.empty:
         raise InputError(f"{path.name} has a header but no rows{' that are trials' * bool(cells.decisions)}")
     table = TextTable(cells.rows, path.name, cells.header, cells.lines, cells.labels)
@@ -76,16 +76,16 @@ def read_text_table(path: Path, wanted: Sequence[str] | None, optional: Sequence
 
 
 def _names_to_read(
-    source: str, header: Sequence[str], wanted: Sequence[str], optional: Sequence[str]
+    source: str, header: Sequence[str], needed: Sequence[str], optional: Sequence[str]
 ) -> list[str]:
-    for name in wanted:
+    for name in needed:
         if name not in header:
             hint = wide_hint(header) or did_you_mean(name, header)
             raise InputError(f"{source} has no column '{name}'{hint}")
     for name in header:
-        if name and header.count(name) > 1 and name in (*wanted, *optional):
+        if name and header.count(name) > 1 and name in (*needed, *optional):
             raise InputError(f"{source} has two columns called '{name}'; rename one")
-    return list(dict.fromkeys([*wanted, *(name for name in optional if name in header)]))
+    return list(dict.fromkeys([*needed, *(name for name in optional if name in header)]))
 
 
 def _sorts(reader: Reader, header: Sequence[str]) -> Cells | None:
@@ -101,11 +101,11 @@ def _stripped(column: "pd.Series[str]") -> "pd.Series[Any]":
     return pd.Series(categorical(codes, [str(text).strip() for text in texts]), index=column.index)
 
 
-def categorical(codes: NDArray[np.integer[Any]], found: Sequence[str]) -> "pd.Categorical[str]":
-    """Categories, sorted, from codes into the names `found`; equal names become one."""
-    names = sorted(set(found))
+def categorical(codes: NDArray[np.integer[Any]], texts: Sequence[str]) -> "pd.Categorical[str]":
+    """Categories, sorted, from codes into the names in `texts`; equal names become one."""
+    names = sorted(set(texts))
     position = {name: i for i, name in enumerate(names)}
-    lookup = np.array([position[name] for name in found], dtype=np.int64)
+    lookup = np.array([position[name] for name in texts], dtype=np.int64)
     index: pd.Index[str] = pd.Index(names, dtype=object)
     return pd.Categorical.from_codes(lookup[codes], categories=index)
 
@@ -205,7 +205,7 @@ def _number(table: TextTable, name: str, text: str) -> float:
 
 def name_lines(table: TextTable, rows: NDArray[np.bool_]) -> str:
     """The lines of some rows in words, the first few only."""
-    found = np.flatnonzero(rows)
-    named = ", ".join(str(table.line(int(row))) for row in found[:NAMED_ROWS])
-    rest = len(found) - NAMED_ROWS
-    return f"line{'s' if len(found) > 1 else ''} {named}{f' and {rest} more' if rest > 0 else ''}"
+    numbers = np.flatnonzero(rows)
+    named = ", ".join(str(table.line(int(row))) for row in numbers[:NAMED_ROWS])
+    rest = len(numbers) - NAMED_ROWS
+    return f"line{'s' if len(numbers) > 1 else ''} {named}{f' and {rest} more' if rest > 0 else ''}"

@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.read.files.open import reader_of
 from experiments.errors import InputError
 
-_PLACE = re.compile(r"\{([^{}]+)\}")
+_PLACEHOLDER = re.compile(r"\{([^{}]+)\}")
 FEWEST_COLUMNS = 3
 """So many columns alike look like the cells of a wide table."""
 
@@ -63,9 +63,12 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
 
     Parameters
     ----------
-    path : any file that the analysis reads.
-    pattern : names of the columns of cells, each factor in braces: `{face}_{blur}`, `t{time}`.
-    rating : name of the new column of numbers.
+    path : Path
+        Any file that the analysis reads.
+    pattern : str
+        Names of the columns of cells, each factor in braces: `{face}_{blur}`, `t{time}`.
+    rating : str
+        Name of the new column of numbers.
 
     Raises
     ------
@@ -74,9 +77,11 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
     """
     reader = reader_of(path)
     header = [name for name in reader.header() if name]
-    factors = tuple(_PLACE.findall(pattern))
+    factors = tuple(_PLACEHOLDER.findall(pattern))
     _refuse_pattern(pattern, factors)
-    levels = {name: found for name in header if (found := _levels(pattern, name)) is not None}
+    levels = {
+        name: levels_of_column for name in header if (levels_of_column := _levels(pattern, name)) is not None
+    }
     if not levels:
         raise InputError(f"no column of {path.name} fits '{pattern}'; its columns: {', '.join(header)}")
     beside = tuple(name for name in header if name not in levels)
@@ -87,8 +92,10 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
             )
     cells = reader.cells(header).rows
     parts = [
-        cells[list(beside)].assign(**dict(zip(factors, found, strict=True)), **{rating: cells[name]})
-        for name, found in levels.items()
+        cells[list(beside)].assign(
+            **dict(zip(factors, levels_of_column, strict=True)), **{rating: cells[name]}
+        )
+        for name, levels_of_column in levels.items()
     ]
     rows = pd.concat(parts).sort_index(kind="stable").reset_index(drop=True)
     return LongTable(rows, factors, len(levels), beside)
@@ -107,9 +114,10 @@ def _refuse_pattern(pattern: str, factors: tuple[str, ...]) -> None:
 
 def _levels(pattern: str, name: str) -> tuple[str, ...] | None:
     """The levels that a column's name holds; None where it does not fit."""
-    literal = _PLACE.split(pattern)[::2]
+    literal = _PLACEHOLDER.split(pattern)[::2]
     short, long = (
-        re.fullmatch(place.join(re.escape(part) for part in literal), name) for place in ("(.+?)", "(.+)")
+        re.fullmatch(pattern_of_level.join(re.escape(part) for part in literal), name)
+        for pattern_of_level in ("(.+?)", "(.+)")
     )
     if short is None or long is None:
         return None

@@ -3,7 +3,7 @@
 from base64 import b64encode
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from analysis.report.formats import Table
 
@@ -12,15 +12,6 @@ if TYPE_CHECKING:
     from experiments.seal import Seal
 
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Section:
-    """A further piece of the report: sensitivity analyses, checks."""
-
-    title: str
-    text: str
-    tables: tuple[Table, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,12 +30,26 @@ class Picture:
         return "data:image/svg+xml;base64," + b64encode(self.svg).decode("ascii")
 
 
-def _no_pictures() -> tuple[Picture, ...]:
-    return ()
+_Keyed = TypeVar("_Keyed", Table, Picture)
 
 
 def _no_files(_: str) -> dict[str, bytes]:
     return {}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A further piece of the report: sensitivity analyses, checks."""
+
+    title: str
+    text: str
+    tables: tuple[Table, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    beside: Callable[[str], dict[str, bytes]] = _no_files
+
+
+def _no_pictures() -> tuple[Picture, ...]:
+    return ()
 
 
 def _no_sections(_: Progress) -> tuple[Section, ...]:
@@ -57,11 +62,20 @@ class Part:
 
     Attributes
     ----------
-    title: empty where the report has one part.
-    tables: the first leads, the others are every test.
-    draw: makes the figures, which takes time. more: makes further sections, which takes more.
-    beside: makes files that lie beside the report, by name; it is told the key of this part.
-    key: what the names of this part's files begin with, where there are several.
+    title : str
+        Empty where the report has one part.
+    tables : tuple of Table
+        The first leads, the others are every test.
+    draw : callable
+        Makes the figures, which takes time.
+    more : callable
+        Makes further sections, which takes more.
+    beside : callable
+        Makes files that lie beside the report, by name; it is told the key of this part.
+    key : str
+        What the names of this part's files begin with, where there are several.
+    brief : tuple of str
+        What was found, in a few lines for the first page.
     """
 
     tables: tuple[Table, ...]
@@ -71,15 +85,26 @@ class Part:
     more: Callable[[Progress], tuple[Section, ...]] = _no_sections
     beside: Callable[[str], dict[str, bytes]] = _no_files
     key: str = ""
+    brief: tuple[str, ...] = ()
 
     def under(self, key: str, title: str) -> "Part":
-        """The same as one of several parts: titled, its tables and figures in files that begin with `key`."""
-        tables = tuple(replace(table, key=f"{key}-{table.key}") for table in self.tables)
+        """The same as one of several parts: titled, keys of its tables and figures begin with `key`."""
 
         def draw() -> tuple[Picture, ...]:
-            return tuple(replace(one, key=f"{key}-{one.key}") for one in self.draw())
+            return _keyed(key, self.draw())
 
-        return replace(self, title=title, tables=tables, draw=draw, key=key)
+        def more(progress: Progress) -> tuple[Section, ...]:
+            return tuple(
+                replace(one, tables=_keyed(key, one.tables), pictures=_keyed(key, one.pictures))
+                for one in self.more(progress)
+            )
+
+        return replace(self, title=title, tables=_keyed(key, self.tables), draw=draw, more=more, key=key)
+
+
+def _keyed(key: str, made: tuple[_Keyed, ...]) -> tuple[_Keyed, ...]:
+    """The same, their own keys behind another."""
+    return tuple(replace(one, key=f"{key}-{one.key}") for one in made)
 
 
 @dataclass(frozen=True)
@@ -88,10 +113,14 @@ class Contents:
 
     Attributes
     ----------
-    lead: how many participants, and what was asked of them.
-    numbers: every number, as the JSON file has it.
-    given: what people gave (ratings, comparisons), for the mark of synthetic data.
-    evidence: whether people gave it; None where the data do not say.
+    lead : str
+        How many participants, and what was asked of them.
+    numbers : dict of str to Any
+        Every number, as the JSON file has it.
+    given : str
+        What people gave (ratings, comparisons), for the mark of synthetic data.
+    evidence : Section or None
+        Whether people gave it; None where the data do not say.
     """
 
     name: str
@@ -107,6 +136,11 @@ class Contents:
     numbers: dict[str, Any] = field(repr=False)
     given: str = "answers"
     evidence: Section | None = None
+
+    @property
+    def warning(self) -> str:
+        """What stands beside the mark of synthetic data."""
+        return f"No person gave these {self.given}; nothing here is a result about people."
 
 
 def held_against(

@@ -23,8 +23,8 @@ def verdict_counts(rows: pd.DataFrame) -> dict[str, int]:
     if VERDICT not in rows.columns or "run" not in rows.columns:
         return {}
     verdicts = rows[["run", VERDICT]].drop_duplicates("run")[VERDICT].astype(str)
-    found = verdicts.replace("", "not_judged").value_counts()
-    return {verdict: int(found.get(verdict, 0)) for verdict in VERDICTS}
+    counts = verdicts.replace("", "not_judged").value_counts()
+    return {verdict: int(counts.get(verdict, 0)) for verdict in VERDICTS}
 
 
 def evidence_section(rows: pd.DataFrame, runs: RunEvidence | None) -> tuple[Section | None, dict[str, Any]]:
@@ -49,20 +49,20 @@ def evidence_section(rows: pd.DataFrame, runs: RunEvidence | None) -> tuple[Sect
 
 def summaries(signals: pd.DataFrame) -> dict[str, dict[str, float]]:
     """Number of runs, median, least and greatest value of each signal that any run has."""
-    found: dict[str, dict[str, float]] = {}
+    by_name: dict[str, dict[str, float]] = {}
     for name in signals.columns:
         values = signals[name].dropna()
         if len(values):
-            found[name.removeprefix("evidence_")] = {
+            by_name[name.removeprefix("evidence_")] = {
                 "runs": len(values),
                 "median": float(values.median()),
                 "minimum": float(values.min()),
                 "maximum": float(values.max()),
             }
-    return found
+    return by_name
 
 
-def _signals(found: dict[str, dict[str, float]]) -> Table:
+def _signals(signals: dict[str, dict[str, float]]) -> Table:
     columns = {column.name.removeprefix("evidence_"): column for column in EVIDENCE_COLUMNS}
     said = {name: f"{name}: {one.description}" for name, one in columns.items()}
     said |= {name: f"{said[name]} In {one.unit}." for name, one in columns.items() if one.unit}
@@ -72,7 +72,7 @@ def _signals(found: dict[str, dict[str, float]]) -> Table:
             f"{one['runs']:.0f}",
             *(f"{one[what]:.3g}" for what in ("median", "minimum", "maximum")),
         )
-        for name, one in found.items()
+        for name, one in signals.items()
     )
     return Table(
         "evidence-signals", "Signals of the runs", ("Signal", "Runs", "Median", "Least", "Greatest"), rows

@@ -1,6 +1,8 @@
 """Figures of an analysis, after the paper's 9, 10 and 11: means with within-participant error bars, and
 every participant visible behind them. The same data give the same bytes."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Literal
@@ -23,13 +25,20 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+MAX_KEY = 200
+"""Characters of a figure's key; names of files may have 255 bytes."""
+_CLOUD_STEPS = 60
+
 _SPREAD = 0.62
 """Width of a group of conditions on an axis where groups are 1 apart."""
 
 
 @dataclass(frozen=True)
 class FigureSpec:
-    """What to draw: the factors along the axis (several are combined), and the factor shown by colour."""
+    """What to draw: the factors along the axis (several are combined), and the factor shown by colour.
+
+    `key` names its files and its label in LaTeX: letters, digits, `-` and `_` of ASCII.
+    """
 
     key: str
     title: str
@@ -66,11 +75,27 @@ def figures_of(analysis: Analysis) -> tuple[FigureSpec, ...]:
         return known
     names = analysis.anova.factors
     if len(names) == 1:
-        return (FigureSpec(f"figure-{names[0]}", analysis.labels.factor(names[0]), names),)
+        (key,) = _keys([names])
+        return (FigureSpec(key, analysis.labels.factor(names[0]), names),)
+    pairs = list(combinations(names, 2))[:6]
     return tuple(
-        FigureSpec(f"figure-{a}-{b}", f"{analysis.labels.factor(a)} and {analysis.labels.factor(b)}", (a,), b)
-        for a, b in list(combinations(names, 2))[:6]
+        FigureSpec(key, f"{analysis.labels.factor(a)} and {analysis.labels.factor(b)}", (a,), b)
+        for key, (a, b) in zip(_keys(pairs), pairs, strict=True)
     )
+
+
+def _keys(shown: Sequence[tuple[str, ...]]) -> list[str]:
+    """A key for the factors of each figure: what no file system and no TeX reads otherwise, all different."""
+    keys: list[str] = []
+    for factors in shown:
+        plain = [re.sub(r"[^A-Za-z0-9_-]+", "-", factor).strip("-") or "factor" for factor in factors]
+        key = again = f"figure-{'-'.join(plain)}"[:MAX_KEY]
+        number = 1
+        while again.lower() in map(str.lower, keys):
+            number += 1
+            again = f"{key}-{number}"
+        keys.append(again)
+    return keys
 
 
 def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
@@ -80,7 +105,9 @@ def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
         axes = figure.add_subplot()
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
-        bars = "Points and thin lines: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        bars = (
+            "Points, thin lines and clouds: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        )
         write_note(figure, f"N = {analysis.n_participants}. {bars}", analysis.synthetic)
     return figure
 
@@ -92,7 +119,10 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     flat = values.reshape(len(values), -1)
     errors = reach * np.array(within_participant_errors(flat.tolist())).reshape(n_groups, n_shades)
     offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
-    jitter = _jitter(len(values)) * 0.34 * _SPREAD / n_shades
+    room = _SPREAD / n_shades
+    jitter = (
+        0.16 * _jitter(len(values)) - 0.24 if spec.style == "points" else 0.34 * _jitter(len(values))
+    ) * room
     for shade in range(n_shades):
         at = np.arange(n_groups) + offsets[shade]
         colour = COLOURS[shade % len(COLOURS)]
@@ -100,6 +130,8 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             people = at[:, None] + jitter[None, :]
             axes.plot(people, values[:, :, shade].T, color=colour, alpha=0.12, linewidth=0.5, zorder=1)
         for group in range(n_groups):
+            if spec.style == "points":
+                _cloud(axes, at[group] + 0.06 * room, values[:, group, shade], 0.38 * room, colour)
             axes.plot(
                 at[group] + jitter,
                 values[:, group, shade],
@@ -129,14 +161,31 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_xticks(range(n_groups), groups)
 
 
+def _cloud(axes: Axes, x: float, values: Floats, width: float, colour: str) -> None:
+    """The distribution of participants, to the right of a condition; their points lie left of it."""
+    if len(values) < 3 or np.ptp(values) == 0:
+        return
+    heights = np.linspace(values.min(), values.max(), _CLOUD_STEPS)
+    density = _density(values, heights)
+    reach = x + width * density / density.max()
+    axes.fill_betweenx(heights, x, reach, color=colour, alpha=0.13, linewidth=0, zorder=0)
+
+
+def _density(values: Floats, at: Floats) -> Floats:
+    """Gaussian kernels of Scott's width, n to the power of -1/5 SDs (scipy's `gaussian_kde`, unscaled)."""
+    width = values.std(ddof=1) * len(values) ** -0.2
+    kernels = np.exp(-(((at[:, None] - values) / width) ** 2) / 2)
+    return np.asarray(kernels.sum(axis=1), dtype=np.float64)
+
+
 def _arranged(analysis: Analysis, spec: FigureSpec) -> tuple[Floats, list[str], list[str]]:
     """Participants' means (N, groups, shades) of the figure's margin, and the names of both."""
     factors = analysis.anova.factors
-    wanted = [*spec.along, *([spec.colour] if spec.colour else [])]
-    members = tuple(sorted(factors.index(name) for name in wanted))
+    named = [*spec.along, *([spec.colour] if spec.colour else [])]
+    members = tuple(sorted(factors.index(name) for name in named))
     sizes = [len(analysis.anova.levels[m]) for m in members]
     values: Floats = margin(analysis.anova, members).reshape(-1, *sizes)
-    order = [[factors[m] for m in members].index(name) for name in wanted]
+    order = [[factors[m] for m in members].index(name) for name in named]
     values = np.moveaxis(values, [i + 1 for i in order], range(1, len(order) + 1))
     along = tuple(factors.index(name) for name in spec.along)
     groups = [_name(analysis, levels) for levels in level_combinations(analysis.anova, along)]

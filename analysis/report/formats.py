@@ -1,4 +1,4 @@
-"""A table, and its renderings as terminal text, Markdown and LaTeX (HTML is the report template's)."""
+"""A table, and its renderings as terminal text and Markdown (HTML is the report template's)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -79,47 +79,3 @@ def as_markdown(table: Table) -> str:
 
 def _markdown_cell(cell: str) -> str:
     return cell.replace("\\", "\\\\").replace("|", "\\|").replace("<", "\\<")
-
-
-_LATEX = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"$<$",
-    ">": r"$>$",
-    "×": r"$\times$",
-    "η": r"$\eta$",
-    "ε": r"$\varepsilon$",
-    "Λ": r"$\Lambda$",
-    "²": r"$^2$",
-    "±": r"$\pm$",
-    "−": r"$-$",
-    "–": "--",
-    "ₚ": r"$_p$",
-}
-
-
-def latex_text(text: str) -> str:
-    """`text` with every character LaTeX gives a meaning escaped."""
-    return "".join(_LATEX.get(character, character) for character in text).replace("$$", "")
-
-
-def as_latex(table: Table) -> str:
-    """A floating booktabs table."""
-    columns = "".join("l" if i < table.text_columns else "r" for i in range(len(table.header)))
-    rows = "\n".join(" & ".join(latex_text(cell) for cell in row) + r" \\" for row in table.rows)
-    notes = "".join(f"\n\\par\\smallskip\\footnotesize {latex_text(note)}" for note in table.notes)
-    return (
-        "\\begin{table}\n\\centering\n"
-        f"\\caption{{{latex_text(table.title)}}}\n\\label{{tab:{table.key}}}\n"
-        f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
-        f"{' & '.join(latex_text(cell) for cell in table.header)} \\\\\n\\midrule\n{rows}\n\\bottomrule\n"
-        f"\\end{{tabular}}{notes}\n\\end{{table}}\n"
-    )

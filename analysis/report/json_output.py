@@ -4,11 +4,12 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from analysis.plans.result import Analysis
-from analysis.within.effect_tests import Effect
+from analysis.within.effect_tests import Effect, MultivariateTest
 from analysis.within.homogeneity import box_test, levene_tests
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
+    from analysis.plans.prepare import Prepared
 
 
 _OF_SIMPLE = ("univariate", "multivariate", "mauchly", "eta_sq_partial", "eta_sq_partial_ci")
@@ -18,7 +19,8 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
     """The JSON document as plain data.
 
     Keys: name, title, source, synthetic, rating, factors, levels, n_participants, participants, effects,
-    marginal_means, pairwise, dropped, decisions, and exclusions (null for a table without a declaration).
+    marginal_means, pairwise, dropped, decisions,
+    robust (null unless asked for), and exclusions (null for a table without a declaration).
     Beside `multivariate`, `mauchly` and `univariate` stands `..._reason`: why a test is null, else null.
     """
     cells = analysis.cells
@@ -75,6 +77,7 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
         ],
         "constant_participants": list(cells.constant),
         "decisions": list(analysis.decisions),
+        "robust": None if analysis.robust is None else asdict(analysis.robust),
         "exclusions": None if analysis.exclusions is None else exclusions_data(analysis.exclusions),
     }
 
@@ -94,7 +97,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
         "within": list(effect.within),
         "univariate": asdict(effect.univariate),
         "univariate_reason": effect.univariate_reason,
-        "multivariate": None if effect.multivariate is None else asdict(effect.multivariate),
+        "multivariate": None if effect.multivariate is None else _multivariate(effect.multivariate),
         "multivariate_reason": effect.multivariate_reason,
         "mauchly": None if effect.mauchly is None else asdict(effect.mauchly),
         "mauchly_reason": effect.mauchly_reason,
@@ -102,6 +105,45 @@ def _effect(effect: Effect) -> dict[str, Any]:
         "eta_sq_partial_ci": list(effect.eta_sq_partial_ci),
         "eta_sq_generalized": effect.eta_sq_generalized,
         "omega_sq_partial": effect.omega_sq_partial,
+    }
+
+
+def _multivariate(test: MultivariateTest) -> dict[str, Any]:
+    own = (
+        "pillai",
+        "wilks",
+        "hotelling_lawley",
+        "roy",
+        "f_value",
+        "df_effect",
+        "df_error",
+        "p_value",
+        "exact",
+    )
+    return {
+        **{name: getattr(test, name) for name in own},
+        "eta_sq_partial": test.eta_sq_partial,
+        "eta_sq_partial_ci": list(test.eta_sq_partial_ci),
+        "statistics": asdict(test.statistics),
+    }
+
+
+def study_data(prepared: "Prepared", people: int) -> dict[str, Any]:
+    """What the JSON document of a study of any kind begins with.
+
+    Parameters
+    ----------
+    people : int
+        Those who are analysed.
+    """
+    experiment = prepared.experiment
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "kind": experiment.trial.kind,
+        "source": prepared.source,
+        "synthetic": prepared.synthetic,
+        "n_participants": people,
     }
 
 

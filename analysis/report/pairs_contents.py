@@ -6,18 +6,19 @@ from typing import Any
 
 from analysis.pairs.abilities import PairsResult
 from analysis.pairs.comparisons import Comparisons
-from analysis.pairs.factors import FactorTest
+from analysis.pairs.factors import FactorTest, ItemFactors
 from analysis.pairs.findings import Findings
 from analysis.plans.prepare import Prepared
 from analysis.plans.result import Labels, labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data
+from analysis.report.json_output import exclusions_data, study_data
 from analysis.report.left_out import left_out
 from analysis.report.numbers import fixed, p_value
 from analysis.report.pairs_sentences import sentences
 from analysis.report.pairs_tables import abilities_table, contrasts_table, factors_table
+from analysis.report.r_choices import pairs_files
 from experiments.definition import Experiment
 
 METHODS = {
@@ -55,12 +56,15 @@ def item_labels(experiment: Experiment, items: tuple[str, ...]) -> dict[str, str
     }
 
 
-def contents_of(prepared: Prepared, comparisons: Comparisons, findings: Findings) -> Contents:
+def contents_of(
+    prepared: Prepared, comparisons: Comparisons, findings: Findings, factors: ItemFactors | None = None
+) -> Contents:
     """What the report says."""
     experiment, items = prepared.experiment, item_labels(prepared.experiment, comparisons.items)
     shown = labelled(findings, items, labels_of(experiment))
     name, synthetic = experiment.name, prepared.synthetic
     people, number = len(comparisons.participants), comparisons.outcome.size
+    said = sentences(shown, [items[item] for item in comparisons.items])
     method = "" if findings.abilities is None else METHODS[findings.abilities.method]
     return Contents(
         name=name,
@@ -74,8 +78,10 @@ def contents_of(prepared: Prepared, comparisons: Comparisons, findings: Findings
         parts=(
             Part(
                 tables(shown, name, synthetic),
-                sentences(shown, [items[item] for item in comparisons.items]),
+                said,
                 draw=lambda: draw_all(shown, synthetic, people),
+                beside=lambda key: pairs_files(experiment.title, comparisons, findings, factors, key),
+                brief=said[:2],
             ),
         ),
         methods=method + FURTHER,
@@ -172,12 +178,7 @@ def numbers(prepared: Prepared, comparisons: Comparisons, findings: Findings) ->
     experiment = prepared.experiment
     factors = () if findings.factors is None else findings.factors.factors
     return {
-        "name": experiment.name,
-        "title": experiment.title,
-        "kind": experiment.trial.kind,
-        "source": prepared.source,
-        "synthetic": prepared.synthetic,
-        "n_participants": len(comparisons.participants),
+        **study_data(prepared, len(comparisons.participants)),
         "n_comparisons": int(comparisons.outcome.size),
         "labels": item_labels(experiment, comparisons.items),
         "abilities": None if findings.abilities is None else asdict(findings.abilities),

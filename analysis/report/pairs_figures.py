@@ -8,7 +8,7 @@ import numpy as np
 from analysis.pairs.abilities import Z_95, PairsResult
 from analysis.pairs.findings import PairCount
 from analysis.report.contents import Picture
-from analysis.report.pictures import COLOURS, STYLE, as_bytes, new_figure, write_note
+from analysis.report.pictures import COLOURS, STYLE, in_both_formats, new_figure, write_note
 
 NUMBERED_MAX = 14
 """More items than this and the shares are colours without numbers."""
@@ -41,7 +41,7 @@ def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture
         write_note(figure, note, synthetic, "comparisons")
         best = ranked[-1].name
         alt = f"Abilities of {len(ranked)} cells with 95% intervals, from the most chosen, {best}, down"
-        return Picture("figure-abilities", "Abilities", alt, as_bytes(figure, "svg"), as_bytes(figure, "png"))
+        return Picture("figure-abilities", "Abilities", alt, *in_both_formats(figure))
 
 
 def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Picture:
@@ -73,6 +73,5 @@ def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Pi
             "figure-choices",
             "Choices in each pair",
             alt,
-            as_bytes(figure, "svg"),
-            as_bytes(figure, "png"),
+            *in_both_formats(figure),
         )

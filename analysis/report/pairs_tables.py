@@ -1,9 +1,9 @@
 """Paired comparisons as tables and words."""
 
-from analysis.pairs.abilities import PairsResult
+from analysis.pairs.abilities import Contrast, PairsResult
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
-from analysis.report.numbers import apa_p, fixed, p_value
+from analysis.report.numbers import DASH, apa_p, fixed, p_value
 
 
 def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
@@ -16,19 +16,49 @@ def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> 
         row = [item.name, str(item.rank), fixed(item.ability, 3), *(fixed(error, 3) for error in errors)]
         row += [f"{fixed(item.ci_low)} to {fixed(item.ci_high)}", p_value(item.p)]
         rows.append((*row, f"{item.wins}/{item.losses}/{item.ties}"))
-    notes = (f"Abilities in {result.scale}; '{result.reference}' is 0. W/L/T: won, lost, tied.",)
+    said = f"Abilities in {result.scale}; '{result.reference}' is 0. W/L/T: won, lost, tied."
+    if robust:
+        said += " CI and p by the model's SE; robust p of every difference stand with the differences."
+    notes = (said,)
     title = caption("Abilities", name, synthetic)
     return Table("abilities", title, tuple(header), tuple(rows), 1, notes)
 
 
 def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
-    """Every pair of items, Holm-corrected."""
+    """Every pair of items, Holm-corrected: by the model's errors, and by those that count raters."""
+    robust = any(c.se_robust is not None for c in result.contrasts)
     rows = tuple(
-        (f"{c.first} - {c.second}", fixed(c.difference, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_holm))
+        (
+            f"{c.first} - {c.second}",
+            *(fixed(c.difference, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_holm)),
+            *(_robust_cells(c) if robust else ()),
+        )
         for c in result.contrasts
     )
     title = caption("Differences between items", name, synthetic)
-    return Table("pair-contrasts", title, ("Items", "Difference", "SE", "z", "p (Holm)"), rows, 1, (), True)
+    header = ("Items", "Difference", "SE", "z", "p", *(("robust SE", "t", "robust p") if robust else ()))
+    return Table("pair-contrasts", title, header, rows, 1, (_which_errors(result, robust),), True)
+
+
+def _robust_cells(contrast: Contrast) -> tuple[str, str, str]:
+    se, p = contrast.se_robust, contrast.p_robust_holm
+    if se is None or p is None:
+        return "" if se is None else fixed(se, 3), DASH, DASH
+    return fixed(se, 3), fixed(contrast.difference / se), p_value(p)
+
+
+def _which_errors(result: PairsResult, robust: bool) -> str:
+    """Which errors the p of the contrasts go by, and which to read."""
+    if not robust:
+        return (
+            "SE, z and p by the model, which takes every comparison for one of another rater; with "
+            "raters named there are robust ones too. p corrected by Holm."
+        )
+    return (
+        "SE, z and p by the model, which takes every comparison for one of another rater; robust: raters as "
+        f"clusters, t on {(result.n_participants or 1) - 1} df. Where raters gave several comparisons and "
+        "differ, the robust p are those to report. p corrected by Holm."
+    )
 
 
 def factors_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:

@@ -1,23 +1,28 @@
 """What all figures share: colours, style, and bytes that do not differ from run to run."""
 
+from collections.abc import Callable
 from io import BytesIO
-from typing import Any, Literal
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+
+from analysis.report.letters import FONT, further_letters
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#444444")
 """Okabe and Ito's palette, told apart with every common colour vision; markers tell levels apart as well."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
+    "font.family": FONT,
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "svg.hashsalt": "palpebra",
     "svg.fonttype": "path",
     "axes.linewidth": 0.8,
+    "text.parse_math": False,  # `$` in a level's name is a sign of money, not the start of a formula
 }
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
 
@@ -35,10 +40,19 @@ def write_note(figure: Figure, note: str, synthetic: bool, what: str = "ratings"
     figure.supxlabel(mark + note, fontsize=7, color="#8a1c1c" if synthetic else "#555555")
 
 
-def as_bytes(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
-    """The figure as PNG or SVG without anything that differs from run to run."""
-    buffer = BytesIO()
-    metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-    with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format=kind, metadata=metadata)
-    return buffer.getvalue()
+def in_both_formats(figure: Figure) -> tuple[bytes, bytes]:
+    """The figure as SVG and as PNG, without anything that differs from run to run.
+
+    Each is drawn once and laid out once: `savefig` draws twice, and lays out each time.
+    """
+    svg, png, dpi = BytesIO(), BytesIO(), figure.dpi
+    with mpl.rc_context(STYLE), further_letters(figure):
+        _drawn(FigureCanvasSVG(figure).print_svg, svg, {"Date": None, "Creator": None})
+        figure.set_layout_engine("none")
+        figure.dpi = dpi  # an SVG has 72
+        _drawn(FigureCanvasAgg(figure).print_png, png, {"Software": None})
+    return svg.getvalue(), png.getvalue()
+
+
+def _drawn(by: Callable[..., None], into: BytesIO, metadata: dict[str, None]) -> None:
+    by(into, metadata=metadata)

@@ -10,11 +10,12 @@ from analysis.plans.prepare import Prepared
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data
+from analysis.report.json_output import exclusions_data, study_data
 from analysis.report.left_out import left_out
 from analysis.report.numbers import fixed
 from analysis.report.plane_tables import plane_tables
 from analysis.report.threshold_contents import difference_sentence, differences_table
+from analysis.report.threshold_tables import interval_text
 from analysis.thresholds.plane_people import PlanesResult
 from experiments.trials.threshold.declaration import threshold_of
 
@@ -27,8 +28,10 @@ METHODS = (
     "function, x the {first}, z the {second}, with the declared guess rate {guess:g} and lapse rate "
     "{lapse:g}, by maximum likelihood: the threshold t at the middle z0 moves by the tilt b along z. "
     "Intervals are 95% profiles of the likelihood. 'fit p' tests the line and the shape against the "
-    "shares at every stimulus. Means over people are random effects by REML, with Hartung-Knapp "
-    "intervals. Series are compared within people by paired t tests, those of groups of people by "
+    "shares at every stimulus. Over people, thresholds and tilts are normal random variables, fitted by "
+    "marginal maximum likelihood to everybody's answers (profiles with the quantile of F(1, people - 1)); "
+    "means of own fits are random effects by REML, with Hartung-Knapp intervals. Series "
+    "are compared within people by paired t tests, those of groups of people by "
     "Welch's, corrected by Holm. Stimuli were chosen by the answers before them; the likelihood is the "
     "same as if they had been fixed. "
 )
@@ -91,6 +94,7 @@ def merge(fits: "Sequence[SeriesPlane]") -> PlanesResult | None:
         {label: result.means["all"] for label, result in done},
         sum(result.n_trials for _, result in done),
         (),
+        {label: result.population["all"] for label, result in done if result.population},
     )
 
 
@@ -100,16 +104,26 @@ def sentences(fits: "Sequence[SeriesPlane]", variables: tuple[str, str]) -> tupl
     for series in fits:
         if series.result is None:
             continue
-        fit, means = series.result.pooled["all"], series.result.means["all"]
-        threshold, tilt, of = fit.threshold, fit.tilt, "over all trials"
-        if means.threshold is not None and means.tilt is not None:
-            threshold, tilt = means.threshold.mean, means.tilt.mean
-            of = f"of {means.threshold.people} people on average"
-        said.append(
-            f"{series.label}: the threshold {of} was {fixed(threshold, 3)} where {variables[1]} is "
-            f"{fit.middle:g}, and moved by {fixed(tilt, 3)} per unit of it."
-        )
+        said.append(f"{series.label}: {_line_in_words(series.result, variables[1])}")
     return tuple(said)
+
+
+def _line_in_words(result: PlanesResult, second: str) -> str:
+    """Threshold and tilt with their intervals: of the population, or over all trials of fewer people."""
+    pooled = result.pooled["all"]
+    fit, of = (
+        (result.population["all"], f"of {result.population['all'].people} people")
+        if result.population
+        else (pooled, "over all trials")
+    )
+    low, high = fit.tilt_ci.low, fit.tilt_ci.high
+    known = (low is not None and low > 0) or (high is not None and high < 0)
+    verdict = f"so that it depends on {second}" if known else "an interval that includes 0"
+    return (
+        f"the threshold {of} was {fixed(fit.threshold, 3)} (95% CI {interval_text(fit.threshold_ci)}) where "
+        f"{second} is {pooled.middle:g}. Its tilt, the change per unit of {second}, was {fixed(fit.tilt, 3)} "
+        f"(95% CI {interval_text(fit.tilt_ci)}), {verdict}."
+    )
 
 
 def _shares(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], name: str, synthetic: bool) -> Table:
@@ -127,22 +141,17 @@ def numbers(
     prepared: Prepared, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]", people: int
 ) -> dict[str, Any]:
     """The JSON document; conditions are the series' names."""
-    experiment = prepared.experiment
     names = {fit.label: fit.name for fit in fits}
     done = [(fit.name, fit.result) for fit in fits if fit.result is not None]
     return {
-        "name": experiment.name,
-        "title": experiment.title,
-        "kind": experiment.trial.kind,
-        "source": prepared.source,
-        "synthetic": prepared.synthetic,
-        "n_participants": people,
+        **study_data(prepared, people),
         "n_trials": len(prepared.rows),
         "labels": {fit.name: fit.label for fit in fits},
         "pooled": {name: asdict(result.pooled["all"]) for name, result in done},
         "reasons": {fit.name: fit.reason for fit in fits if fit.reason},
         "people": [asdict(one) | {"condition": name} for name, result in done for one in result.people],
         "means": {name: asdict(result.means["all"]) for name, result in done},
+        "population": {name: asdict(result.population["all"]) for name, result in done if result.population},
         "differences": [
             asdict(d) | {"first": names[d.first], "second": names[d.second]} for d in differences
         ],
@@ -156,7 +165,7 @@ def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: b
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     import matplotlib as mpl
 
-    from analysis.report.pictures import STYLE, as_bytes, new_figure, write_note
+    from analysis.report.pictures import STYLE, in_both_formats, new_figure, write_note
 
     with mpl.rc_context(STYLE):
         figure = new_figure()
@@ -182,8 +191,8 @@ def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: b
             axes.set_xlabel(variables[1])
             axes.margins(x=0.15)
         panels[0].set_ylabel(variables[0])
-        note = f"N = {people}. Size: trials. Dark to light: share of yes, or right, 0 to 1. Line: threshold."
+        note = f"N = {people}. Size: trials. Dark to light: share of yes, or right, 0 to 1. Line: all trials."
         write_note(figure, note, synthetic, "answers")
         alt = f"Thresholds of {len(fits)} series along {variables[0]} and {variables[1]}"
-        made = as_bytes(figure, "svg"), as_bytes(figure, "png")
+        made = in_both_formats(figure)
         return Picture("figure-thresholds", "Lines of thresholds", alt, *made)

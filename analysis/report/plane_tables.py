@@ -3,7 +3,7 @@
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
-from analysis.report.threshold_tables import interval_text
+from analysis.report.threshold_tables import estimate, table_of_people
 from analysis.thresholds.people import Average
 from analysis.thresholds.plane_people import PlanesResult
 
@@ -19,11 +19,20 @@ def plane_tables(
 def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:
     rows = [
         (
-            condition,
-            fixed(fit.threshold, 3),
-            interval_text(fit.threshold_ci),
-            fixed(fit.tilt, 3),
-            interval_text(fit.tilt_ci),
+            f"{condition}, {fit.people} people",
+            *estimate(fit.threshold, fit.threshold_ci),
+            *estimate(fit.tilt, fit.tilt_ci),
+            fixed(fit.spread, 3),
+            DASH,
+            DASH,
+        )
+        for condition, fit in result.population.items()
+    ]
+    rows += [
+        (
+            f"{condition}, all trials" if result.people else condition,
+            *estimate(fit.threshold, fit.threshold_ci),
+            *estimate(fit.tilt, fit.tilt_ci),
             fixed(fit.spread, 3),
             p_value(fit.p),
             str(fit.n_trials),
@@ -32,7 +41,7 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
     ]
     for condition, means in result.means.items():
         if means.threshold is not None and means.tilt is not None:
-            label = f"{condition}, mean of {means.threshold.people}"
+            label = f"{condition}, mean of {means.threshold.people} own fits"
             cells = (*_average(means.threshold), *_average(means.tilt))
             rows.append((label, *cells, DASH, DASH, DASH))
     header = ("Condition", "Threshold", "95% CI", "Tilt", "95% CI", "Spread", "fit p", "Trials")
@@ -40,9 +49,22 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
     notes = (
         f"Threshold: in {variables[0]}, where {variables[1]} is {middle:g}. "
         f"Tilt: change of the threshold per unit of {variables[1]}.",
+        *_of_people(result),
     )
     title = caption("Thresholds over two variables", name, synthetic)
     return Table("thresholds", title, header, tuple(rows), 1, notes)
+
+
+def _of_people(result: PlanesResult) -> tuple[str, ...]:
+    """What the rows are of, and how people differ."""
+    if not result.people:
+        return ()
+    differ = [
+        f"{condition}: {fixed(fit.threshold_sd, 3)} and {fixed(fit.tilt_sd, 3)}"
+        for condition, fit in result.population.items()
+    ]
+    said = "All trials: as if one person had given them, too sure where people differ."
+    return (said, f"SD between people of threshold and tilt: {'; '.join(differ)}.") if differ else (said,)
 
 
 def _average(one: Average) -> tuple[str, str]:
@@ -51,7 +73,7 @@ def _average(one: Average) -> tuple[str, str]:
 
 def _line(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:
     rows = tuple(
-        (condition, f"{point.z:g}", fixed(point.threshold, 3), interval_text(point.ci))
+        (condition, f"{point.z:g}", *estimate(point.threshold, point.ci))
         for condition, fit in result.pooled.items()
         for point in fit.line
     )
@@ -60,22 +82,19 @@ def _line(result: PlanesResult, variables: tuple[str, str], name: str, synthetic
 
 
 def _people(result: PlanesResult, name: str, synthetic: bool) -> Table:
-    rows = tuple(
-        (one.participant, one.condition, one.reason, "", "", "")
-        if one.fit is None
-        else (
-            one.participant,
-            one.condition,
-            fixed(one.fit.threshold, 3),
-            interval_text(one.fit.threshold_ci),
-            fixed(one.fit.tilt, 3),
-            interval_text(one.fit.tilt_ci),
+    rows = [
+        (
+            one,
+            None
+            if one.fit is None
+            else (
+                *estimate(one.fit.threshold, one.fit.threshold_ci),
+                *estimate(one.fit.tilt, one.fit.tilt_ci),
+            ),
         )
         for one in result.people
-    )
-    title = caption("Thresholds by person", name, synthetic)
-    header = ("Person", "Condition", "Threshold", "95% CI", "Tilt", "95% CI")
-    return Table("threshold-people", title, header, rows, 2, (), True)
+    ]
+    return table_of_people(rows, ("Threshold", "95% CI", "Tilt", "95% CI"), name, synthetic)
 
 
 def plane_text(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool = False) -> str:

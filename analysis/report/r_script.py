@@ -1,16 +1,16 @@
 """A script in R that computes a report's tables anew with afex, car and emmeans, and compares."""
 
-import csv
-import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 
 from analysis.plans.result import Analysis
+from analysis.report.r_sizes import sizes
+from analysis.report.r_text import as_csv, r_number
 from analysis.report.templating import filled
+from analysis.within.simple_effects import SimpleEffect
 
 SCRIPT, DATA = "verify.R", "cell-means.csv"
 
@@ -37,6 +37,16 @@ def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
         effects=_effects(analysis, names),
         means=_means(analysis, names),
         pairs=_pairs(analysis, names),
+        adjusted=_adjusted(analysis, names),
+        contrasts=[
+            f"c({', '.join(map(r_number, contrast.weights))})"
+            for contrast in (*analysis.trends, *analysis.contrasts)
+        ],
+        contrasts_printed=_contrasts(analysis, names),
+        pillai=_pillai(analysis, names),
+        simple=[_levels_held(analysis, names, simple) for simple in _exact_simple(analysis)],
+        simple_printed=_simple(analysis, names),
+        **sizes(analysis, names),
     )
     return {script: text.encode(), data: _data(analysis, names).encode()}
 
@@ -79,7 +89,7 @@ def _data(analysis: Analysis, names: dict[str, str]) -> str:
         for at in np.ndindex(anova.y.shape[1:]):
             cell = [levels[k] for levels, k in zip(anova.levels, at, strict=True)]
             rows.append([participant, *groups, *numbers, *cell, repr(float(anova.y[i][at]))])
-    return _csv([[*header, *(names[f] for f in anova.factors), "rating"], *rows])
+    return as_csv([[*header, *(names[f] for f in anova.factors), "rating"], *rows])
 
 
 def _effects(analysis: Analysis, names: dict[str, str]) -> str:
@@ -89,30 +99,76 @@ def _effects(analysis: Analysis, names: dict[str, str]) -> str:
         name = ":".join(names[part] for part in (*effect.between, *effect.within))
         epsilon = test.epsilon_gg if test.df_effect > 1 and effect.within else None
         rows.append(
-            [name, *map(_number, (test.f_value, test.df_effect, test.df_error, test.p_value, epsilon))]
+            [name, *map(r_number, (test.f_value, test.df_effect, test.df_error, test.p_value, epsilon))]
         )
-    return _csv(rows).strip()
+    return as_csv(rows).strip()
 
 
 def _means(analysis: Analysis, names: dict[str, str]) -> str:
-    rows = [[names[m.effect], _number(m.mean), _number(m.se)] for m in analysis.means if m.effect in names]
-    return _csv(rows).strip()
+    rows = [[names[m.effect], r_number(m.mean), r_number(m.se)] for m in analysis.means if m.effect in names]
+    return as_csv(rows).strip()
 
 
 def _pairs(analysis: Analysis, names: dict[str, str]) -> str:
     rows = [
-        [names[pair.effect], *map(_number, (pair.difference, pair.se, pair.df, pair.t, pair.p))]
+        [names[pair.effect], *map(r_number, (pair.difference, pair.se, pair.df, pair.t, pair.p))]
         for pair in analysis.pairs
         if pair.effect in names
     ]
-    return _csv(rows).strip()
+    return as_csv(rows).strip()
 
 
-def _number(value: float | None) -> str:
-    return "NA" if value is None or not np.isfinite(value) else repr(float(value))
+def _adjusted(analysis: Analysis, names: dict[str, str]) -> str:
+    rows = [
+        [
+            names[pair.effect],
+            *map(r_number, (pair.p, pair.p_bonferroni, pair.p_holm, pair.p_sidak, pair.p_fdr)),
+        ]
+        for pair in analysis.pairs
+        if pair.effect in names
+    ]
+    return as_csv(rows).strip()
 
 
-def _csv(rows: Iterable[Sequence[Any]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
+def _contrasts(analysis: Analysis, names: dict[str, str]) -> str:
+    rows = [
+        [names[c.factor], f"contrast {i}", *map(r_number, (c.estimate, c.se, c.t, c.p))]
+        for i, c in enumerate((*analysis.trends, *analysis.contrasts), start=1)
+    ]
+    return as_csv(rows).strip()
+
+
+def _pillai(analysis: Analysis, names: dict[str, str]) -> str:
+    rows = []
+    for effect in analysis.anova.effects:
+        if effect.multivariate is not None and effect.within:
+            name = ":".join(names[part] for part in (*effect.between, *effect.within))
+            rows.append([name, r_number(effect.multivariate.pillai)])
+    return as_csv(rows).strip()
+
+
+def _exact_simple(analysis: Analysis) -> list[SimpleEffect]:
+    """Simple effects with an exact F, which are printed by it."""
+    return [
+        simple
+        for simple in analysis.simple_effects
+        if simple.test.multivariate is not None and simple.test.multivariate.exact
+    ]
+
+
+def _levels_held(analysis: Analysis, names: dict[str, str], simple: SimpleEffect) -> str:
+    """The levels at which a simple effect is tested, as codes."""
+    levels = dict(_factors(analysis))
+    at = (f'{names[name]} = "l{levels[name].index(level) + 1}"' for name, level in simple.at.items())
+    return f"list({', '.join(at)})"
+
+
+def _simple(analysis: Analysis, names: dict[str, str]) -> str:
+    rows = []
+    for simple in _exact_simple(analysis):
+        test = simple.test.multivariate
+        if test is not None:
+            numbers = (test.f_value, test.df_effect, test.df_error, test.p_value)
+            within = "TRUE" if simple.of in analysis.anova.factors else "FALSE"
+            rows.append([names[simple.of], *map(r_number, numbers), within])
+    return as_csv(rows).strip()

@@ -5,9 +5,8 @@ import math
 from analysis.plans.result import Analysis
 from analysis.report.numbers import apa_p, fixed, share, share_interval
 from analysis.report.tables import corrected_df, effect_label, has_sphericity, uses_multivariate
-from analysis.within.effect_tests import Effect
-
-SIGNIFICANCE = 0.05
+from analysis.within.effect_tests import Effect, MultivariateTest, UnivariateTest
+from analysis.within.simple_effects import SIGNIFICANCE
 
 
 def sentences(analysis: Analysis) -> tuple[str, ...]:
@@ -31,6 +30,19 @@ def _sentence(analysis: Analysis, effect: Effect, multivariate: bool) -> str:
     )
 
 
+def effect_p(analysis: Analysis, effect: Effect) -> float:
+    """The p that the effect's sentence gives."""
+    return _p(effect, uses_multivariate(analysis))
+
+
+def statistics_in_brief(analysis: Analysis, effect: Effect) -> str:
+    """F, p and size of the effect as its sentence begins with them, without intervals."""
+    m = effect.multivariate
+    if uses_multivariate(analysis) and m is not None and has_sphericity(effect):
+        return f"{_multivariate_f(m)}, {_share_explained(m.eta_sq_partial)}"
+    return f"{_univariate_f(effect.univariate)}, {_share_explained(effect.eta_sq_partial)}"
+
+
 def _p(effect: Effect, multivariate: bool) -> float:
     if multivariate and effect.multivariate is not None:
         return effect.multivariate.p_value
@@ -40,9 +52,8 @@ def _p(effect: Effect, multivariate: bool) -> float:
 def _statistics(effect: Effect, multivariate: bool) -> str:
     m = effect.multivariate
     if multivariate and m is not None and has_sphericity(effect):
-        test = f"F({m.df_effect}, {m.df_error}) = {fixed(m.f_value)}, {apa_p(m.p_value)}"
-        size = _size(m.eta_sq_partial, m.eta_sq_partial_ci)
-        return f"{test}, Pillai's trace = {share(m.pillai, 2)}, {size} (univariate {_univariate(effect)})"
+        test = f"{_multivariate_f(m)}, Pillai's trace = {share(m.pillai, 2)}"
+        return f"{test}, {_size(m.eta_sq_partial, m.eta_sq_partial_ci)} (univariate {_univariate(effect)})"
     return _univariate(effect)
 
 
@@ -50,12 +61,23 @@ def _univariate(effect: Effect) -> str:
     """The univariate F with its own df, p and size, corrected where sphericity may fail."""
     u = effect.univariate
     correction = f", Greenhouse-Geisser ε = {share(u.epsilon_gg, 2)}" if has_sphericity(effect) else ""
-    test = f"F({corrected_df(u)}) = {fixed(u.f_value)}, {apa_p(u.p_gg)}{correction}"
-    return f"{test}, {_size(effect.eta_sq_partial, effect.eta_sq_partial_ci)}"
+    return f"{_univariate_f(u)}{correction}, {_size(effect.eta_sq_partial, effect.eta_sq_partial_ci)}"
+
+
+def _multivariate_f(test: MultivariateTest) -> str:
+    return f"F({test.df_effect}, {test.df_error}) = {fixed(test.f_value)}, {apa_p(test.p_value)}"
+
+
+def _univariate_f(test: UnivariateTest) -> str:
+    return f"F({corrected_df(test)}) = {fixed(test.f_value)}, {apa_p(test.p_gg)}"
 
 
 def _size(eta: float, interval: tuple[float, float]) -> str:
-    return f"partial η² = {share(eta, 2)}, 95% CI {share_interval(interval)}"
+    return f"{_share_explained(eta)}, 95% CI {share_interval(interval)}"
+
+
+def _share_explained(eta: float) -> str:
+    return f"partial η² = {share(eta, 2)}"
 
 
 def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:

@@ -11,10 +11,11 @@ from analysis.plans.prepare import Prepared
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data
+from analysis.report.json_output import exclusions_data, study_data
 from analysis.report.left_out import left_out
 from analysis.report.numbers import apa_p, fixed, interval, p_value
-from analysis.report.threshold_tables import people_table, threshold_table
+from analysis.report.r_choices import threshold_files
+from analysis.report.threshold_tables import means_table, people_table, threshold_table
 from analysis.thresholds.likelihood import function
 from analysis.thresholds.people import ThresholdsResult
 from analysis.thresholds.psychometric import Threshold
@@ -26,11 +27,11 @@ if TYPE_CHECKING:
 METHODS = (
     "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and lapse "
     "rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% profiles "
-    "of the likelihood. The first table pools all trials of a series, which flattens the slope where people "
-    "differ; its last rows average thresholds over people (random effects by REML, Hartung-Knapp interval). "
-    "Series are compared within people by paired t tests, those of groups of people by Welch's, corrected by "
-    "Holm. Stimuli were chosen by the "
-    "answers before them; the likelihood is the same as if they had been fixed. {weibull}"
+    "of the likelihood. The first table averages the thresholds of single people (random effects by REML, "
+    "Hartung-Knapp interval); the one over all trials pools them, which flattens the slope where people "
+    "differ. Series are compared within people by paired t tests, those of groups of people by Welch's, "
+    "corrected by Holm. Stimuli were chosen by the answers before them; the likelihood is the same as if "
+    "they had been fixed. {weibull}"
 )
 SIGNIFICANCE = 0.05
 WEIBULL = "The declaration's Weibull has its threshold where F is 1 - 1/e; here it is where F is one half. "
@@ -58,6 +59,8 @@ def contents_of(
                 _tables(fits, merged, differences, name, synthetic),
                 sentences(fits, merged, differences),
                 draw=lambda: (draw(fits, experiment.factor(trial.stimulus.factor).label, synthetic, people),),
+                beside=lambda key: _r_files(prepared, fits, differences, key),
+                brief=sentences((), merged, differences),
             ),
         ),
         methods=METHODS.format(
@@ -68,6 +71,15 @@ def contents_of(
         ),
         numbers=numbers(prepared, fits, merged, differences, people),
     )
+
+
+def _r_files(
+    prepared: Prepared, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]", key: str
+) -> dict[str, bytes]:
+    """The script that fits every function anew in R, and its trials."""
+    from analysis.plans.threshold import answers_of
+
+    return threshold_files(prepared.experiment.title, fits, answers_of(prepared), differences, key)
 
 
 def merge(fits: "Sequence[SeriesFit]") -> ThresholdsResult:
@@ -89,9 +101,11 @@ def _tables(
     name: str,
     synthetic: bool,
 ) -> tuple[Table, ...]:
-    made = [threshold_table(merged, name, synthetic)] if merged.pooled else []
+    made = [means_table(merged, name, synthetic)] if merged.means else []
     if differences:
         made.append(differences_table(differences, name, synthetic))
+    if merged.pooled:
+        made.append(threshold_table(merged, name, synthetic))
     if merged.people:
         made.append(people_table(merged, name, synthetic))
     return (*made, shares_table(fits, name, synthetic))
@@ -170,15 +184,9 @@ def numbers(
     people: int,
 ) -> dict[str, Any]:
     """The JSON document; conditions are the series' names."""
-    experiment = prepared.experiment
     names = {fit.label: fit.name for fit in fits}
     return {
-        "name": experiment.name,
-        "title": experiment.title,
-        "kind": experiment.trial.kind,
-        "source": prepared.source,
-        "synthetic": prepared.synthetic,
-        "n_participants": people,
+        **study_data(prepared, people),
         "n_trials": len(prepared.rows),
         "labels": {fit.name: fit.label for fit in fits},
         "pooled": {names[label]: asdict(fit) for label, fit in merged.pooled.items()},
@@ -205,15 +213,23 @@ def draw(fits: "Sequence[SeriesFit]", along: str, synthetic: bool, people: int) 
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     import matplotlib as mpl
 
-    from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, as_bytes, new_figure, write_note
+    from analysis.report.pictures import (
+        BESIDE,
+        COLOURS,
+        MARKERS,
+        STYLE,
+        in_both_formats,
+        new_figure,
+        write_note,
+    )
 
     with mpl.rc_context(STYLE):
         figure = new_figure()
         axes = figure.add_subplot()
-        for place, fit in enumerate(fits):
-            colour, trials = COLOURS[place % len(COLOURS)], fit.trials
+        for position, fit in enumerate(fits):
+            colour, trials = COLOURS[position % len(COLOURS)], fit.trials
             sizes = 8 + 60 * np.sqrt(trials.n / max(1.0, float(trials.n.max())))
-            marker = MARKERS[place % len(MARKERS)]
+            marker = MARKERS[position % len(MARKERS)]
             shares = trials.k / trials.n
             axes.scatter(trials.x, shares, s=sizes, color=colour, marker=marker, alpha=0.6, label=fit.label)
             if fit.result is not None:
@@ -230,5 +246,5 @@ def draw(fits: "Sequence[SeriesFit]", along: str, synthetic: bool, people: int) 
         note = f"N = {people}. Size: trials. Dotted: threshold over all trials."
         write_note(figure, note, synthetic, "answers")
         alt = f"Psychometric functions of {len(fits)} series along {along}"
-        made = as_bytes(figure, "svg"), as_bytes(figure, "png")
+        made = in_both_formats(figure)
         return Picture("figure-thresholds", "Psychometric functions", alt, *made)

@@ -1,15 +1,18 @@
 """Thresholds as tables and words."""
 
+from collections.abc import Sequence
+
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
 from analysis.thresholds.likelihood import Interval
-from analysis.thresholds.people import ThresholdsResult
+from analysis.thresholds.people import PersonThreshold, ThresholdsResult
+from analysis.thresholds.plane_people import PersonPlane
 
 
 def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
-    """The fit over all trials of each condition, and the mean over people where there is one."""
-    rows = [
+    """The fit over all trials of each condition."""
+    rows = tuple(
         (
             condition,
             fixed(fit.threshold, 3),
@@ -21,26 +24,37 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
             str(fit.n_trials),
         )
         for condition, fit in result.pooled.items()
-    ]
-    rows += [
-        (
-            f"{mean.condition}, mean of {mean.people}",
-            fixed(mean.mean, 3),
-            f"{fixed(mean.ci_low, 3)} to {fixed(mean.ci_high, 3)}",
-            DASH,
-            DASH,
-            DASH,
-            DASH,
-            DASH,
-        )
-        for mean in result.means
-    ]
+    )
     header = ("Condition", "Threshold", "95% CI", "Spread", "x .75", "Lapse", "fit p", "Trials")
     notes = (
-        ("All trials pooled, so that differences between people flatten the slope.",) if result.means else ()
+        ("All trials pooled: where people differ the slope is flatter and the interval too narrow.",)
+        if result.means
+        else ()
     )
-    title = caption("Thresholds", name, synthetic)
-    return Table("thresholds", title, header, tuple(rows), 1, notes)
+    title = caption("Thresholds over all trials", name, synthetic)
+    return Table("thresholds", title, header, rows, 1, notes)
+
+
+def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
+    """Each condition's threshold as the mean of those of single people, which is the answer for people."""
+    rows = tuple(
+        (
+            mean.condition,
+            str(mean.people),
+            fixed(mean.mean, 3),
+            fixed(mean.se, 3),
+            f"{fixed(mean.ci_low, 3)} to {fixed(mean.ci_high, 3)}",
+            fixed(mean.tau, 3),
+        )
+        for mean in result.means
+    )
+    header = ("Condition", "People", "Threshold", "SE", "95% CI", "SD")
+    notes = (
+        "Mean of the thresholds of single people, weighed by their errors (random effects by REML, Hartung "
+        "and Knapp's interval). SD: how far people's own thresholds differ.",
+    )
+    title = caption("Thresholds, mean over people", name, synthetic)
+    return Table("threshold-means", title, header, rows, 1, notes)
 
 
 def population_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
@@ -64,21 +78,36 @@ def population_table(result: ThresholdsResult, name: str, synthetic: bool = Fals
 
 def people_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
     """Every person's threshold."""
-    rows = tuple(
-        (one.participant, one.condition, one.reason, "", "")
-        if one.fit is None
-        else (
-            one.participant,
-            one.condition,
-            fixed(one.fit.threshold, 3),
-            interval_text(one.fit.threshold_ci),
-            fixed(one.fit.spread, 3),
+    rows = [
+        (
+            one,
+            None
+            if one.fit is None
+            else (*estimate(one.fit.threshold, one.fit.threshold_ci), fixed(one.fit.spread, 3)),
         )
         for one in result.people
+    ]
+    return table_of_people(rows, ("Threshold", "95% CI", "Spread"), name, synthetic)
+
+
+def estimate(value: float, interval: Interval) -> tuple[str, str]:
+    """The cells of an estimate and its interval."""
+    return fixed(value, 3), interval_text(interval)
+
+
+def table_of_people(
+    people: Sequence[tuple[PersonThreshold | PersonPlane, tuple[str, ...] | None]],
+    measures: tuple[str, ...],
+    name: str,
+    synthetic: bool,
+) -> Table:
+    """What was measured of every person in every condition, or why nothing could be."""
+    rows = tuple(
+        (one.participant, one.condition, *(cells or (one.reason, *[""] * (len(measures) - 1))))
+        for one, cells in people
     )
     title = caption("Thresholds by person", name, synthetic)
-    header = ("Person", "Condition", "Threshold", "95% CI", "Spread")
-    return Table("threshold-people", title, header, rows, 2, (), True)
+    return Table("threshold-people", title, ("Person", "Condition", *measures), rows, 2, (), True)
 
 
 def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False) -> str:

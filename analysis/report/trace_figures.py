@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.report.contents import Picture
 from analysis.report.numbers import fixed
-from analysis.report.pictures import COLOURS, as_bytes, new_figure, write_note
+from analysis.report.pictures import COLOURS, in_both_formats, new_figure, write_note
 from analysis.traces.lag import LagResult, MeanTrace
 
 COLUMNS = 2
@@ -61,7 +61,7 @@ def lag_figure(lag: LagResult, synthetic: bool) -> Picture:
 
 
 def _colours(traces: Sequence[MeanTrace]) -> list[str]:
-    return [COLOURS[place % len(COLOURS)] for place in range(len(traces))]
+    return [COLOURS[position % len(COLOURS)] for position in range(len(traces))]
 
 
 def _extent(traces: Sequence[MeanTrace]) -> tuple[float, float]:
@@ -79,10 +79,10 @@ def _extent(traces: Sequence[MeanTrace]) -> tuple[float, float]:
 def _mark_events(panel: Any, trace: MeanTrace, below: float, height: float) -> None:
     clips = [events for events in trace.events_s if events]
     row = height / max(1, len(clips))
-    for place, events in enumerate(clips):
-        top = below - place * row
+    for position, events in enumerate(clips):
+        top = below - position * row
         panel.vlines(events, top - 0.7 * row, top, color="#444444", linewidth=0.9)
 
 
 def _picture(figure: Any, key: str, title: str, alt: str) -> Picture:
-    return Picture(key, title, alt, as_bytes(figure, "svg"), as_bytes(figure, "png"))
+    return Picture(key, title, alt, *in_both_formats(figure))

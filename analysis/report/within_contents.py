@@ -3,7 +3,9 @@
 from collections.abc import Callable
 
 from analysis.plans.result import Analysis
+from analysis.report.brief import brief
 from analysis.report.contents import Contents, Part, Picture, Progress, Section
+from analysis.report.formats import Table
 from analysis.report.json_output import as_data
 from analysis.report.left_out import left_out
 from analysis.report.r_script import r_files
@@ -52,13 +54,25 @@ def part_of(
 ) -> Part:
     """The tables, sentences and figures of one analysis."""
     return Part(
-        all_tables(analysis),
+        tables_of(analysis),
         sentences(analysis),
         title,
         lambda: draw_all(analysis),
         more,
         lambda key: r_files(analysis, key),
+        brief=brief(analysis),
     )
+
+
+def tables_of(analysis: Analysis) -> tuple[Table, ...]:
+    """Every table, those of the robust companions last where they were asked for."""
+    tables = all_tables(analysis)
+    if analysis.robust is None:
+        return tables
+    # what only some ask for is imported when it is
+    from analysis.report.robust_tables import robust_tables
+
+    return (*tables, *robust_tables(analysis, analysis.robust))
 
 
 def methods_of(analysis: Analysis) -> str:
@@ -72,7 +86,7 @@ def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
     """Draw every figure of the analysis."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     from analysis.report.figures import draw, figures_of
-    from analysis.report.pictures import as_bytes
+    from analysis.report.pictures import in_both_formats
 
     pictures = []
     for spec in figures_of(analysis):
@@ -80,7 +94,5 @@ def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
         shown = (
             f"{spec.title}: mean ratings with within-participant 95% intervals and every participant's mean"
         )
-        pictures.append(
-            Picture(spec.key, spec.title, shown, as_bytes(figure, "svg"), as_bytes(figure, "png"))
-        )
+        pictures.append(Picture(spec.key, spec.title, shown, *in_both_formats(figure)))
     return tuple(pictures)

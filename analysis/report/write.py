@@ -1,4 +1,4 @@
-"""One report: HTML and Markdown, LaTeX tables, figures, and the results as JSON."""
+"""One report: HTML, Markdown, Word and LaTeX, tables for LaTeX, figures, and the results as JSON."""
 
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -7,8 +7,10 @@ from pathlib import Path
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
 from analysis.report.contents import Contents, Picture, Progress, Section
-from analysis.report.formats import Table, as_latex
+from analysis.report.formats import Table
+from analysis.report.latex import NEEDS, as_document, as_latex
 from analysis.report.templating import filled
+from analysis.report.word import as_docx
 from experiments.errors import InputError
 from experiments.files import whole_file
 from experiments.json import json_text
@@ -19,6 +21,7 @@ class DrawnPart:
     """A part with its figures drawn and its further sections made, as the templates print it."""
 
     title: str
+    brief: tuple[str, ...]
     first: Table
     tables: tuple[Table, ...]
     sentences: tuple[str, ...]
@@ -32,14 +35,15 @@ def write_report(
 ) -> list[Path]:
     """Write every file of the report into `folder`, each whole or not at all; give back their paths.
 
-    Files: report.html, report.md, tables.tex, results.json, figure-*.png and .svg, and what a part lays
-    beside. `more` adds the sections that take long.
+    Files: report.html, report.md, report.docx, report.tex, tables.tex, results.json, figure-*.png and
+    .svg, and what a part lays beside. `more` adds the sections that take long.
     """
     make_folder(folder)
     progress("figures")
     parts = tuple(
         DrawnPart(
             part.title,
+            part.brief,
             part.tables[0],
             part.tables[1:],
             part.sentences,
@@ -51,14 +55,20 @@ def write_report(
     )
     progress("report")
     files: dict[str, bytes] = {}
-    for picture in (picture for part in parts for picture in part.pictures):
+    drawn = [picture for part in parts for picture in part.pictures]
+    drawn += [picture for part in parts for section in part.sections for picture in section.pictures]
+    for picture in drawn:
         files[f"{picture.key}.svg"], files[f"{picture.key}.png"] = picture.svg, picture.png
-    for part in contents.parts:
+    for part, made in zip(contents.parts, parts, strict=True):
         files.update(part.beside(part.key))
+        for section in made.sections:
+            files.update(section.beside(part.key))
     files["tables.tex"] = _latex(contents, parts).encode()
+    files["report.tex"] = as_document(contents, parts, version("palpebra")).encode()
     files["results.json"] = json_text(contents.numbers).encode()
     files["report.md"] = _render("report.md.j2", contents, parts).encode()
     files["report.html"] = _render("report.html.j2", contents, parts).encode()
+    files["report.docx"] = as_docx(contents, parts, version("palpebra"))
     for name, content in files.items():
         with whole_file(folder / name) as temporary:
             temporary.write_bytes(content)
@@ -75,7 +85,7 @@ def make_folder(folder: Path) -> None:
 
 def _latex(contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
     mark = f"% SYNTHETIC DATA: no person gave these {contents.given}\n" if contents.synthetic else ""
-    head = f"% {contents.title}\n{mark}% needs \\usepackage{{booktabs}}\n\n"
+    head = f"% {' '.join(contents.title.split())}\n{mark}% needs {NEEDS}\n\n"
     tables = (
         table
         for part in parts

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-from analysis.synthetic.published import Place, PrintedMean, Published, decimals, window
+from analysis.synthetic.published import MarginLevels, PrintedMean, Published, decimals, window
 from analysis.synthetic.space import DesignSpace
 from analysis.synthetic.targets import place_name
 from experiments.errors import InputError
@@ -15,7 +15,7 @@ from experiments.errors import InputError
 class GivenWay:
     """A printed mean that cannot hold beside the others, and the nearest one that can."""
 
-    at: Place
+    at: MarginLevels
     printed: str
     used: str
     reason: str
@@ -60,13 +60,13 @@ def _possible(means: tuple[PrintedMean, ...], space: DesignSpace) -> bool:
     low, high = np.array([window(m.printed) for m in means]).T
     half = (high - low)[:, None] / 2
     bounds = [(None, None)] * space.n_cells + [(None, 1.0)]
-    found = linprog(
+    solution = linprog(
         np.r_[np.zeros(space.n_cells), -1.0],
         A_ub=np.vstack([np.hstack([rows, half]), np.hstack([-rows, half])]),
         b_ub=np.r_[high, -low],
         bounds=bounds,
     )
-    return bool(found.x is not None and found.status == 0 and found.x[-1] > 1e-6)
+    return bool(solution.x is not None and solution.status == 0 and solution.x[-1] > 1e-6)
 
 
 def _contradiction(means: tuple[PrintedMean, ...], space: DesignSpace) -> str:

@@ -33,16 +33,22 @@ def make_population(
     """
     means = _cell_means(published, space, targets)
     variances: dict[str, Floats] = {}
-    wanted = {t.name.removeprefix("F "): t for t in targets.tests}
+    tests = {t.name.removeprefix("F "): t for t in targets.tests}
     for effect, contrasts in space.effects.items():
         q = contrasts.shape[1]
         z = contrasts.T @ means
-        target = wanted.get(effect)
-        none_wanted = target is not None and target.wanted is not None and target.wanted < 0.01
-        if none_wanted:
+        target = tests.get(effect)
+        is_zero = target is not None and target.start is not None and target.start < 0.01
+        if is_zero:
             means, z = means - contrasts @ z, np.zeros(q)
         elif z @ z < 1e-6:
             z = rng.normal(size=q) * published.contrast_sd / np.sqrt(targets.n)
+            if published.assumed and target is not None and target.start is not None:
+                z *= (
+                    np.sqrt(target.start * q / (targets.n - q) * (targets.n - 1) / (z @ z))
+                    * published.contrast_sd
+                )
+                z /= np.sqrt(targets.n)
             means = means + contrasts @ z
         share = published.slope_shares.get(effect, 0.0)
         variances[effect] = _error_variance(z, target, targets.n, published.contrast_sd, share)
@@ -72,7 +78,7 @@ def _error_variance(z: Floats, target: TestTarget | None, n: int, sd: float, sha
     usual = sd**2 * np.eye(q)
     if target is None:
         return usual
-    f = target.wanted
+    f = target.start
     if f is None:
         present = n / (n - 1) * float(z @ z) / sd**2 * (n - q) / q
         if not target.low <= present <= target.high:
@@ -92,14 +98,16 @@ def _covariance(
     k = space.n_cells
     flat = np.full((k, 1), 1 / np.sqrt(k))
     effects = sum((c @ variances[e] @ c.T for e, c in space.effects.items()), np.zeros((k, k)))
-    wanted = [((s.low + s.high) / 2) ** 2 - float(s.weights @ effects @ s.weights) for s in targets.spreads]
-    grand = float(np.mean(wanted)) if wanted else published.grand_sd**2
+    variances_needed = [
+        ((s.low + s.high) / 2) ** 2 - float(s.weights @ effects @ s.weights) for s in targets.spreads
+    ]
+    grand = float(np.mean(variances_needed)) if variances_needed else published.grand_sd**2
     together = np.zeros(k)
-    if wanted:
+    if variances_needed:
         # var(margin) = grand + 2 w.c + w'Ew with c the covariance of the cells' effects with the grand mean
         rows = np.stack([s.weights for s in targets.spreads])
         rows = rows - rows.mean(axis=1, keepdims=True)
-        together = np.linalg.pinv(rows) @ ((np.array(wanted) - grand) / 2)
+        together = np.linalg.pinv(rows) @ ((np.array(variances_needed) - grand) / 2)
         together -= together.mean()
     ones = np.sqrt(k) * flat[:, 0]
     full = grand * np.outer(ones, ones) + np.outer(ones, together) + np.outer(together, ones) + effects

@@ -6,15 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from experiments.errors import InputError, did_you_mean
+from experiments.trials.scales import RatedScale
 
 FOLDER = Path(__file__).parent
-SHIPPED = ("exp1", "exp2", "exp3")
 
-Place = dict[str, str]
+MarginLevels = dict[str, str]
 """Levels that name a margin or a cell, e.g. `{blur: MB, amplitude: FC}`; other factors are averaged over."""
 
 Printed = Annotated[str, Field(pattern=r"^[<>]?\d+(\.\d+)?$")]
+
+
+GRAND_SD, CONTRAST_SD = 0.75 / 6, 0.35 / 6
+"""Spread of people's means and of their contrasts in Exp 1 to 3, as a part of the scale's width."""
 
 
 class _Figures(BaseModel):
@@ -24,14 +27,14 @@ class _Figures(BaseModel):
 class PrintedMean(_Figures):
     """A marginal or cell mean."""
 
-    at: Place
+    at: MarginLevels
     printed: Printed
 
 
 class PrintedSpread(_Figures):
     """A standard error or standard deviation over participants of a marginal mean."""
 
-    at: Place
+    at: MarginLevels
     kind: Literal["se", "sd"]
     printed: Printed
 
@@ -55,18 +58,18 @@ class PrintedPairs(_Figures):
 class Direction(_Figures):
     """An order of means: one pair of places, a factor's whole order, or the highest place."""
 
-    higher: Place | None = None
-    lower: Place | None = None
+    higher: MarginLevels | None = None
+    lower: MarginLevels | None = None
     order: dict[str, tuple[str, ...]] | None = None
     within: str | None = None
-    highest: Place | None = None
+    highest: MarginLevels | None = None
     vary: str | None = None
 
 
 class InventedMean(_Figures):
     """A mean nobody printed, needed to make whole data."""
 
-    at: Place
+    at: MarginLevels
     mean: float
 
 
@@ -84,14 +87,26 @@ class Published(_Figures):
     directions: tuple[Direction, ...] = ()
     invented_means: tuple[InventedMean, ...] = ()
     slope_shares: dict[str, float] = {}
-    gives_way: Place = {}
+    gives_way: MarginLevels = {}
+    assumed: bool = False
+    """Nothing is published: an effect is as large as its F and the usual spread of contrasts make it."""
 
 
 def load_published(name: str) -> Published:
-    """The shipped figures of `exp1`, `exp2` or `exp3`; InputError for another name."""
-    if name not in SHIPPED:
-        raise InputError(f"no published figures for '{name}'{did_you_mean(name, SHIPPED)}")
+    """The shipped figures of `exp1`, `exp2` or `exp3`."""
     return Published.model_validate(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
+
+
+def assumed(name: str, scale: RatedScale) -> Published:
+    """For a study that nobody has run: the middle of the scale, and people who differ as in Exp 1 to 3."""
+    width = scale.maximum - scale.minimum
+    return Published(
+        experiment=name,
+        grand_mean=scale.minimum + width / 2,
+        grand_sd=GRAND_SD * width,
+        contrast_sd=CONTRAST_SD * width,
+        assumed=True,
+    )
 
 
 def decimals(printed: str) -> int:

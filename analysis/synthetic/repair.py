@@ -45,12 +45,12 @@ class Repaired:
 
 def missed_targets(y: Floats, targets: Targets) -> tuple[Missed, ...]:
     """Targets whose statistic on cell means (n, cells) lies outside the window."""
-    found = []
+    missed = []
     for target in targets.everything:
         value = value_of(y, target)
         if not target.low <= value <= target.high:
-            found.append(Missed(target.name, value, target.low, target.high))
-    return tuple(found)
+            missed.append(Missed(target.name, value, target.low, target.high))
+    return tuple(missed)
 
 
 class _Search:

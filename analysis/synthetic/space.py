@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from experiments.definition import Experiment
+from experiments.design import rated_levels
 from experiments.errors import InputError, did_you_mean
 
 Floats = NDArray[np.float64]
@@ -23,9 +24,9 @@ class DesignSpace:
 
     @classmethod
     def of(cls, experiment: Experiment) -> "DesignSpace":
-        """Factors in the order of the experiment's analysis plan."""
+        """Factors in the order of the experiment's analysis plan, with the levels that are rated."""
         order = experiment.analysis.factors or experiment.factor_names
-        return cls(tuple(order), tuple(tuple(lv.name for lv in experiment.factor(f).levels) for f in order))
+        return cls(tuple(order), tuple(tuple(rated_levels(experiment, f)) for f in order))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -52,13 +53,13 @@ class DesignSpace:
             block = np.asarray(np.kron(block, basis[:, 1:] if axis in members else basis[:, :1]))
         return block
 
-    def weights(self, place: Mapping[str, str]) -> Floats:
+    def weights(self, at: Mapping[str, str]) -> Floats:
         """Averaging weights (cells,) of a margin or cell; InputError for an unknown factor or level."""
         weight: Floats = np.ones(1)
-        for factor, level in place.items():
+        for factor, level in at.items():
             self._check(factor, level)
         for factor, names in zip(self.factors, self.levels, strict=True):
-            chosen = [place[factor]] if factor in place else list(names)
+            chosen = [at[factor]] if factor in at else list(names)
             weight = np.asarray(np.kron(weight, np.array([name in chosen for name in names]) / len(chosen)))
         return weight
 
@@ -77,8 +78,8 @@ class DesignSpace:
 
     def effect_called(self, name: str) -> str:
         """The effect whose factors are those of `name`, in the design's own order."""
-        wanted = name.split(":")
+        factors = name.split(":")
         for effect in self.effects:
-            if sorted(effect.split(":")) == sorted(wanted):
+            if sorted(effect.split(":")) == sorted(factors):
                 return effect
         raise InputError(f"no effect '{name}'{did_you_mean(name, self.effects)}")

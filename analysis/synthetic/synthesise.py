@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 from analysis.synthetic.feasible import GivenWay, make_feasible
 from analysis.synthetic.moves import value_of
 from analysis.synthetic.population import Population, draw, make_population
-from analysis.synthetic.published import Published, load_published
-from analysis.synthetic.repair import Missed, Repaired, repair
+from analysis.synthetic.published import Published, assumed, load_published
+from analysis.synthetic.repair import Repaired, repair
 from analysis.synthetic.space import DesignSpace
+from analysis.synthetic.steps import Steps
 from analysis.synthetic.targets import Targets, make_targets
-from analysis.synthetic.trials import rating_rows
+from analysis.synthetic.trials import Totals, rating_rows
 from analysis.synthetic.wishes import with_wishes
+from analysis.synthetic.wishes_by_scale import refuse_off_scale, wishes_for
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.files import whole_file
-from experiments.load import load_experiment
+from experiments.load import SHIPPED, load_experiment
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.scales import scale_called
+from experiments.trials.scales import RatedScale, scale_called, scales_of
 
 ATTEMPTS = 40
 """Fresh draws of participants before the best is kept and what it misses is reported."""
@@ -48,22 +50,34 @@ class Reached:
 
 @dataclass(frozen=True)
 class Synthetic:
-    """Synthetic participants: cell sums (n, cells) and how the wanted figures came out."""
+    """Synthetic participants on one scale, and how the wanted figures came out.
+
+    Attributes
+    ----------
+    sums : int64 array (n, cells)
+        Sums of a cell's ratings, counted in steps of the scale.
+    """
 
     experiment: Experiment
     space: DesignSpace
+    scale: RatedScale
     seed: int
     trials_per_cell: int
     sums: NDArray[np.int64] = field(repr=False)
     reached: tuple[Reached, ...]
-    missed: tuple[Missed, ...]
     given_way: tuple[GivenWay, ...]
     attempts: int
 
     @property
+    def missed(self) -> tuple[Reached, ...]:
+        """Figures that the data do not have."""
+        return tuple(figure for figure in self.reached if not figure.hit)
+
+    @property
     def y(self) -> NDArray[np.float64]:
         """Cell means (n, levels of the first factor, ...)."""
-        return (self.sums / self.trials_per_cell).reshape(len(self.sums), *self.space.shape)
+        means = ratings_of(self.sums, self.trials_per_cell, Steps.of(self.scale))
+        return means.reshape(len(self.sums), *self.space.shape)
 
 
 @dataclass(frozen=True)
@@ -75,32 +89,86 @@ class Plan:
     published: Published
     targets: Targets
     given_way: tuple[GivenWay, ...]
+    scale: RatedScale
     as_published: bool = True
 
 
 def make_plan(
-    name: str, n: int | None = None, means: Sequence[str] = (), effects: Sequence[str] = ()
+    name: str,
+    n: int | None = None,
+    means: Sequence[str] = (),
+    effects: Sequence[str] = (),
+    scale: str | None = None,
 ) -> Plan:
-    """Figures of exp1, exp2 or exp3 with the user's wishes, made jointly possible."""
-    published = load_published(name)
-    experiment = load_experiment(published.experiment)
+    """Figures of exp1, exp2 or exp3 with wishes, made jointly possible; of other studies the wishes alone.
+
+    Parameters
+    ----------
+    name : str
+        Of a shipped experiment, or the path of a declaration.
+    n : int, optional
+        Participants; as declared where not given.
+    means, effects : sequence of str
+        As in `with_wishes`, each for all scales or, as in `eeriness/character=9`, for one.
+    scale : str, optional
+        The scale that ratings are of; the first where not given.
+
+    Raises
+    ------
+    InputError
+        No such study or scale; wishes that contradict each other, lie off the scale or name no effect;
+        factors between participants; too few participants.
+    """
+    experiment = load_experiment(name)
+    rated = scale_called(experiment, scale)
     space = DesignSpace.of(experiment)
+    _refuse_between(experiment, space)
+    if name not in SHIPPED and not effects:
+        raise InputError(
+            f"nothing is published of '{name}': name the effects that you expect, for example "
+            f"--effect {space.factors[0]}=6.5 (F with {experiment.participants} participants)"
+        )
+    published = load_published(name) if name in SHIPPED else assumed(name, rated)
     people = experiment.participants if n is None else n
     widest = max(c.shape[1] for c in space.effects.values())
     if people < widest + 2:
         raise InputError(f"expected at least {widest + 2} participants for {name}, got {people}")
     if people != experiment.participants:
         published = _without_p(published)
-    published, given_way = make_feasible(with_wishes(published, space, means, effects), space)
+    means, effects = (wishes_for(experiment, rated, wishes) for wishes in (means, effects))
+    published = with_wishes(published, space, means, effects)
+    refuse_off_scale(published.means, experiment, rated)
+    published, given_way = make_feasible(published, space)
     as_published = people == experiment.participants and not means and not effects
     targets = make_targets(published, space, people)
-    return Plan(experiment, space, published, targets, given_way, as_published)
+    return Plan(experiment, space, published, targets, given_way, rated, as_published)
+
+
+def _refuse_between(experiment: Experiment, space: DesignSpace) -> None:
+    between = [name for name in space.factors if experiment.factor(name).between]
+    if between:
+        raise InputError(f"expected factors within participants, got '{between[0]}' between them")
 
 
 def _without_p(published: Published) -> Published:
     """The figures for another number of participants: a printed F then has another p."""
     tests = tuple(t if t.f is None else t.model_copy(update={"p": None}) for t in published.tests)
     return published.model_copy(update={"tests": tests})
+
+
+def make_plans(
+    name: str, n: int | None = None, means: Sequence[str] = (), effects: Sequence[str] = ()
+) -> tuple[Plan, ...]:
+    """A plan for every scale of a study, in order; arguments and errors are those of `make_plan`."""
+    scales = scales_of(load_experiment(name))
+    return tuple(make_plan(name, n, means, effects, scale.name) for scale in scales) or (
+        make_plan(name, n, means, effects),
+    )
+
+
+def ratings_of(sums: NDArray[np.int64], trials: int, steps: Steps) -> NDArray[np.float64]:
+    """Mean ratings of sums that are counted in steps."""
+    return steps.offset + steps.size * (sums / trials)
 
 
 def population_of(plan: Plan, rng: np.random.Generator) -> Population:
@@ -111,33 +179,41 @@ def population_of(plan: Plan, rng: np.random.Generator) -> Population:
 def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | None = None) -> Synthetic:
     """Draw participants and mend them until every figure holds; the best of some draws where none does.
 
+    The scales of a study are drawn independently: equal seeds give no equal people on two of them.
     `progress` gets (figures missed, rounds done).
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_seed_of(plan, seed))
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
-    declared = scale_called(plan.experiment)
-    scale = (round(declared.minimum), round(declared.maximum))
-    found: list[Repaired] = []
+    steps = Steps.of(plan.scale)
+    targets = steps.targets(plan.targets)
+    repaired: list[Repaired] = []
     rounds = 0
     attempts = ATTEMPTS if plan.as_published else WISHED_ATTEMPTS
-    while len(found) < attempts and not any(not f.missed for f in found):
-        start = draw(population_of(plan, rng), plan.targets.n, rng, exact=True)
-        found.append(repair(start, trials, scale, plan.targets, rng, _onward(progress, rounds)))
-        rounds += found[-1].steps
-    best = min(found, key=lambda f: len(f.missed))
-    y = best.sums / trials
+    while len(repaired) < attempts and not any(not f.missed for f in repaired):
+        start = (draw(population_of(plan, rng), targets.n, rng, exact=True) - steps.offset) / steps.size
+        ends = (steps.low, steps.high)
+        repaired.append(repair(start, trials, ends, targets, rng, _onward(progress, rounds)))
+        rounds += repaired[-1].steps
+    best = min(repaired, key=lambda f: len(f.missed))
+    y = ratings_of(best.sums, trials, steps)
     reached = tuple(Reached(t.name, value_of(y, t), t.low, t.high) for t in plan.targets.everything)
     return Synthetic(
         plan.experiment,
         plan.space,
+        plan.scale,
         seed,
         trials,
         best.sums,
         reached,
-        best.missed,
         plan.given_way,
-        len(found),
+        len(repaired),
     )
+
+
+def _seed_of(plan: Plan, seed: int) -> list[int]:
+    """The first scale's is that of a study with one; [seed, 1] is that of single ratings."""
+    position = scales_of(plan.experiment).index(plan.scale)
+    return [seed] if position == 0 else [seed, 1 + position]
 
 
 def _onward(progress: Callable[[int, int], None] | None, rounds: int) -> Callable[[int, int], None] | None:
@@ -146,15 +222,30 @@ def _onward(progress: Callable[[int, int], None] | None, rounds: int) -> Callabl
     return lambda missed, step: progress(missed, rounds + step)
 
 
-def write_ratings(synthetic: Synthetic, out: Path) -> int:
-    """Write the ratings as the server's CSV export, every row marked synthetic; the number of rows."""
-    header = RATINGS.csv_header(synthetic.experiment.factor_names)
-    rng = np.random.default_rng([synthetic.seed, 1])
+def write_ratings(scales: Sequence[Synthetic], out: Path) -> int:
+    """Write the ratings as the server's CSV export, every row marked synthetic.
+
+    Parameters
+    ----------
+    scales : sequence of Synthetic
+        The same participants on every scale of the study, in order.
+    out : Path
+        The CSV file.
+
+    Returns
+    -------
+    int
+        Rows: one a trial and scale.
+    """
+    first = scales[0]
+    header = RATINGS.csv_header(first.experiment.factor_names)
+    rng = np.random.default_rng([first.seed, 1])
+    sums = [Totals(made.scale, made.sums) for made in scales]
     count = 0
     with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:
         writer = csv.DictWriter(handle, header, lineterminator="\n")
         writer.writeheader()
-        for row in rating_rows(synthetic.experiment, synthetic.space, synthetic.sums, rng):
+        for row in rating_rows(first.experiment, first.space, sums, rng):
             writer.writerow(row)
             count += 1
     return count

@@ -48,7 +48,7 @@ class TestTarget:
     low: float
     high: float
     scale: float
-    wanted: float | None
+    start: float | None
     """The F to start from; None where only a bound on p is known."""
 
 
@@ -69,9 +69,9 @@ class Targets:
         return (*self.means, *self.spreads, *self.tests, *self.pairs, *self.directions)
 
 
-def place_name(place: dict[str, str]) -> str:
+def place_name(at: dict[str, str]) -> str:
     """A place in words: `blur=MB amplitude=FC`."""
-    return " ".join(f"{factor}={level}" for factor, level in place.items())
+    return " ".join(f"{factor}={level}" for factor, level in at.items())
 
 
 def narrowed(printed: str) -> tuple[float, float, float]:
@@ -114,8 +114,8 @@ def test_target(test: PrintedTest, space: DesignSpace, n: int) -> TestTarget:
     if test.f is not None:
         f_low, f_high, scale = narrowed(test.f)
         low, high = max(low, f_low), min(high, f_high)
-    wanted = (low + high) / 2 if test.f is not None else None
-    return TestTarget(f"F {effect}", contrasts, low, high, scale, wanted)
+    start = (low + high) / 2 if test.f is not None else None
+    return TestTarget(f"F {effect}", contrasts, low, high, scale, start)
 
 
 def _pair_targets(pairs: PrintedPairs, space: DesignSpace, n: int) -> Iterator[TestTarget]:
@@ -147,9 +147,9 @@ def _ordered_places(
             if direction.within
             else [{}]
         )
-        for place in outer:
+        for at in outer:
             for a, b in pairwise(order):
-                yield {**place, factor: a}, {**place, factor: b}
+                yield {**at, factor: a}, {**at, factor: b}
     if direction.highest is not None:
         varied = [direction.vary] if direction.vary else list(direction.highest)
         for names in product(*[space.levels_of(factor) for factor in varied]):

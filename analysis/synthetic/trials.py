@@ -1,21 +1,25 @@
 """From cell sums to single ratings in the order of a visit: rows as the server exports them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.synthetic.space import DesignSpace
+from analysis.synthetic.steps import Steps
 from experiments.definition import Experiment
-from experiments.design import BlockSpec, ClipSpec, blocks, clips, exemplar_key
+from experiments.design import BlockSpec, ClipSpec, blocks, exemplar_key, rated_clips
 from experiments.schema.canonical import definition_sha256
 from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.scales import scale_called
+from experiments.trials.scales import RatedScale
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]
+
+WIDTH = 6
+"""Of the scales of Exp 1 to 3, from 1 to 7, in whose ratings the two spreads below are."""
 
 TRIAL_SD = 1.1
 """Spread of the ratings within a participant's cell before they are made to sum up."""
@@ -31,7 +35,8 @@ def split_sum(
     total: int, means: NDArray[np.float64], low: int, high: int, rng: np.random.Generator
 ) -> Integers:
     """Draw len(means) whole ratings in [low, high] around `means` that add up to `total`."""
-    ratings = np.clip(np.rint(means + rng.normal(size=len(means)) * TRIAL_SD), low, high).astype(np.int64)
+    sd = TRIAL_SD * (high - low) / WIDTH
+    ratings = np.clip(np.rint(means + rng.normal(size=len(means)) * sd), low, high).astype(np.int64)
     while (gap := total - int(ratings.sum())) != 0:
         movable = np.flatnonzero(ratings < high if gap > 0 else ratings > low)
         chosen = rng.permutation(movable)[: abs(gap)]
@@ -39,38 +44,75 @@ def split_sum(
     return ratings
 
 
-def rating_rows(
-    experiment: Experiment, space: DesignSpace, sums: Integers, rng: np.random.Generator
-) -> Iterator[Row]:
-    """Yield one mapping a trial with the columns of the CSV export, every one marked synthetic.
+class Totals(NamedTuple):
+    """Sums of the ratings of every cell on a scale, in its steps: (participants, cells) or (cells,)."""
 
-    `sums` (participants, cells) are the cells' sums of ratings, cells in the order of `space`.
+    scale: RatedScale
+    sums: Integers
+
+
+def rating_rows(
+    experiment: Experiment, space: DesignSpace, totals: Sequence[Totals], rng: np.random.Generator
+) -> Iterator[Row]:
+    """Yield one mapping a trial and scale with the columns of the CSV export, every one marked synthetic.
+
+    Parameters
+    ----------
+    totals : sequence of Totals
+        Of every scale in order, cells in the order of `space`.
     """
     cells = {
         frozenset(zip(space.factors, names, strict=True)): i for i, names in enumerate(product(*space.levels))
     }
     by_cell: list[list[ClipSpec]] = [[] for _ in cells]
-    for spec in clips(experiment):
+    rated = rated_clips(experiment)
+    for spec in rated:
         by_cell[cells[frozenset(spec.levels)]].append(spec)
-    own = {
-        key: rng.normal() * BLINK_SD
-        for key in sorted({exemplar_key(experiment, s) for s in clips(experiment)})
-    }
+    keys = sorted({exemplar_key(experiment, spec) for spec in rated})
+    own = [{key: rng.normal() * BLINK_SD for key in keys} for _ in totals]
     common = _common(experiment)
-    for person, row in enumerate(sums):
-        answers: dict[ClipSpec, list[int]] = {}
-        for specs, total in zip(by_cell, row, strict=True):
-            answers |= _cell_answers(experiment, specs, int(total), own, rng)
+    for person in range(len(totals[0].sums)):
+        answers = [
+            _answers(experiment, by_cell, Totals(scale, rows[person]), offsets, rng)
+            for (scale, rows), offsets in zip(totals, own, strict=True)
+        ]
         yield from _visit(experiment, f"S{person + 1:03d}", answers, common, rng)
 
 
+class OnScale(NamedTuple):
+    """A participant's ratings of every clip on one scale, those of repeats in any order."""
+
+    scale: RatedScale
+    ratings: dict[ClipSpec, list[float]]
+
+
+def _answers(
+    experiment: Experiment,
+    by_cell: list[list[ClipSpec]],
+    totals: Totals,
+    own: dict[str, float],
+    rng: np.random.Generator,
+) -> OnScale:
+    steps = Steps.of(totals.scale)
+    ratings: dict[ClipSpec, list[float]] = {}
+    for specs, total in zip(by_cell, totals.sums, strict=True):
+        for spec, drawn in _cell_answers(experiment, specs, int(total), steps, own, rng).items():
+            ratings[spec] = [steps.rating(k) for k in drawn]
+    return OnScale(totals.scale, ratings)
+
+
 def _cell_answers(
-    experiment: Experiment, specs: list[ClipSpec], total: int, own: dict[str, float], rng: np.random.Generator
+    experiment: Experiment,
+    specs: list[ClipSpec],
+    total: int,
+    steps: Steps,
+    own: dict[str, float],
+    rng: np.random.Generator,
 ) -> dict[ClipSpec, list[int]]:
-    repeats, scale = experiment.blocks.repeats, scale_called(experiment)
-    offsets = np.repeat([own[exemplar_key(experiment, spec)] for spec in specs], repeats)
+    repeats, unit = experiment.blocks.repeats, (steps.high - steps.low) / WIDTH
+    offsets = unit * np.repeat([own[exemplar_key(experiment, spec)] for spec in specs], repeats)
     means = total / len(offsets) + offsets - offsets.mean()
-    drawn = split_sum(total, means, round(scale.minimum), round(scale.maximum), rng)
+    drawn = split_sum(total, means, steps.low, steps.high, rng)
     return {spec: drawn[i * repeats : (i + 1) * repeats].tolist() for i, spec in enumerate(specs)}
 
 
@@ -86,6 +128,7 @@ def _common(experiment: Experiment) -> Row:
         "kind": "main",
         "play": 1,
         "changes": 0,
+        "not_applicable": 0,
         "method": "none",
         "verdict": "good",
         "focus_lost": 0,
@@ -111,19 +154,21 @@ def _block_order(experiment: Experiment, rng: np.random.Generator) -> list[Block
 def _visit(
     experiment: Experiment,
     participant: str,
-    answers: dict[ClipSpec, list[int]],
+    answers: list[OnScale],
     common: Row,
     rng: np.random.Generator,
 ) -> Iterator[Row]:
     index, clock = 0, 0.0
     empty = dict.fromkeys(name for name in RATINGS.names if name != "levels")
     for number, block in enumerate(_block_order(experiment, rng), start=1):
-        order = rng.permutation(len(block.clips))
+        rated = [spec for spec in block.clips if experiment.trial.rates(experiment, spec)]
+        order = rng.permutation(len(rated))
         times = np.round(MEDIAN_RT_MS * np.exp(0.35 * rng.normal(size=len(order))), 1)
         for position, rt in zip(order, times.tolist(), strict=True):
-            spec = block.clips[position]
-            clock += CLIP_MS + rt
-            yield {
+            spec = rated[position]
+            times_of = _scale_times(rt, len(answers), rng)
+            clock += CLIP_MS + times_of[-1]
+            trial = {
                 **empty,
                 **common,
                 **dict(spec.levels),
@@ -136,9 +181,21 @@ def _visit(
                 "exemplar": spec.exemplar,
                 "profile_id": exemplar_key(experiment, spec),
                 "stimulus": f"synthetic_{spec.cell.replace('/', '_')}_{spec.exemplar:03d}",
-                "response": answers[spec].pop(),
-                "rt": rt,
-                "rt_from_first_frame": round(CLIP_MS + rt, 1),
+                "rt": times_of[-1],
+                "rt_from_first_frame": round(CLIP_MS + times_of[-1], 1),
                 "time_elapsed": round(clock, 1),
             }
+            for (scale, ratings), scale_rt in zip(answers, times_of, strict=True):
+                yield {
+                    **trial,
+                    "scale": scale.name,
+                    "response": ratings[spec].pop(),
+                    "scale_rt": scale_rt if len(answers) > 1 else None,
+                }
             index += 1
+
+
+def _scale_times(first_ms: float, scales: int, rng: np.random.Generator) -> list[float]:
+    """Times in ms from the clip's end to the answer on each scale, one after the other."""
+    further = MEDIAN_RT_MS * np.exp(0.35 * rng.normal(size=scales - 1))
+    return [round(float(time), 1) for time in np.cumsum([first_ms, *further])]

@@ -2,7 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 
-from analysis.synthetic.published import Direction, Place, PrintedMean, PrintedTest, Published, decimals
+from analysis.synthetic.published import (
+    Direction,
+    MarginLevels,
+    PrintedMean,
+    PrintedTest,
+    Published,
+    decimals,
+)
 from analysis.synthetic.space import DesignSpace
 from experiments.errors import InputError
 
@@ -12,13 +19,15 @@ def with_wishes(
 ) -> Published:
     """Replace published figures by wishes.
 
-    Parameters
-    ----------
-    means : `factor.level=4.80` (several levels joined by commas: `blur.MB,amplitude.FC=4.9`).
-    effects : `blur:amplitude=20.35`, the multivariate F wanted; `=0` for no effect.
-
     Figures that would contradict a wish (the order and the pairs of its factors, a mean at the same place,
     the printed p of the same effect, the means of an effect wished away) are dropped; all others stay.
+
+    Parameters
+    ----------
+    means : sequence of str
+        `factor.level=4.80` (several levels joined by commas: `blur.MB,amplitude.FC=4.9`).
+    effects : sequence of str
+        `blur:amplitude=20.35`, the multivariate F wanted; `=0` for no effect.
     """
     wished_means = [_mean(text, space) for text in means]
     wished_tests = [_test(text, space) for text in effects]
@@ -46,7 +55,7 @@ def with_wishes(
 
 
 def _kept(
-    means: tuple[PrintedMean, ...], places: list[Place], gone: list[frozenset[str]]
+    means: tuple[PrintedMean, ...], places: list[MarginLevels], gone: list[frozenset[str]]
 ) -> Iterator[PrintedMean]:
     """Printed means at no wished place, and not of an effect that is wished away."""
     for mean in means:
@@ -56,13 +65,13 @@ def _kept(
 
 def _factors(direction: Direction) -> set[str]:
     places = (direction.higher, direction.lower, direction.order, direction.highest)
-    return {factor for place in places if place for factor in place}
+    return {factor for at in places if at for factor in at}
 
 
 def _mean(text: str, space: DesignSpace) -> PrintedMean:
-    place_text, found, value = text.rpartition("=")
+    place_text, sign, value = text.rpartition("=")
     parts = [part.strip().rpartition(".") for part in place_text.split(",")]
-    if not found or not all(factor and level for factor, _, level in parts):
+    if not sign or not all(factor and level for factor, _, level in parts):
         raise InputError(f"expected a mean as factor.level=4.80, got '{text}'")
     at = {factor: level for factor, _, level in parts}
     space.weights(at)
@@ -71,8 +80,8 @@ def _mean(text: str, space: DesignSpace) -> PrintedMean:
 
 
 def _test(text: str, space: DesignSpace) -> PrintedTest:
-    name, found, value = text.rpartition("=")
-    if not found:
+    name, sign, value = text.rpartition("=")
+    if not sign:
         raise InputError(f"expected an effect as blur:amplitude=20.35 (its F), got '{text}'")
     number = _number(value, text)
     return PrintedTest(

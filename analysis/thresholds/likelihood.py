@@ -34,6 +34,11 @@ class Interval:
     high: float | None
 
 
+def normal_density(eta: Array) -> Array:
+    """The standard normal density; scipy's takes ten times as long for a few values."""
+    return np.asarray(np.exp(-(eta**2) / 2) / np.sqrt(2 * np.pi), dtype=np.float64)
+
+
 def function(shape: Shape, x: Array, location: float, log_spread: float) -> Array:
     r"""Return the underlying F(x).
 
@@ -151,7 +156,9 @@ class Likelihood:
         x, n = self.trials.x, self.trials.n
         places = [float(np.average(x, weights=n)), float(np.quantile(x, 0.25))]
         spreads = [1.0, 4.0] if self.shape == "weibull" else [self.width / 3, self.width / 10]
-        return [np.array([place, np.log(spread), 0.02][:size]) for place in places for spread in spreads]
+        return [
+            np.array([location, np.log(spread), 0.02][:size]) for location in places for spread in spreads
+        ]
 
     def standard_error(self, best: Array) -> float | None:
         """Wald standard error of the location from the observed information; None where it has none."""
@@ -183,8 +190,8 @@ class Likelihood:
         )
 
     def _end(self, index: int, best: Array, value: float, step: float, bound: float) -> float | None:
-        def loss(place: float) -> float:
-            return 2 * (value - self.maximum({index: place}, best)[1]) - CHI2_95
+        def loss(location: float) -> float:
+            return 2 * (value - self.maximum({index: location}, best)[1]) - CHI2_95
 
         inside = float(best[index])
         while True:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.read.text_table import (
     TextTable,
@@ -29,7 +30,10 @@ NO = frozenset({"0", "no", "false", "wrong", "incorrect", "unseen", "n", "0.0"})
 class Answers:
     """Rows of a table: stimulus x (n,), answer 0 or 1 (n,), and names of person and condition (n,).
 
-    second: a second stimulus variable (n,), where there is one.
+    Attributes
+    ----------
+    second : float64 array or None
+        A second stimulus variable (n,), where there is one.
     """
 
     x: Array
@@ -53,23 +57,6 @@ class PersonThreshold:
 
 
 @dataclass(frozen=True)
-class MeanThreshold:
-    """Mean over people of their thresholds: a random-effects model of estimates with known errors.
-
-    tau is the SD between people (REML); the interval uses t with people - 1 degrees of freedom (Hartung &
-    Knapp 2001, Statistics in Medicine 20, 3875).
-    """
-
-    condition: str
-    people: int
-    mean: float
-    se: float
-    ci_low: float
-    ci_high: float
-    tau: float
-
-
-@dataclass(frozen=True)
 class Average:
     """Mean of estimates with known errors over people; see `average`."""
 
@@ -79,6 +66,17 @@ class Average:
     ci_low: float
     ci_high: float
     tau: float
+
+
+@dataclass(frozen=True)
+class MeanThreshold(Average):
+    """Mean over people of their thresholds: a random-effects model of estimates with known errors.
+
+    tau is the SD between people (REML); the interval uses t with people - 1 degrees of freedom (Hartung &
+    Knapp 2001, Statistics in Medicine 20, 3875).
+    """
+
+    condition: str
 
 
 @dataclass(frozen=True)
@@ -175,6 +173,14 @@ def fit_thresholds(
     InputError
         Where a condition cannot be fitted at all.
     """
+    # sums this short only wait for a second thread
+    with threadpool_limits(1, "blas"):
+        return _fitted(answers, shape, guess, lapse, falling)
+
+
+def _fitted(
+    answers: Answers, shape: Shape, guess: float, lapse: float | None, falling: bool | None
+) -> ThresholdsResult:
     labels = np.full(answers.x.size, "all", dtype=object) if answers.condition is None else answers.condition
     pooled: dict[str, Threshold] = {}
     people: list[PersonThreshold] = []
@@ -207,14 +213,13 @@ def with_population(
         raise InputError("--hierarchical needs --participant, the column that names the person")
     if lapse is None:
         raise InputError("--hierarchical holds the lapse rate; give it as a number, --lapse 0.02")
-    found = {}
+    populations, names = {}, answers.participant.astype(str)
     for condition, pooled in result.pooled.items():
         own = np.ones(answers.x.size, bool) if answers.condition is None else answers.condition == condition
-        people = sorted({str(name) for name in answers.participant[own]})
-        rows = [own & (answers.participant.astype(str) == name) for name in people]
+        rows = [own & (names == name) for name in sorted(set(names[own]))]
         trials = [counted(answers.x[one], answers.response[one]) for one in rows]
-        found[condition] = fit_population(trials, shape, guess, lapse, pooled.falling)
-    return replace(result, population=found)
+        populations[condition] = fit_population(trials, shape, guess, lapse, pooled.falling)
+    return replace(result, population=populations)
 
 
 def _people(
@@ -244,7 +249,7 @@ def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThresho
     own = [one.fit for one in people if one.condition == condition and one.fit is not None]
     known = [(fit.threshold, fit.threshold_se) for fit in own if fit.threshold_se]
     made = average(np.array([a for a, _ in known]), np.array([float(b or 0) for _, b in known]))
-    return None if made is None else MeanThreshold(condition, **vars(made))
+    return None if made is None else MeanThreshold(**vars(made), condition=condition)
 
 
 def average(y: Array, errors: Array) -> Average | None:
@@ -270,10 +275,10 @@ def average(y: Array, errors: Array) -> Average | None:
         )
 
     span = float(np.var(y)) + float(s2.mean())
-    found = optimize.minimize_scalar(
+    optimum = optimize.minimize_scalar(
         restricted, bounds=(np.log(span) - 25, np.log(span) + 3), method="bounded"
     )
-    tau2 = float(np.exp(found.x)) if found.fun < restricted(-np.inf) else 0.0
+    tau2 = float(np.exp(optimum.x)) if optimum.fun < restricted(-np.inf) else 0.0
     weights = 1 / (s2 + tau2)
     mean = float(np.sum(weights * y) / weights.sum())
     count = len(y)

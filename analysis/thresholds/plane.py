@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
-from analysis.thresholds.likelihood import CHI2_95, Interval
+from analysis.thresholds.likelihood import CHI2_95, Interval, normal_density
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -213,7 +213,7 @@ class _Link:
     def _share(self, eta: Array) -> tuple[Array, Array]:
         """P and dP/d eta."""
         if self.shape == "normal":
-            f, slope = special.ndtr(eta), np.exp(-0.5 * eta**2) / np.sqrt(2 * np.pi)
+            f, slope = special.ndtr(eta), normal_density(eta)
         else:
             f = special.expit(eta)
             slope = f * special.expit(-eta)
@@ -280,7 +280,10 @@ class _Link:
 class _Profiles:
     """Ends of the likelihood's profiles: the predictor is written so that one parameter is a constant.
 
-    best: b0, b1 and b2 of b0 + b1 x + b2 z at the maximum, from which every fit starts.
+    Attributes
+    ----------
+    best : (float, float, float)
+        b0, b1 and b2 of b0 + b1 x + b2 z at the maximum, from which every fit starts.
     """
 
     def __init__(

@@ -1,13 +1,14 @@
 """Thresholds over two stimulus variables: of every condition and person, and their means over people."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.thresholds.people import Answers, Average, average
 from analysis.thresholds.plane import Plane, PlaneShape, Points, counted_points, fit_plane
+from analysis.thresholds.plane_population import PEOPLE_MIN, PopulationPlane, fit_plane_population
 from experiments.errors import InputError
 
 
@@ -31,7 +32,21 @@ class PlaneMeans:
 
 @dataclass(frozen=True)
 class PlanesResult:
-    """Everything that is known of answers over two variables; `reasons` of conditions without a fit."""
+    """Everything that is known of answers over two variables, by condition.
+
+    Attributes
+    ----------
+    pooled : dict of str to Plane
+        Over all trials, as if one person had given them: too sure where people differ.
+    reasons : dict of str to str
+        Why a condition has no fit.
+    people : tuple of PersonPlane
+        Everybody's own fit.
+    means : dict of str to PlaneMeans
+        Over those who have a fit of their own.
+    population : dict of str to PopulationPlane
+        Over everybody, where they are three or more.
+    """
 
     pooled: dict[str, Plane]
     reasons: dict[str, str]
@@ -39,6 +54,7 @@ class PlanesResult:
     means: dict[str, PlaneMeans]
     n_trials: int
     decisions: tuple[str, ...]
+    population: dict[str, PopulationPlane] = field(default_factory=dict)
 
 
 def fit_planes(
@@ -50,11 +66,15 @@ def fit_planes(
     falling: bool | None = None,
     middle: float | None = None,
 ) -> PlanesResult:
-    """Fit every condition over all trials and, where people are named, every person in it.
+    """Fit every condition over all trials and, where people are named, every person in it and all together.
 
     Where it is not said whether the function is `falling`, the answers tell, without a guess rate alone.
-    middle: the second variable's number at which thresholds are given. Fits that are compared must share
-    it; halfway between the ends of these answers where it is not given.
+
+    Parameters
+    ----------
+    middle : float, optional
+        The second variable's number at which thresholds are given. Fits that are compared must share it;
+        halfway between the ends of these answers where it is not given.
 
     Raises
     ------
@@ -71,24 +91,27 @@ def fit_planes(
     pooled: dict[str, Plane] = {}
     reasons: dict[str, str] = {}
     people: list[PersonPlane] = []
+    population: dict[str, PopulationPlane] = {}
     for condition in sorted({str(label) for label in labels}):
         rows = labels == condition
         down = _falls(answers, rows, guess) if falling is None else falling
-        fit, reason = fitted(_points(answers, rows), shape, guess, lapse, down, middle)
+        fit, reason = fitted(points_of(answers, rows), shape, guess, lapse, down, middle)
         if fit is None:
             reasons[condition] = reason
         else:
             pooled[condition] = fit
-        for name in sorted({str(one) for one in names[rows]} - {""}):
-            mine = _points(answers, rows & (names == name))
+        every = {name: points_of(answers, rows & (names == name)) for name in sorted({*names[rows]} - {""})}
+        for name, mine in every.items():
             fitted_own = fitted(mine, shape, guess, lapse, down, middle, along=False)
-            people.append(PersonPlane(name, condition, *fitted_own))
+            people.append(PersonPlane(str(name), condition, *fitted_own))
+        if fit is not None and len(every) >= PEOPLE_MIN:
+            population[condition] = fit_plane_population(list(every.values()), fit)
     if not pooled:
         raise InputError(f"{answers.source}: {next(iter(reasons.values()))}")
     means = {
         condition: means_of([one for one in people if one.condition == condition]) for condition in pooled
     }
-    return PlanesResult(pooled, reasons, tuple(people), means, size, answers.decisions)
+    return PlanesResult(pooled, reasons, tuple(people), means, size, answers.decisions, population)
 
 
 def _falls(answers: Answers, rows: NDArray[np.bool_], guess: float) -> bool:
@@ -96,7 +119,8 @@ def _falls(answers: Answers, rows: NDArray[np.bool_], guess: float) -> bool:
     return guess == 0.0 and float(np.sum((x - x.mean()) * y)) < 0
 
 
-def _points(answers: Answers, rows: NDArray[np.bool_]) -> Points:
+def points_of(answers: Answers, rows: NDArray[np.bool_] | slice = slice(None)) -> Points:
+    """The answers of some rows counted by stimulus; of those over one variable the second is the first."""
     second = answers.x if answers.second is None else answers.second
     return counted_points(answers.x[rows], second[rows], answers.response[rows])
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special, stats
+from scipy import optimize, special
 
-from analysis.thresholds.likelihood import Array, Interval, Shape, Trials
+from analysis.thresholds.likelihood import CHI2_95, Array, Interval, Shape, Trials
 from experiments.errors import InputError
 
 NODES = 15
@@ -16,7 +16,6 @@ NODES = 15
 NEWTON_STEPS = 25
 STEP = 1e-4
 LOG_SD_MIN = -12.0
-CHI2_95 = float(stats.chi2.ppf(0.95, 1))
 SHAPES_WITH_POPULATION = ("normal", "logistic")
 
 
@@ -176,14 +175,14 @@ def _maximum(model: PopulationLikelihood, start: Array, width: float, mu: float 
     first = start / scale
     free = first if mu is None else first[1:]
     bounds = [(None, None), (LOG_SD_MIN + np.log(width), None), (None, None), (LOG_SD_MIN, 2.0)]
-    found = optimize.minimize(
+    optimum = optimize.minimize(
         negative,
         free,
         method="L-BFGS-B",
         bounds=bounds[4 - len(free) :],
         options={"ftol": 1e-12, "gtol": 1e-6},
     )
-    whole = found.x if mu is None else np.concatenate([[mu / width], found.x])
+    whole = optimum.x if mu is None else np.concatenate([[mu / width], optimum.x])
     return np.asarray(whole * scale)
 
 

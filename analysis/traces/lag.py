@@ -68,9 +68,9 @@ def event_train(events_s: Sequence[float], samples: int, rate_hz: float) -> Arra
     """(samples,) number of events in each sample's interval; an event belongs to the sample at its end."""
     train = np.zeros(samples)
     for time_s in events_s:
-        place = int(np.ceil(time_s * rate_hz - 1e-9))
-        if place < samples:
-            train[place] += 1.0
+        sample = int(np.ceil(time_s * rate_hz - 1e-9))
+        if sample < samples:
+            train[sample] += 1.0
     return train
 
 
@@ -98,16 +98,16 @@ def lag_of(clips: Sequence[ClipTraces], max_lag_s: float, seed: int = 0) -> LagR
     Each person's correlations are averaged over their clips that have events, then over people.
     """
     eventful = [clip for clip in clips if clip.events_s and clip.values.shape[1] > 2]
-    people = sorted({who for clip in eventful for who in clip.people})
+    people = sorted({person for clip in eventful for person in clip.people})
     if len(people) < 2:
         return None
     rate = eventful[0].rate_hz
     lags = int(min(max_lag_s * rate, min(clip.values.shape[1] for clip in eventful) - 1)) + 1
-    place = {who: index for index, who in enumerate(people)}
+    row_of = {person: index for index, person in enumerate(people)}
     sums, counts = np.zeros((len(people), lags)), np.zeros(len(people))
     for clip in eventful:
         train = event_train(clip.events_s, clip.values.shape[1], clip.rate_hz)
-        rows = [place[who] for who in clip.people]
+        rows = [row_of[person] for person in clip.people]
         np.add.at(sums, rows, correlogram(clip.values, train)[:, :lags])
         np.add.at(counts, rows, 1)
     each: Array = sums / counts[:, None]
@@ -174,8 +174,8 @@ def mean_trace(clips: Sequence[ClipTraces]) -> MeanTrace:
     samples = min(clip.values.shape[1] for clip in clips)
     of_person: dict[str, list[Array]] = {}
     for clip in clips:
-        for who, row in zip(clip.people, clip.values, strict=True):
-            of_person.setdefault(who, []).append(row[:samples])
+        for person, row in zip(clip.people, clip.values, strict=True):
+            of_person.setdefault(person, []).append(row[:samples])
     rows = np.array([np.mean(traces, axis=0) for traces in of_person.values()])
     mean, low, high = _interval(rows)
     level, level_low, level_high = (float(one[0]) for one in _interval(rows.mean(axis=1, keepdims=True)))

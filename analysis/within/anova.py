@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
@@ -51,9 +52,9 @@ class AnovaResult:
 
     def effect(self, name: str) -> Effect:
         """Return the effect called `name`, its factors in any order."""
-        wanted = frozenset(name.split(":"))
+        factors = frozenset(name.split(":"))
         for effect in self.effects:
-            if effect.effect == name or frozenset(effect.factors) == wanted:
+            if effect.effect == name or frozenset(effect.factors) == factors:
                 return effect
         raise InputError(
             f"no effect is called '{name}'; effects: {', '.join(e.effect for e in self.effects)}"
@@ -147,11 +148,7 @@ def linear_anova(
     cells = _checked(y, factors, levels)
     n, k = len(cells), cells[0].size
     floor = n * k * (8 * np.finfo(float).eps * float(np.abs(cells).max())) ** 2
-    people = cells.reshape(n, -1).mean(axis=1)
-    rotated = rotate(cells - people.reshape(-1, *[1] * len(factors)))
-    strata: dict[tuple[int, ...], Floats] = {(): np.sqrt(k) * (people - people.mean())[:, None]}
-    strata |= {m: effect_scores(rotated, m) for m in effect_members(len(factors))}
-    scores, total = _scores(strata, between, sum_of_squares, floor)
+    scores, total = _scores(cells, between, sum_of_squares, floor)
     if not scores:
         raise InputError("expected a factor or a covariate; name one with --within, --between or --covariate")
     names = levels or [[str(i + 1) for i in range(size)] for size in cells.shape[1:]]
@@ -168,20 +165,43 @@ def linear_anova(
     )
 
 
+def contrast_strata(cells: Floats) -> dict[tuple[int, ...], Floats]:
+    """Contrast scores (N, q) of cell means (N, a, b, ...), by the positions of the within factors.
+
+    The scores at `()` are those between participants: their means, centred, in units of one cell.
+    """
+    every, columns = _all_scores(cells)
+    return {members: every[:, own] for members, own in columns.items()}
+
+
+def _all_scores(cells: Floats) -> tuple[Floats, dict[tuple[int, ...], slice]]:
+    """Every contrast score (N, K) side by side, and the columns of each set of within factors."""
+    n, k = len(cells), cells[0].size
+    people = cells.reshape(n, -1).mean(axis=1)
+    rotated = rotate(cells - people.reshape(-1, *[1] * (cells.ndim - 1)))
+    parts: dict[tuple[int, ...], Floats] = {(): np.sqrt(k) * (people - people.mean())[:, None]}
+    parts |= {m: effect_scores(rotated, m) for m in effect_members(cells.ndim - 1)}
+    ends = list(accumulate(part.shape[1] for part in parts.values()))
+    columns = {m: slice(end - part.shape[1], end) for (m, part), end in zip(parts.items(), ends, strict=True)}
+    return np.concatenate(list(parts.values()), axis=1), columns
+
+
 def _scores(
-    strata: dict[tuple[int, ...], Floats], between: BetweenDesign, sum_of_squares: int, floor: float
+    cells: Floats, between: BetweenDesign, sum_of_squares: int, floor: float
 ) -> tuple[list[Scores], dict[tuple[int, ...], float]]:
     """Scores of every effect, those of fewer factors first, and the error sum of squares of every stratum."""
+    z, columns = _all_scores(cells)
     basis = np.linalg.qr(between.matrix)[0]
-    directions = term_directions(between, sum_of_squares)
     df, scores, total = len(basis) - basis.shape[1], [], {}
-    for members, z in strata.items():
-        residual = z - basis @ (basis.T @ z)
-        error = error_scores(residual - basis @ (basis.T @ residual), members, df, floor)
+    residual = z - basis @ (basis.T @ z)
+    residual = residual - basis @ (basis.T @ residual)
+    directed = [rows @ z for rows in term_directions(between, sum_of_squares)]
+    for members, own in columns.items():
+        error = error_scores(residual[:, own], members, df, floor)
         total[members] = error.ss
-        for term, rows in zip(between.terms, directions, strict=True):
+        for term, along in zip(between.terms, directed, strict=True):
             if term or members:
-                scores.append(hypothesis_scores(rows @ z, term, error, floor))
+                scores.append(hypothesis_scores(along[:, own], term, error, floor))
     return sorted(scores, key=lambda s: len(s.between) + len(s.error.members)), total
 
 

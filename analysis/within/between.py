@@ -16,6 +16,9 @@ Integers = NDArray[np.int64]
 RANK_RATIO = 1e-9
 """A column whose part outside the others is smaller than this share of it adds nothing to them."""
 
+WELL_CONDITIONED = 1e-4
+"""Ratio of singular values above which a design is taken apart by one QR for all of its terms."""
+
 
 @dataclass(frozen=True)
 class Covariate:
@@ -187,6 +190,8 @@ def _refuse_deficient(
             f"expected more participants than coefficients between participants, got {n} for {p}; "
             "the tests have no error term"
         )
+    if _well_conditioned(matrix):
+        return
     for term, own in zip(terms, columns, strict=True):
         others = np.delete(matrix, own, axis=1)
         if others.shape[1] and len(_outside(matrix[:, own], others)[0]) < len(own):
@@ -211,13 +216,39 @@ def term_directions(design: BetweenDesign, sum_of_squares: int) -> list[Floats]:
     Type III: what the term adds to all other terms. Type II: what it adds to all terms that do not contain
     it, so that the intercept adds to nothing. For scores z the hypothesis matrix is (U z)' (U z).
     """
-    directions = []
-    for term, own in zip(design.terms, design.columns, strict=True):
-        others = [
-            column
-            for other, columns in zip(design.terms, design.columns, strict=True)
-            if other != term and (sum_of_squares == 3 or not set(term) <= set(other))
-            for column in columns
-        ]
-        directions.append(_outside(design.matrix[:, own], design.matrix[:, others])[0])
-    return directions
+    if sum_of_squares == 3:
+        basis, upper = np.linalg.qr(design.matrix)
+        if _well_conditioned(upper):
+            # the rows of X^+ that belong to a term are what it adds to all others
+            inverse = np.linalg.solve(upper, basis.T)
+            return [_orthonormal(inverse[list(own)]) for own in design.columns]
+    return [
+        _outside(design.matrix[:, own], design.matrix[:, reduced_columns(design, term, sum_of_squares)])[0]
+        for term, own in zip(design.terms, design.columns, strict=True)
+    ]
+
+
+def _orthonormal(rows: Floats) -> Floats:
+    """Orthonormal rows that span the same."""
+    if len(rows) == 1:
+        return np.asarray(rows / np.sqrt(np.vdot(rows, rows)))
+    return np.linalg.qr(rows.T)[0].T
+
+
+def _well_conditioned(matrix: Floats) -> bool:
+    """Whether columns, scaled to length one, are so far from dependent that no digit that counts is lost."""
+    lengths = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
+    if not (lengths > 0).all():
+        return False
+    singular = np.linalg.svd(matrix / lengths, compute_uv=False)
+    return bool(singular[-1] > WELL_CONDITIONED * singular[0])
+
+
+def reduced_columns(design: BetweenDesign, term: tuple[str, ...], sum_of_squares: int) -> list[int]:
+    """Columns of the model without a term that it is tested against; of type II without what contains it."""
+    return [
+        column
+        for other, columns in zip(design.terms, design.columns, strict=True)
+        if other != term and (sum_of_squares == 3 or not set(term) <= set(other))
+        for column in columns
+    ]

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -68,9 +69,12 @@ def cell_table(
 
     Parameters
     ----------
-    rows : one row a trial; `participant` and `within` columns hold text, `rating` finite numbers.
-    within : factor columns, in the order wanted.
-    levels : declared levels of some or all factors, in order; the levels found, sorted, for the others.
+    rows : DataFrame
+        One row a trial; `participant` and `within` columns hold text, `rating` finite numbers.
+    within : sequence of str
+        Factor columns, in the order wanted.
+    levels : mapping of str to sequence of str, optional
+        Declared levels of some or all factors, in order; the levels found, sorted, for the others.
 
     Raises
     ------
@@ -82,26 +86,35 @@ def cell_table(
             raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
     if rows.empty:
         raise InputError("there are no ratings to analyse; the table has a header but no rows")
-    who, people = _codes(rows[participant], None, participant)
+    person, people = _codes(rows[participant], None, participant)
     coded = [_codes(rows[name], (levels or {}).get(name), name) for name in within]
     shape = tuple(len(names) for _, names in coded)
-    cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape) if within else np.zeros_like(who)
+    cell = (
+        np.ravel_multi_index(tuple(codes for codes, _ in coded), shape) if within else np.zeros_like(person)
+    )
     values = rows[rating].to_numpy(dtype=np.float64)
-    slot, slots = who * int(np.prod(shape)) + cell, len(people) * int(np.prod(shape))
+    slot, slots = person * int(np.prod(shape)) + cell, len(people) * int(np.prod(shape))
     counts = np.bincount(slot, minlength=slots).reshape(len(people), *shape)
     sums: Floats = np.zeros(counts.shape)
     sums += np.bincount(slot, weights=values, minlength=slots).reshape(counts.shape)
     return _complete(
-        people, list(within), [names for _, names in coded], sums, counts, _constant(who, values)
+        people, list(within), [names for _, names in coded], sums, counts, _constant(person, values)
     )
+
+
+def factorized(column: pd.Series) -> tuple[Integers, Sequence[Any]]:
+    """Codes (n,) of a column into its values, in the order in which these appear; -1 where one is missing."""
+    # of the array itself: an index of the values would take longer than the codes
+    codes, values = pd.factorize(column.to_numpy() if isinstance(column.dtype, np.dtype) else column.array)
+    return np.asarray(codes, dtype=np.int64), list(values)
 
 
 def _codes(column: pd.Series, declared: Sequence[str] | None, name: str) -> tuple[Integers, list[str]]:
     """Codes of a column into its sorted (or declared) names."""
-    codes, found = pd.factorize(column)
+    codes, uniques = factorized(column)
     if (codes < 0).any():
         raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
-    texts = [str(text) for text in found]
+    texts = [str(text) for text in uniques]
     names = natural_order(texts) if declared is None else [str(level) for level in declared]
     position = {text: i for i, text in enumerate(names)}
     for text in texts:
@@ -111,11 +124,11 @@ def _codes(column: pd.Series, declared: Sequence[str] | None, name: str) -> tupl
     return lookup[codes], names
 
 
-def _constant(who: Integers, values: Floats) -> NDArray[np.bool_]:
+def _constant(person: Integers, values: Floats) -> NDArray[np.bool_]:
     """Which participants gave one and the same rating throughout (and more than one)."""
-    number = np.bincount(who)
-    mean = np.bincount(who, weights=values) / number
-    deviation = np.bincount(who, weights=(values - mean[who]) ** 2)
+    number = np.bincount(person)
+    mean = np.bincount(person, weights=values) / number
+    deviation = np.bincount(person, weights=(values - mean[person]) ** 2)
     return (deviation <= 1e-20 * np.maximum(mean**2, 1.0)) & (number > 1)
 
 

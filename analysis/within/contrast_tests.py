@@ -103,14 +103,14 @@ def polynomial_weights(values: Sequence[float]) -> Floats:
 
 def trends(result: AnovaResult) -> tuple[Contrast, ...]:
     """Polynomial trends of every factor with three or more levels whose names are all numbers."""
-    found: list[Contrast] = []
+    contrasts: list[Contrast] = []
     for factor, levels in zip(result.all_factors, result.all_levels, strict=True):
         values = _as_numbers(levels)
         if values is None or len(levels) < 3:
             continue
         weights = polynomial_weights(values)[: len(DEGREES)]
-        found += contrasts_of(result, factor, list(zip(DEGREES, weights.tolist(), strict=False)))
-    return tuple(found)
+        contrasts += contrasts_of(result, factor, list(zip(DEGREES, weights.tolist(), strict=False)))
+    return tuple(contrasts)
 
 
 def _as_numbers(levels: Sequence[str]) -> list[float] | None:
@@ -127,14 +127,14 @@ def equivalence(
     """Test every pair for equivalence within (low, high); pairs that do not vary are left out."""
     if not low < 0 < high:
         raise InputError(f"expected bounds around zero, like -0.5,0.5, got {low:g} and {high:g}")
-    found = []
+    tests = []
     for pair in pairs:
         if not np.isfinite(pair.t):
             continue
         lower = float(special.stdtr(pair.df, -(pair.difference - low) / pair.se))
         upper = float(special.stdtr(pair.df, (pair.difference - high) / pair.se))
         reach = float(special.stdtrit(pair.df, 1 - alpha)) * pair.se
-        found.append(
+        tests.append(
             Equivalence(
                 effect=pair.effect,
                 level_a=pair.level_a,
@@ -147,4 +147,4 @@ def equivalence(
                 ci=(pair.difference - reach, pair.difference + reach),
             )
         )
-    return tuple(found)
+    return tuple(tests)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from analysis.within.contrasts import effect_name
-from analysis.within.eta_squared import partial_eta_squared, partial_eta_squared_ci
-from analysis.within.multivariate import FourStatistics, four_statistics
+from analysis.within.eta_squared import SizeIntervals
+from analysis.within.multivariate import FourStatistics, exact_statistics, four_statistics
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +48,8 @@ class MultivariateTest:
 
     F, its df and p are exact and the same for all four where the effect has one direction between
     participants or one contrast within; else they are Pillai's, and `statistics` has those of each.
-    `eta_sq_partial` is V / s = F df1 / (F df1 + df2), the size that belongs to this F.
+    `eta_sq_partial` is V / s = F df1 / (F df1 + df2), the size that belongs to this F; `sizes` and `at` know
+    its interval.
     """
 
     pillai: float
@@ -60,9 +61,15 @@ class MultivariateTest:
     df_error: int
     p_value: float
     eta_sq_partial: float
-    eta_sq_partial_ci: tuple[float, float]
     exact: bool
     statistics: FourStatistics
+    sizes: SizeIntervals = field(repr=False, compare=False)
+    at: int = field(repr=False, compare=False)
+
+    @property
+    def eta_sq_partial_ci(self) -> tuple[float, float]:
+        """Interval of `eta_sq_partial`."""
+        return self.sizes.interval(self.at)
 
 
 @dataclass(frozen=True)
@@ -92,9 +99,15 @@ class Effect:
     mauchly: Mauchly | None
     mauchly_reason: str | None
     eta_sq_partial: float
-    eta_sq_partial_ci: tuple[float, float]
     eta_sq_generalized: float
     omega_sq_partial: float
+    sizes: SizeIntervals = field(repr=False, compare=False)
+    at: int = field(repr=False, compare=False)
+
+    @property
+    def eta_sq_partial_ci(self) -> tuple[float, float]:
+        """Interval of `eta_sq_partial`."""
+        return self.sizes.interval(self.at)
 
 
 @dataclass(frozen=True)
@@ -175,7 +188,10 @@ def hypothesis_scores(directed: Floats, between: tuple[str, ...], error: ErrorSc
         return Scores(between, error, rank, ss, np.empty(0), NO_ERROR if ss else NO_VARIANCE)
     if error.whiten is None:
         return Scores(between, error, rank, ss, np.empty(0), error.reason)
-    roots: Floats = np.asarray(np.linalg.svd(directed @ error.whiten, compute_uv=False), dtype=np.float64)
+    whitened = directed @ error.whiten
+    if 1 in whitened.shape:
+        return Scores(between, error, rank, ss, np.array([np.vdot(whitened, whitened)]), None)
+    roots: Floats = np.asarray(np.linalg.svd(whitened, compute_uv=False), dtype=np.float64)
     return Scores(between, error, rank, ss, roots**2, None)
 
 
@@ -186,40 +202,54 @@ def effects_of(
 
     `factors` are the within factors; `ss_error_total` is the sum of the errors of all strata.
     """
-    univariate = _univariate(scores)
-    multivariate = _multivariate(scores, confidence)
-    ss, ss_error = np.array([s.ss for s in scores]), np.array([s.error.ss for s in scores])
-    f = np.array([u.f_value for u in univariate])
-    d1, d2 = np.array([(u.df_effect, u.df_error) for u in univariate], dtype=np.float64).T
-    shrink = np.nan_to_num(np.array([s.error.epsilon for s in scores]), nan=1.0)
-    eta = partial_eta_squared(ss, ss_error)
-    ci = partial_eta_squared_ci(f, d1 * shrink, d2 * shrink, confidence)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        generalized = ss / (ss + ss_error_total)
-        omega = (f - 1) * d1 / (f * d1 + d2 + 1)
-    return tuple(
-        Effect(
-            effect=effect_name([*s.between, *(factors[m] for m in s.error.members)]),
-            factors=(*s.between, *(factors[m] for m in s.error.members)),
-            between=s.between,
-            within=tuple(factors[m] for m in s.error.members),
-            univariate=univariate[i],
-            univariate_reason=s.reason if s.error.ss == 0 else None,
-            multivariate=multivariate[i],
-            multivariate_reason=s.reason,
-            mauchly=_mauchly(s.error),
-            mauchly_reason="one contrast: sphericity holds by definition" if s.error.q == 1 else s.reason,
-            eta_sq_partial=float(eta[i]),
-            eta_sq_partial_ci=(float(ci[i, 0]), float(ci[i, 1])),
-            eta_sq_generalized=float(generalized[i]),
-            omega_sq_partial=float(omega[i]),
-        )
-        for i, s in enumerate(scores)
-    )
-
-
-def _univariate(scores: Sequence[Scores]) -> list[UnivariateTest]:
     columns = np.array([(s.ss, s.error.ss, s.rank, s.error.q, s.error.df, s.error.epsilon) for s in scores])
+    univariate = _univariate(scores, columns)
+    f, d1, d2 = np.array([(u.f_value, u.df_effect, u.df_error) for u in univariate], dtype=np.float64).T
+    ss, ss_error, shrink = columns[:, 0], columns[:, 1], np.nan_to_num(columns[:, 5], nan=1.0)
+    four = _four_statistics(scores)
+    first = np.array(
+        [
+            (np.nan,) * 3 if one is None else (one.pillai.f_value, one.pillai.df_effect, one.pillai.df_error)
+            for one in four
+        ]
+    )
+    sizes = SizeIntervals(
+        np.concatenate([f, first[:, 0]]),
+        np.concatenate([d1 * shrink, first[:, 1]]),
+        np.concatenate([d2 * shrink, first[:, 2]]),
+        confidence,
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        eta = (ss / (ss + ss_error)).tolist()
+        generalized = (ss / (ss + ss_error_total)).tolist()
+        omega = ((f - 1) * d1 / (f * d1 + d2 + 1)).tolist()
+    effects = []
+    for i, (s, u) in enumerate(zip(scores, univariate, strict=True)):
+        within = tuple(factors[m] for m in s.error.members)
+        named, statistics = (*s.between, *within), four[i]
+        effects.append(
+            Effect(
+                effect=effect_name(named),
+                factors=named,
+                between=s.between,
+                within=within,
+                univariate=u,
+                univariate_reason=s.reason if s.error.ss == 0 else None,
+                multivariate=None if statistics is None else _one_test(statistics, s, sizes, len(scores) + i),
+                multivariate_reason=s.reason,
+                mauchly=_mauchly(s.error),
+                mauchly_reason="one contrast: sphericity holds by definition" if s.error.q == 1 else s.reason,
+                eta_sq_partial=eta[i],
+                eta_sq_generalized=generalized[i],
+                omega_sq_partial=omega[i],
+                sizes=sizes,
+                at=i,
+            )
+        )
+    return tuple(effects)
+
+
+def _univariate(scores: Sequence[Scores], columns: Floats) -> list[UnivariateTest]:
     ss, ss_error, r, q, nu, gg = columns.T
     with np.errstate(invalid="ignore", divide="ignore"):
         f = np.where(ss_error > 0, (ss / (r * q)) / (ss_error / (q * nu)), np.nan)
@@ -229,49 +259,49 @@ def _univariate(scores: Sequence[Scores]) -> list[UnivariateTest]:
     used = np.where(np.isnan(hf), 1.0, np.minimum(1.0, hf))
     shrink = np.stack([np.ones_like(q), gg, used])
     df1, df2 = shrink * r * q, shrink * q * nu
-    p, p_gg, p_hf = special.fdtrc(df1, df2, f)
+    p, p_gg, p_hf = special.fdtrc(df1, df2, f).tolist()
+    (_, d1_gg, d1_hf), (_, d2_gg, d2_hf) = df1.tolist(), df2.tolist()
+    f_values, hf_values = f.tolist(), hf.tolist()
     return [
         UnivariateTest(
             ss=s.ss,
             ss_error=s.error.ss,
             df_effect=s.rank * s.error.q,
             df_error=s.error.q * s.error.df,
-            f_value=float(f[i]),
-            p_value=float(p[i]),
+            f_value=f_values[i],
+            p_value=p[i],
             epsilon_gg=s.error.epsilon,
-            p_gg=float(p_gg[i]),
-            epsilon_hf=float(hf[i]),
-            p_hf=float(p_hf[i]),
-            df_effect_gg=float(df1[1, i]),
-            df_error_gg=float(df2[1, i]),
-            df_effect_hf=float(df1[2, i]),
-            df_error_hf=float(df2[2, i]),
+            p_gg=p_gg[i],
+            epsilon_hf=hf_values[i],
+            p_hf=p_hf[i],
+            df_effect_gg=d1_gg[i],
+            df_error_gg=d2_gg[i],
+            df_effect_hf=d1_hf[i],
+            df_error_hf=d2_hf[i],
         )
         for i, s in enumerate(scores)
     ]
 
 
-def _multivariate(scores: Sequence[Scores], confidence: float) -> list[MultivariateTest | None]:
-    every = [
-        None if s.reason else four_statistics(s.eigenvalues, s.error.q, s.rank, s.error.df) for s in scores
+def _four_statistics(scores: Sequence[Scores]) -> list[FourStatistics | None]:
+    """The statistics of each effect that has them; those with one exact F are computed together."""
+    exact = [i for i, s in enumerate(scores) if s.reason is None and 1 in (s.rank, s.error.q)]
+    dimensions = np.array(
+        [(scores[i].eigenvalues[0], scores[i].error.q, scores[i].rank, scores[i].error.df) for i in exact]
+    ).reshape(-1, 4)
+    together = dict(zip(exact, exact_statistics(*dimensions.T), strict=True))
+    return [
+        None
+        if s.reason is not None
+        else together[i]
+        if i in together
+        else four_statistics(s.eigenvalues, s.error.q, s.rank, s.error.df)
+        for i, s in enumerate(scores)
     ]
-    known = [i for i, four in enumerate(every) if four is not None]
-    triples = [(four.pillai.f_value, four.pillai.df_effect, four.pillai.df_error) for four in every if four]
-    tests: list[MultivariateTest | None] = [None] * len(every)
-    if not triples:
-        return tests
-    f_value, df_effect, df_error = np.array(triples).T
-    intervals = partial_eta_squared_ci(f_value, df_effect, df_error, confidence)
-    for i, interval in zip(known, intervals, strict=True):
-        four = every[i]
-        if four is not None:
-            smaller = min(scores[i].rank, scores[i].error.q)
-            tests[i] = _one_test(four, smaller, (float(interval[0]), float(interval[1])))
-    return tests
 
 
-def _one_test(four: FourStatistics, smaller: int, interval: tuple[float, float]) -> MultivariateTest:
-    first = four.pillai
+def _one_test(four: FourStatistics, scores: Scores, sizes: SizeIntervals, at: int) -> MultivariateTest:
+    first, smaller = four.pillai, min(scores.rank, scores.error.q)
     return MultivariateTest(
         pillai=first.value,
         wilks=four.wilks.value,
@@ -282,9 +312,10 @@ def _one_test(four: FourStatistics, smaller: int, interval: tuple[float, float])
         df_error=round(first.df_error),
         p_value=first.p_value,
         eta_sq_partial=first.value / smaller,
-        eta_sq_partial_ci=interval,
         exact=smaller == 1,
         statistics=four,
+        sizes=sizes,
+        at=at,
     )
 
 

@@ -13,12 +13,6 @@ _STEPS = 80
 _RELATIVE_CHANGE = 1e-13
 
 
-def partial_eta_squared(ss: Floats, ss_error: Floats) -> Floats:
-    """SS / (SS + SSE); NaN where both are zero."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray(ss / (ss + ss_error), dtype=np.float64)
-
-
 def noncentrality(f_value: Floats, df_effect: Floats, df_error: Floats, tail: Floats) -> Floats:
     """Solve P(F'(df_effect, df_error, L) <= f_value) = tail for L; 0 where no L >= 0 does.
 
@@ -63,8 +57,10 @@ def partial_eta_squared_ci(
 
     Parameters
     ----------
-    f_value, df_effect, df_error : (m,) univariate F with its uncorrected df; NaN gives NaN.
-    confidence : coverage of the two-sided interval.
+    f_value, df_effect, df_error : float64 array (m,)
+        Univariate F with its uncorrected df; NaN gives NaN.
+    confidence : float, optional
+        Coverage of the two-sided interval.
 
     Returns
     -------
@@ -78,3 +74,30 @@ def partial_eta_squared_ci(
     size = noncentrality(f[known, None], d1[known, None], d2[known, None], tails)
     interval[known] = size / (size + (d1 + d2 + 1.0)[known, None])
     return interval
+
+
+class SizeIntervals:
+    """Intervals of partial eta squared of several F, computed together when the first is asked for.
+
+    Parameters
+    ----------
+    f_value, df_effect, df_error : (m,) array
+        As in `partial_eta_squared_ci`.
+    confidence : float
+        Coverage.
+    """
+
+    def __init__(self, f_value: Floats, df_effect: Floats, df_error: Floats, confidence: float) -> None:
+        self._tests = np.stack([f_value, df_effect, df_error], axis=1)
+        self._confidence = confidence
+        self._known: list[tuple[float, float]] | None = None
+
+    def interval(self, at: int) -> tuple[float, float]:
+        """Lower and upper bound of the F at a position."""
+        if self._known is None:
+            # with one contrast the univariate and the multivariate test are one
+            once, back = np.unique(self._tests, axis=0, return_inverse=True)
+            f_value, df_effect, df_error = once.T
+            bounds = partial_eta_squared_ci(f_value, df_effect, df_error, self._confidence)[back.reshape(-1)]
+            self._known = [(low, high) for low, high in bounds.tolist()]
+        return self._known[at]

@@ -85,6 +85,39 @@ def four_statistics(eigenvalues: Floats, responses: int, df_hypothesis: int, df_
     )
 
 
+def exact_statistics(
+    eigenvalues: Floats, responses: Floats, df_hypothesis: Floats, df_error: Floats
+) -> list[FourStatistics]:
+    r"""Statistics of hypotheses with one eigenvalue each, where all four have one exact F.
+
+    Parameters
+    ----------
+    eigenvalues, responses, df_hypothesis, df_error : (m,) array
+        As in `four_statistics`; min(p, r) = 1.
+
+    Notes
+    -----
+    :math:`F = \lambda (\nu - p + 1) / \max(p, r)` on :math:`\max(p, r), \nu - p + 1`: every form of
+    `four_statistics` with s = 1.
+    """
+    df1, df2 = np.maximum(responses, df_hypothesis), df_error - responses + 1
+    f_value = eigenvalues * df2 / df1
+    columns = (
+        eigenvalues / (1 + eigenvalues),
+        1 / (1 + eigenvalues),
+        eigenvalues,
+        f_value,
+        df1,
+        df2,
+        special.fdtrc(df1, df2, f_value),
+    )
+    every = []
+    for pillai, wilks, root, *test in zip(*(column.tolist() for column in columns), strict=True):
+        largest = Statistic(root, *test)
+        every.append(FourStatistics(Statistic(pillai, *test), Statistic(wilks, *test), largest, largest))
+    return every
+
+
 def _with_p(value: float, f_value: float, df_effect: float, df_error: float) -> Statistic:
     known = df_error > 0
     p_value = float(special.fdtrc(df_effect, df_error, f_value)) if known else float("nan")

@@ -121,7 +121,7 @@ def main_p(effect: Effect) -> float:
 
 def _of_interaction(result: AnovaResult, effect: Effect) -> list[SimpleEffect]:
     levels = dict(zip(result.all_factors, result.all_levels, strict=True))
-    found: list[SimpleEffect] = []
+    effects: list[SimpleEffect] = []
     for of in effect.factors:
         others = [name for name in effect.factors if name != of]
         places = [dict(zip(others, at, strict=True)) for at in product(*(levels[o] for o in others))]
@@ -129,8 +129,8 @@ def _of_interaction(result: AnovaResult, effect: Effect) -> list[SimpleEffect]:
             continue
         tests = [simple_effect(result, of, at) for at in places]
         p = np.array([main_p(test) for test in tests])
-        found += [
+        effects += [
             SimpleEffect(effect.effect, of, at, test, float(one), float(adjusted))
             for at, test, one, adjusted in zip(places, tests, p, holm(p), strict=True)
         ]
-    return found
+    return effects

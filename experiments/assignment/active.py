@@ -40,8 +40,12 @@ class Stored:
 
     Attributes
     ----------
-    answered: comparisons with an answer; won: how many of them the first item won, a tie counting half.
-    open: comparisons that were dealt to people who are still under way.
+    answered : float
+        Comparisons with an answer.
+    won : float
+        How many of them the first item won, a tie counting half.
+    open : int
+        Comparisons that were dealt to people who are still under way.
     """
 
     answered: float = 0.0
@@ -99,11 +103,11 @@ def posterior(items: int, stored: Mapping[Edge, Stored]) -> Posterior:
             furthest = max(furthest, abs(step))
         if furthest < CLOSE_ENOUGH:
             break
-    found = Posterior(scores, precision)
+    posterior = Posterior(scores, precision)
     for edge, count in stored.items():
         if count.open:
-            found.expect(edge, count.open)
-    return found
+            posterior.expect(edge, count.open)
+    return posterior
 
 
 def batch(
@@ -113,8 +117,16 @@ def batch(
 
     Parameters
     ----------
-    items: how many there are, called 0 to `items` - 1. edges: the pairs that may be compared.
-    stored: what is stored of each. number: of pairs to choose. rng: breaks ties.
+    items : int
+        How many there are, called 0 to `items` - 1.
+    edges : sequence of Edge
+        The pairs that may be compared.
+    stored : mapping of Edge to Stored
+        What is stored of each.
+    number : int
+        Of pairs to choose.
+    rng : random.Random
+        Breaks ties.
     """
     known = posterior(items, stored)
     shuffled = rng.sample(list(edges), len(edges))

@@ -16,8 +16,10 @@ def with_checks(experiment: "Experiment", trials: Sequence[Trial], seed: int, av
 
     Parameters
     ----------
-    seed: of the run; the order of the other trials does not depend on the checks.
-    available: how many check clips there are; none is drawn twice.
+    seed : int
+        Of the run; the order of the other trials does not depend on the checks.
+    available : int
+        How many check clips there are; none is drawn twice.
     """
     per_block = experiment.evidence.motion_checks.per_block
     if not per_block or not available:
@@ -28,10 +30,10 @@ def with_checks(experiment: "Experiment", trials: Sequence[Trial], seed: int, av
     for block, members in groupby(trials, lambda trial: trial.block):
         inside = list(members)
         places = rng.sample(range(1, len(inside) + 1), min(per_block, len(inside))) if block else []
-        for place in sorted(places, reverse=True):
+        for position in sorted(places, reverse=True):
             number = next(drawn, None)
             if number is not None:
                 label = inside[0].block_label
-                inside.insert(place, Trial("check", block, label, check=number))
+                inside.insert(position, Trial("check", block, label, check=number))
         planned.extend(inside)
     return planned

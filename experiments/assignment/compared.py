@@ -6,8 +6,14 @@ from typing import Literal, NamedTuple
 class Compared(NamedTuple):
     """Comparisons of two clips, equal in side and answer.
 
-    left, right: the clips as lists name them, cell and exemplar joined by a slash. winner: None where the
-    pair was dealt to somebody who is still under way. times: how many such comparisons there are.
+    Attributes
+    ----------
+    left, right : str
+        The clips as lists name them, cell and exemplar joined by a slash.
+    winner : {"left", "right", "tie"} or None
+        None where the pair was dealt to somebody who is still under way.
+    times : int
+        How many such comparisons there are.
     """
 
     left: str

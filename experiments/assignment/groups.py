@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 
-class Place(NamedTuple):
+class Seat(NamedTuple):
     """Where a participant stands: the levels of their group, and their place in it, from 0."""
 
     levels: tuple[tuple[str, str], ...]
@@ -34,10 +34,10 @@ def names(experiment: "Experiment") -> list[str]:
     return [name_of(levels) for levels in groups(experiment)]
 
 
-def place_of(experiment: "Experiment", slot: int) -> Place:
+def seat_of(experiment: "Experiment", slot: int) -> Seat:
     """The place of a slot of the study: groups take turns, so that their sizes differ by at most one."""
     every = groups(experiment)
-    return Place(every[slot % len(every)], slot // len(every))
+    return Seat(every[slot % len(every)], slot // len(every))
 
 
 def of_group(experiment: "Experiment", levels: Iterable[tuple[str, str]]) -> "Experiment":
@@ -52,11 +52,11 @@ def of_group(experiment: "Experiment", levels: Iterable[tuple[str, str]]) -> "Ex
     return experiment.model_copy(update={"factors": tuple(factors)})
 
 
-def cells_of(experiment: "Experiment", place: Place) -> list[tuple[tuple[str, str], ...]]:
+def cells_of(experiment: "Experiment", seat: Seat) -> list[tuple[tuple[str, str], ...]]:
     """The cells that the group sees, in the order of the design."""
-    return [cell for cell in design.cells(experiment) if set(place.levels) <= set(cell)]
+    return [cell for cell in design.cells(experiment) if set(seat.levels) <= set(cell)]
 
 
-def clips_of(experiment: "Experiment", place: Place) -> list[ClipSpec]:
+def clips_of(experiment: "Experiment", seat: Seat) -> list[ClipSpec]:
     """The clips of those cells, in the order of the design."""
-    return [clip for clip in design.clips(experiment) if set(place.levels) <= set(clip.levels)]
+    return [clip for clip in design.clips(experiment) if set(seat.levels) <= set(clip.levels)]

@@ -34,8 +34,10 @@ def balanced_blocks(items: int, size: int) -> tuple[Block, ...] | None:
 
     Parameters
     ----------
-    items: how many there are (v), called 0 to `items` - 1 in the blocks. size: items in a block (k), 2 or
-    more.
+    items : int
+        How many there are (v), called 0 to `items` - 1 in the blocks.
+    size : int
+        Items in a block (k), 2 or more.
 
     Returns
     -------
@@ -52,10 +54,10 @@ def balanced_blocks(items: int, size: int) -> tuple[Block, ...] | None:
         return None
     if size == items:
         return (tuple(range(items)),)
-    found = _complement(items, size) if 2 * size > items else _by_differences(items, size)
-    if found is None and comb(items, size) <= MAX_BLOCKS:
-        found = list(combinations(range(items), size))
-    return None if found is None else _evened(found)
+    blocks = _complement(items, size) if 2 * size > items else _by_differences(items, size)
+    if blocks is None and comb(items, size) <= MAX_BLOCKS:
+        blocks = list(combinations(range(items), size))
+    return None if blocks is None else _evened(blocks)
 
 
 def near_sizes(items: int, size: int) -> list[int]:
@@ -86,9 +88,9 @@ def _by_differences(items: int, size: int) -> list[Block] | None:
             return None
         for fixed in (False, True):
             search = _Search(items - fixed, size, times, fixed, min(left, MAX_STEPS))
-            found = search.found()
-            if found is not None:
-                return found
+            developed = search.blocks()
+            if developed is not None:
+                return developed
             left -= min(left, MAX_STEPS) - search.steps
     return None
 
@@ -96,8 +98,12 @@ def _by_differences(items: int, size: int) -> list[Block] | None:
 class _Search:
     """Base blocks modulo n whose differences all occur `times` times; `fixed` adds an item that is not moved.
 
-    steps: how many points may be tried; counted down.
     A base block that is a subgroup (or the fixed item with one) repeats before n steps: a short orbit.
+
+    Attributes
+    ----------
+    steps : int
+        How many points may be tried; counted down.
     """
 
     def __init__(self, n: int, size: int, times: int, fixed: bool, steps: int) -> None:
@@ -106,7 +112,7 @@ class _Search:
         # Differences d and n - d are one; half of n is met from both ends of a pair, so it counts double.
         self._met = [0] * (n // 2 + 1)
 
-    def found(self) -> list[Block] | None:
+    def blocks(self) -> list[Block] | None:
         """The developed blocks; None where the search finds none in its steps."""
         for short, full in self._fixed_parts():
             self._met = [0] * (self.n // 2 + 1)
@@ -147,12 +153,12 @@ class _Search:
 
     def _extend(self, bases: list[Block], with_fixed: int) -> list[Block] | None:
         """Add base blocks until every difference is met; depth first, the least met difference next."""
-        wanted = [d for d in range(1, self.n // 2 + 1) if self._met[d] < self.times]
-        if not wanted:
+        missing = [d for d in range(1, self.n // 2 + 1) if self._met[d] < self.times]
+        if not missing:
             return bases if not with_fixed else None
         if with_fixed == 0 and self._left() < self.size * (self.size - 1) // 2:
             return None
-        least = wanted[0]
+        least = missing[0]
         size = self.size - 1 if with_fixed else self.size
         if not self._enter(0, (least,)):
             return None
@@ -182,9 +188,9 @@ class _Search:
                 self._leave(new, block)
 
     def _enter(self, new: int, block: Block) -> bool:
-        for place, old in enumerate(block):
+        for position, old in enumerate(block):
             if not self._count(new - old, 1):
-                self._leave(new, block[:place])
+                self._leave(new, block[:position])
                 return False
         return True
 

@@ -11,9 +11,9 @@ def label(clip: ClipSpec) -> str:
     return f"{clip.cell}/{clip.exemplar}"
 
 
-def listed(clips: Sequence[ClipSpec], lists: Sequence[Sequence[str]], place: int) -> frozenset[ClipSpec]:
+def listed(clips: Sequence[ClipSpec], lists: Sequence[Sequence[str]], number: int) -> frozenset[ClipSpec]:
     """The clips of the list that falls to this place."""
-    mine = set(lists[place % len(lists)])
+    mine = set(lists[number % len(lists)])
     return frozenset(clip for clip in clips if label(clip) in mine)
 
 

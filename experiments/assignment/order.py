@@ -2,20 +2,19 @@
 
 import random
 from collections.abc import Callable
-from itertools import cycle, islice, permutations
+from itertools import cycle, islice
 from typing import TYPE_CHECKING, Literal
 
 from experiments import design
-from experiments.assignment.groups import Place, cells_of, place_of
+from experiments.assignment.block_orders import block_orders
+from experiments.assignment.groups import Seat, cells_of, seat_of
+from experiments.assignment.levels import seen_levels, sees
 from experiments.assignment.shares import share
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec, ClipSpec
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
-
-MAX_ORDERS = 120
-"""Up to five blocks every order is dealt; beyond that a Latin square: each block in each place."""
 
 
 def single_clips(
@@ -25,33 +24,26 @@ def single_clips(
 
     Parameters
     ----------
-    experiment: the declaration.
-    seed: of everything random; equal seeds give equal orders.
-    slot: place in the counterbalancing, from 0; block orders are dealt by it, evenly over any run of slots.
-    asked: draws the answer that an attention check asks for.
+    experiment : Experiment
+        The declaration.
+    seed : int
+        Of everything random; equal seeds give equal orders.
+    slot : int
+        Place in the counterbalancing, from 0; block orders are dealt by it, evenly over any run of slots.
+    asked : callable
+        Draws the answer that an attention check asks for.
     """
     rng = random.Random(seed)
-    place = place_of(experiment, slot)
-    mine = share(experiment, place)
-    trials = _practice(experiment, place, rng)
-    for number, block in enumerate(ordered_blocks(experiment, rng, place.number), start=1):
+    seat = seat_of(experiment, slot)
+    mine = share(experiment, seat)
+    trials = _practice(experiment, seat, rng)
+    for number, block in enumerate(ordered_blocks(experiment, rng, seat.number), start=1):
         clips = [clip for clip in block.clips if clip in mine]
         if experiment.blocks.trial_order == "random":
             rng.shuffle(clips)
         main = [_of_one("main", number, block.label, clip) for clip in clips]
         trials.extend(with_attention(experiment, main, rng, asked))
     return trials
-
-
-def block_orders(experiment: "Experiment") -> list[tuple[int, ...]]:
-    """The orders of the levels' blocks that slots are dealt, as indices; one where nothing is dealt."""
-    count = len(_levels(experiment))
-    if experiment.blocks.order == "alternating":
-        return [tuple((start + step) % count for step in range(count)) for start in range(count)]
-    if experiment.blocks.order == "counterbalanced":
-        every = list(islice(permutations(range(count)), MAX_ORDERS + 1))
-        return every if len(every) <= MAX_ORDERS else _latin_square(count)
-    return [tuple(range(count))]
 
 
 def _levels(experiment: "Experiment") -> list[BlockSpec]:
@@ -72,18 +64,11 @@ def ordered_blocks(experiment: "Experiment", rng: random.Random, slot: int) -> l
     return [levels[index] for index in orders[slot % len(orders)]] * declared.repeats
 
 
-def _latin_square(count: int) -> list[tuple[int, ...]]:
-    """Williams' balanced square (1949): each block in each place, and after each other equally often."""
-    first = [0]
-    for step in range(1, count):
-        first.append((step + 1) // 2 if step % 2 else count - step // 2)
-    rows = [tuple((index + shift) % count for index in first) for shift in range(count)]
-    return rows if count % 2 == 0 else rows + [tuple(reversed(row)) for row in rows]
-
-
-def _practice(experiment: "Experiment", place: Place, rng: random.Random) -> list[Trial]:
+def _practice(experiment: "Experiment", seat: Seat, rng: random.Random) -> list[Trial]:
     """Clips from as many different cells as there are practice trials, exemplars at random."""
-    cells = cells_of(experiment, place)
+    seen, rates = seen_levels(experiment, seat.number), experiment.trial.rates
+    own = (cell for cell in cells_of(experiment, seat) if rates(experiment, ClipSpec(cell, 1)))
+    cells = [cell for cell in own if sees(seen, cell)]
     rng.shuffle(cells)
     drawn = islice(cycle(cells), experiment.practice.trials)
     clips = [ClipSpec(cell, rng.randint(1, experiment.exemplars.per_cell)) for cell in drawn]
@@ -100,8 +85,8 @@ def with_attention(
     """Put the declared number of instructed ratings between a block's trials, never before the first."""
     trials = list(main)
     places = sorted(rng.sample(range(1, len(main) + 1), min(experiment.attention.per_block, len(main))))
-    for place in reversed(places):
+    for position in reversed(places):
         response = asked(rng)
         check = Trial("attention", main[0].block, main[0].block_label, expected_response=response)
-        trials.insert(place, check)
+        trials.insert(position, check)
     return trials

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from experiments import design
-from experiments.assignment import lists
+from experiments.assignment import levels, lists
 from experiments.assignment.every import every_clip
-from experiments.assignment.groups import Place, clips_of, groups, name_of, names, place_of
+from experiments.assignment.groups import Seat, clips_of, groups, name_of, names, seat_of
 from experiments.assignment.sample import sampled
 from experiments.design import ClipSpec
 
@@ -15,14 +15,18 @@ if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 
-def share(experiment: "Experiment", place: Place) -> frozenset[ClipSpec]:
-    """The clips that the participant at this place sees, once a repeat."""
-    declared, clips = experiment.assignment, clips_of(experiment, place)
+def share(experiment: "Experiment", seat: Seat) -> frozenset[ClipSpec]:
+    """The clips that the participant at this place is asked about, once a repeat."""
+    seen = levels.seen_levels(experiment, seat.number)
+    declared, rates = experiment.assignment, experiment.trial.rates
+    own = (clip for clip in clips_of(experiment, seat) if rates(experiment, clip))
+    clips = [clip for clip in own if levels.sees(seen, clip.levels)]
     if declared.lists:
-        return lists.listed(clips, declared.lists, place.number)
+        return lists.listed(clips, declared.lists, seat.number)
     if declared.clips_per_cell is not None:
         of = experiment.exemplars
-        return sampled(clips, declared.clips_per_cell, of.per_cell, of.seed, place.number)
+        turn = levels.exemplar_turn(experiment, seat.number, declared.clips_per_cell)
+        return sampled(clips, declared.clips_per_cell, of.per_cell, of.seed, turn)
     return every_clip(clips)
 
 
@@ -38,15 +42,21 @@ def expected_slots(experiment: "Experiment") -> list[int]:
 
 def expected_counts(experiment: "Experiment", slots: Iterable[int]) -> dict[ClipSpec, int]:
     """How often each clip is seen by the participants with these slots, repeats of blocks included."""
-    counts = Counter(clip for slot in slots for clip in share(experiment, place_of(experiment, slot)))
-    return {clip: counts[clip] * experiment.blocks.repeats for clip in design.clips(experiment)}
+    counts = Counter(clip for slot in slots for clip in share(experiment, seat_of(experiment, slot)))
+    return {clip: counts[clip] * experiment.blocks.repeats for clip in design.rated_clips(experiment)}
 
 
 def lines(experiment: "Experiment") -> tuple[str, ...]:
     """What a plan says of it; nothing where everybody sees every clip."""
     every, slots = groups(experiment), expected_slots(experiment)
     said: list[str] = [said_of_groups(experiment)] if len(every) > 1 else []
-    if len(every) > 1 or experiment.assignment != type(experiment.assignment)():
+    for factor in experiment.factors:
+        if factor.dealt:
+            number = len(factor.levels)
+            said.append(
+                f"each participant sees {factor.per_participant} of {number} levels of '{factor.name}'"
+            )
+    if len(every) > 1 or said or experiment.assignment != type(experiment.assignment)():
         counts = expected_counts(experiment, slots)
         low, high = min(counts.values()), max(counts.values())
         each = f"{low}" if low == high else f"{low} to {high}"
@@ -63,7 +73,7 @@ def said_of_groups(experiment: "Experiment") -> str:
     way = ways.get(declared.by) or f"by the answer to '{declared.question}'"
     sizes = {name: str(declared.quotas.get(name, "no quota")) for name in named}
     if not declared.quotas and declared.by == "turn":
-        turns = Counter(name_of(place_of(experiment, slot).levels) for slot in expected_slots(experiment))
+        turns = Counter(name_of(seat_of(experiment, slot).levels) for slot in expected_slots(experiment))
         sizes = {name: str(turns[name]) for name in named}
     listed = (f"{name} ({size})" for name, size in sizes.items())
     return f"{len(named)} groups of participants {way}: {', '.join(listed)}"
@@ -85,5 +95,7 @@ def fault(experiment: "Experiment") -> str | None:
         )
     if declared.lists and between:
         return f"assignment.lists: '{between[0]}' already makes groups; leave out one of the two"
-    wrong = lists.fault(design.clips(experiment), declared.lists)
+    if wrong := levels.fault(experiment):
+        return wrong
+    wrong = lists.fault(design.rated_clips(experiment), declared.lists)
     return f"assignment.lists: {wrong}" if wrong else None

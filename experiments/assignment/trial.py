@@ -18,8 +18,12 @@ class Shown:
 class Trial:
     """One trial as assigned: practice has block 0; attention checks have no clip.
 
-    series: name of the adaptive series it belongs to, empty where there is none. check: which of the study's
-    check clips a motion check shows, from 0.
+    Attributes
+    ----------
+    series : str
+        Name of the adaptive series it belongs to, empty where there is none.
+    check : int or None
+        Which of the study's check clips a motion check shows, from 0.
     """
 
     kind: Literal["practice", "main", "attention", "check"]

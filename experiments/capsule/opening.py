@@ -34,12 +34,13 @@ class CapsuleError(InputError):
     """A capsule is not what it says it is; the message begins with the file's name."""
 
 
-def open_capsule(place: Path, into: Path) -> tuple[Capsule, Path]:
+def open_capsule(capsule_path: Path, into: Path) -> tuple[Capsule, Path]:
     """Check a capsule, a zip or a folder; return its list and the folder of its files.
 
     Parameters
     ----------
-    into: an empty folder, into which a zip is unpacked.
+    into : Path
+        An empty folder, into which a zip is unpacked.
 
     Raises
     ------
@@ -48,35 +49,39 @@ def open_capsule(place: Path, into: Path) -> tuple[Capsule, Path]:
     InputError
         There is no capsule at this place.
     """
-    if place.is_dir():
-        capsule = _read_list(place / CAPSULE_FILE, place)
-        _refuse_other_names(paths_in(place), capsule)
+    if capsule_path.is_dir():
+        capsule = _read_list(capsule_path / CAPSULE_FILE, capsule_path)
+        _refuse_other_names(paths_in(capsule_path), capsule)
         for file in capsule.files:
-            if (place / file.path).is_symlink():
+            if (capsule_path / file.path).is_symlink():
                 raise CapsuleError(f"{file.path}: expected a file, got a link; unpack the capsule anew")
-            _compare(file, (place / file.path).stat().st_size, file_sha256(place / file.path))
-        return capsule, place
-    if not place.is_file():
-        raise InputError(f"{place}: expected a capsule (a zip, or the folder of one), found nothing there")
+            _compare(file, (capsule_path / file.path).stat().st_size, file_sha256(capsule_path / file.path))
+        return capsule, capsule_path
+    if not capsule_path.is_file():
+        raise InputError(
+            f"{capsule_path}: expected a capsule (a zip, or the folder of one), found nothing there"
+        )
     try:
-        return _unpacked(place, into), into
+        return _unpacked(capsule_path, into), into
     except CapsuleError:
         raise
     except (*_DAMAGED, RuntimeError) as error:
         raise CapsuleError(
-            f"{place.name}: expected the zip of a capsule ({error}); download it anew"
+            f"{capsule_path.name}: expected the zip of a capsule ({error}); download it anew"
         ) from error
 
 
-def _unpacked(place: Path, into: Path) -> Capsule:
-    with zipfile.ZipFile(place) as archive:
+def _unpacked(capsule_path: Path, into: Path) -> Capsule:
+    with zipfile.ZipFile(capsule_path) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
         names = [member.filename for member in members]
         if repeated := [name for name, number in Counter(names).items() if number > 1]:
-            raise CapsuleError(f"{repeated[0]}: stands twice in {place.name}; download the capsule anew")
+            raise CapsuleError(
+                f"{repeated[0]}: stands twice in {capsule_path.name}; download the capsule anew"
+            )
         if CAPSULE_FILE not in names:
             raise CapsuleError(
-                f"{CAPSULE_FILE}: missing from {place.name}; it is no capsule, or a part of one"
+                f"{CAPSULE_FILE}: missing from {capsule_path.name}; it is no capsule, or a part of one"
             )
         head = archive.getinfo(CAPSULE_FILE)
         if head.file_size > MAX_LIST_BYTES:
@@ -84,7 +89,7 @@ def _unpacked(place: Path, into: Path) -> Capsule:
                 f"{CAPSULE_FILE}: {head.file_size:,} bytes, expected at most {MAX_LIST_BYTES:,}"
             )
         (into / CAPSULE_FILE).write_bytes(archive.read(head))
-        capsule = _read_list(into / CAPSULE_FILE, place)
+        capsule = _read_list(into / CAPSULE_FILE, capsule_path)
         _refuse_other_names(names, capsule)
         _refuse_more_than_fits(capsule, into)
         for file in capsule.files:
@@ -108,9 +113,11 @@ def _unpack_one(archive: zipfile.ZipFile, file: CapsuleFile, into: Path) -> None
     _compare(file, size, digest.hexdigest())
 
 
-def _read_list(path: Path, place: Path) -> Capsule:
+def _read_list(path: Path, capsule_path: Path) -> Capsule:
     if not path.is_file():
-        raise CapsuleError(f"{CAPSULE_FILE}: missing from {place.name}; it is no capsule, or a part of one")
+        raise CapsuleError(
+            f"{CAPSULE_FILE}: missing from {capsule_path.name}; it is no capsule, or a part of one"
+        )
     try:
         data: Any = json.loads(path.read_text(encoding="utf-8"))
         own = data.pop("sha256", None)

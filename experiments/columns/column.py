@@ -16,16 +16,26 @@ class Column:
 
     Attributes
     ----------
-    unit: as SI writes it, or the thing counted; None for what has none.
-    values: every value there is, for columns of names.
-    labels: what values mean, as pairs of value (as the CSV writes it) and label; not every value needs one.
-    identifying: whether it may tell who a person is: written in their own words, or of their device alone.
-    minimum, maximum: the range of numbers, ends included; None where open.
-    source: the SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the
-    column is of no view. `JOINED` in it is put into the database's own words.
-    json: True where the source is a JSON column, exported as text.
-    member: path of the value in the JSON object that the source is (`choice`, `left.frames_drawn`); empty
-    where the source is the value. otherwise: SQL of what stands where nothing is there; empty for NULL.
+    unit : str or None
+        As SI writes it, or the thing counted; None for what has none.
+    values : tuple of str
+        Every value there is, for columns of names.
+    labels : tuple of (str, str)
+        What values mean, as pairs of value (as the CSV writes it) and label; not every value needs one.
+    identifying : bool
+        Whether it may tell who a person is: written in their own words, or of their device alone.
+    minimum, maximum : float or None
+        The range of numbers, ends included; None where open.
+    source : str
+        The SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the column
+        is of no view. `JOINED` in it is put into the database's own words.
+    json : bool
+        True where the source is a JSON column, exported as text.
+    member : str
+        Path of the value in the JSON object that the source is (`choice`, `left.frames_drawn`); empty where
+        the source is the value.
+    otherwise : str
+        SQL of what stands where nothing is there; empty for NULL.
     """
 
     name: str

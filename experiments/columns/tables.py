@@ -8,8 +8,12 @@ def rows_of(kind: str, clips: Mapping[str, str], further: str = "") -> str:
 
     Parameters
     ----------
-    kind: as the declaration names it. clips: alias of `version_clips` for each role.
-    further: joins of the kind's own tables, or of the parts of an answer.
+    kind : str
+        As the declaration names it.
+    clips : mapping of str to str
+        Alias of `version_clips` for each role.
+    further : str, optional
+        Joins of the kind's own tables, or of the parts of an answer.
     """
     joins = "".join(
         f"LEFT JOIN trial_clips {role}_clip ON {role}_clip.study_run_id = t.study_run_id "

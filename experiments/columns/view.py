@@ -26,10 +26,14 @@ class View:
 
     Attributes
     ----------
-    name: of the view in the database.
-    title: what one row is, as a heading of the codebook says it.
-    columns: in order. One of them may be `LEVELS`: the CSV has a column a factor in its place.
-    rows: the SQL after SELECT: tables, joins, and which rows count; by database where they differ.
+    name : str
+        Of the view in the database.
+    title : str
+        What one row is, as a heading of the codebook says it.
+    columns : tuple of Column
+        In order. One of them may be `LEVELS`: the CSV has a column a factor in its place.
+    rows : str or callable
+        The SQL after SELECT: tables, joins, and which rows count; by database where they differ.
     """
 
     name: str
@@ -67,10 +71,10 @@ class View:
 
         What is missing stays None, which a CSV writer leaves empty.
         """
-        place = self._levels_at
-        if place is None:
+        index = self._levels_at
+        if index is None:
             return tuple(row)
-        return (*row[:place], *_level_cells(row[place], factors), *row[place + 1 :])
+        return (*row[:index], *_level_cells(row[index], factors), *row[index + 1 :])
 
     @cached_property
     def _levels_at(self) -> int | None:

@@ -19,7 +19,7 @@ class OtherWay(Declaration):
 
 
 class CheckWording(Declaration):
-    """The words of one kind of check, for a study in other languages than English and German."""
+    """The words of one kind of check, in place of the program's own."""
 
     check: CheckName
     """The kind of check."""
@@ -53,7 +53,7 @@ class MotionChecks(Declaration):
     other_way: OtherWay | None = None
     """The way around for people who cannot see such clips; without it they can only guess."""
     wording: tuple[CheckWording, ...] = ()
-    """Question and answers of kinds of check, in place of the program's own English and German."""
+    """Question and answers of kinds of check, in place of the program's own, which has those of the page."""
 
     @model_validator(mode="after")
     def _as_many_choices(self) -> Self:

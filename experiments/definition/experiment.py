@@ -1,6 +1,7 @@
 """An experiment as a declaration: factors, exemplars, blocks, scale, texts, rules and analysis plan."""
 
-from typing import Annotated, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
@@ -13,10 +14,11 @@ from experiments.definition.blocks import Blocks, Practice
 from experiments.definition.dataset import Dataset
 from experiments.definition.display import Display
 from experiments.definition.evidence import Evidence
-from experiments.definition.factors import Exemplars, Factor
+from experiments.definition.factors import Exemplars, Factor, names_listed
 from experiments.definition.forms import Form
 from experiments.definition.groups import Groups
 from experiments.definition.names import refuse_repeats, refuse_reserved
+from experiments.definition.retention import Retention
 from experiments.definition.session import Session
 from experiments.definition.texts import Texts
 from experiments.definition.warnings import Warnings
@@ -92,6 +94,8 @@ class Experiment(Declaration):
     """The pages, a table a language: [texts.en]."""
     analysis: AnalysisPlan = AnalysisPlan()
     """The analysis, fixed before the data."""
+    retention: Retention = Retention()
+    """How long data of persons are kept."""
     dataset: Dataset = Dataset()
     """Who made the data and who may use them, for datasets that are handed on."""
 
@@ -105,9 +109,32 @@ class Experiment(Declaration):
         titles = self.participant_title or {}
         return titles.get(language) or titles.get(self.languages[0]) or self.title
 
+    @property
+    def compared_factors(self) -> tuple[str, ...]:
+        """Names of the factors whose levels the analysis compares, in its order; random ones are not."""
+        fixed = tuple(factor.name for factor in self.factors if not factor.random)
+        return self.analysis.factors or fixed
+
     def factor(self, name: str) -> Factor:
         """Return the factor called `name`."""
         return next(factor for factor in self.factors if factor.name == name)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _factor_of_characters(cls, data: Any) -> Any:
+        """`[render] character = [...]` is short for a last factor, seen whole by everybody."""
+        render = data.get("render") if isinstance(data, Mapping) else None
+        if not isinstance(render, Mapping) or not isinstance(render.get("character"), list | tuple):
+            return data
+        factors = data.get("factors", [])
+        if not isinstance(factors, list | tuple):
+            return data
+        try:
+            names = names_listed(render["character"])
+        except ValueError as error:
+            raise ValueError(f"render.{error}") from None
+        factor = {"name": "character", "label": "Character", "character": names}
+        return {**data, "factors": [*factors, factor], "render": {**render, "character": names[0]}}
 
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Self:
@@ -139,6 +166,26 @@ class Experiment(Declaration):
             raise ValueError(f"assignment: {dealt}")
         if fault := shares.fault(self) or grouping.fault(self):
             raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
+    def _random_factors_fit(self) -> Self:
+        drawn = [factor.name for factor in self.factors if factor.random]
+        if not drawn:
+            return self
+        if not KINDS[self.trial.kind].random_factors:
+            raise ValueError(
+                f"factors: '{drawn[0]}' is random; trials of the kind {self.trial.kind} know none"
+            )
+        for key, mentioned in (("factors", self.analysis.factors), ("pairs", self.analysis.pairs)):
+            if named := next((name for name in mentioned if name in drawn), None):
+                raise ValueError(
+                    f"analysis.{key}: '{named}' is a random factor, over which means are taken; leave it out"
+                )
+        if len(drawn) == len(self.factors):
+            raise ValueError(
+                f"factors: every factor is random; expected one to compare, got '{drawn[0]}' alone"
+            )
         return self
 
     @model_validator(mode="after")

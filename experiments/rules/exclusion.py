@@ -41,8 +41,10 @@ class LeavesOutRuns(Declaration):
 
     Attributes
     ----------
-    needed: columns it reads; where the data lack one the report says that the rule was not applied.
-    source: all rows of the run, main trials of which nothing is left out, or attention checks.
+    needed : tuple of str
+        Columns it reads; where the data lack one the report says that the rule was not applied.
+    source : {"rows", "plays", "attention"}
+        All rows of the run, main trials of which nothing is left out, or attention checks.
     """
 
     needed: ClassVar[tuple[str, ...]]
@@ -54,7 +56,8 @@ class LeavesOutTrials(Declaration):
 
     Attributes
     ----------
-    needed: the column; where the data lack it the report says that the rule was not applied.
+    needed : str
+        The column; where the data lack it the report says that the rule was not applied.
     """
 
     needed: ClassVar[str]

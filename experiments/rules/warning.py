@@ -23,8 +23,10 @@ class Warns(Declaration):
 
     Attributes
     ----------
-    answers: how many answers, the latest last, it is given; with fewer it is not asked.
-    text: what the participant then reads.
+    answers : int
+        How many answers, the latest last, it is given; with fewer it is not asked.
+    text : Translated
+        What the participant then reads.
     """
 
     answers: int

@@ -33,8 +33,10 @@ def canonical(
 
     Parameters
     ----------
-    always: paths of keys that are kept whatever they are set to.
-    earlier: path of each renamed key to the name that stands in the form for it.
+    always : frozenset of str
+        Paths of keys that are kept whatever they are set to.
+    earlier : mapping of str to str
+        Path of each renamed key to the name that stands in the form for it.
     """
     form: dict[str, Any] = {}
     for name, field in type(declaration).model_fields.items():

@@ -17,8 +17,12 @@ class Change:
 
     Attributes
     ----------
-    path: as the TOML has it, elements of lists by their name or number: `factors.speed.levels.fast.label`.
-    effect: `wording` or `measured`. before, after: the values; None where the key or element is not there.
+    path : str
+        As the TOML has it, elements of lists by their name or number: `factors.speed.levels.fast.label`.
+    effect : {"wording", "measured"}
+        `wording` or `measured`.
+    before, after : Any
+        The values; None where the key or element is not there.
     """
 
     path: str

@@ -22,6 +22,10 @@ EFFECTS: Mapping[str, Effect] = {
     "factors.name": "measured",
     "factors.label": "wording",
     "factors.between": "measured",
+    # Which test is made of the same answers.
+    "factors.random": "wording",
+    "factors.per_participant": "measured",
+    "factors.character": "measured",
     "factors.levels.name": "measured",
     "factors.levels.label": "wording",
     "factors.levels.render": "measured",
@@ -71,6 +75,8 @@ EFFECTS: Mapping[str, Effect] = {
     "forms.fields.options.label": "wording",
     "texts": "wording",
     "analysis": "wording",
+    # Carried out by the server; no answer is to another question.
+    "retention": "wording",
     "dataset": "wording",
 }
 

@@ -17,9 +17,9 @@ def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
         return Experiment.model_validate(data, context={STORED: True})
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
+        path = ".".join(str(part) for part in first["loc"])
         name = definition.get("name", "without a name")
         raise InputError(
-            f"the stored definition {name} (format {number}) cannot be read: {place}: {first['msg']}; "
+            f"the stored definition {name} (format {number}) cannot be read: {path}: {first['msg']}; "
             "use the version of this program that stored it, and report this"
         ) from error

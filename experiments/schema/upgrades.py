@@ -19,8 +19,10 @@ class Step:
 
     Attributes
     ----------
-    renamed: path before (`trial.fixation_ms`) to the key's new name. The hash goes on under the old name.
-    change: whatever else is to be done, on a copy of the data; None where renaming is all.
+    renamed : mapping of str to str
+        Path before (`trial.fixation_ms`) to the key's new name. The hash goes on under the old name.
+    change : callable or None
+        Whatever else is to be done, on a copy of the data; None where renaming is all.
     """
 
     renamed: Mapping[str, str] = field(default_factory=dict)

@@ -10,7 +10,7 @@ from experiments.assignment.compared import Compared
 from experiments.assignment.trial import Trial
 from experiments.base import Declaration
 from experiments.columns.view import View
-from experiments.design import BlockSpec
+from experiments.design import BlockSpec, ClipSpec
 from experiments.schema.effects import Effect
 from experiments.trials.scales import RatedScale
 
@@ -34,6 +34,11 @@ class TrialDeclaration(Declaration):
     def rated_scales(self) -> tuple[RatedScale, ...]:
         """The scales on which each trial is rated; none where its answers are no ratings."""
         return ()
+
+    def rates(self, experiment: "Experiment", clip: ClipSpec) -> bool:
+        """Whether trials ask about this clip; others of the design are only shown beside it."""
+        del experiment, clip
+        return True
 
     def fault(self, experiment: "Experiment") -> str | None:
         """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""
@@ -75,22 +80,44 @@ class Kind:
 
     Attributes
     ----------
-    declaration: the model of the TOML's [trial]; the constant of its `kind` is the name.
-    answer: the model of what a participant answers to one trial, and how that is stored.
-    view: the rows it exports.
-    roles: the clips a trial shows, in the order of their places (`shown`; `left`, `right`).
-    effects: what an edit of each key of the declaration does to stored answers, by path below [trial].
-    page: what of the declaration the participant's page is told. shown: makes it.
-    assign: the trials of one participant in order, by declaration, seed and slot.
-    block_size: trials of one participant in a block, attention checks not counted.
-    example: a [trial] as TOML, for the reference; it is what a newcomer copies.
-    further_examples: of keys that exclude one another, so that the reference shows each.
-    shares_clips: whether it follows [assignment]; else that is refused.
-    groups: whether it follows factors between participants; else they are refused.
-    plan: lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
-    adapts: whether answers decide what is shown next: the server then follows its series.
-    chooses: whether a run's trials are chosen by the comparisons stored before it. assign_by: then does so.
-    check_response: the number that an answer, as stored, is to an attention check, which asks for one.
+    declaration : type
+        The model of the TOML's [trial]; the constant of its `kind` is the name.
+    answer : type
+        The model of what a participant answers to one trial, and how that is stored.
+    view : View
+        The rows it exports.
+    roles : tuple of str
+        The clips a trial shows, in the order of their places (`shown`; `left`, `right`).
+    effects : mapping of str to {"wording", "measured"}
+        What an edit of each key of the declaration does to stored answers, by path below [trial].
+    page : type
+        What of the declaration the participant's page is told.
+    shown : callable
+        Makes the page's model (`page`) from the declaration.
+    assign : callable
+        The trials of one participant in order, by declaration, seed and slot.
+    block_size : callable
+        Trials of one participant in a block, attention checks not counted.
+    example : str
+        A [trial] as TOML, for the reference; it is what a newcomer copies.
+    further_examples : tuple of str
+        Of keys that exclude one another, so that the reference shows each.
+    shares_clips : bool
+        Whether it follows [assignment]; else that is refused.
+    groups : bool
+        Whether it follows factors between participants; else they are refused.
+    random_factors : bool
+        Whether it follows random factors: deals their levels, and analyses them as random.
+    plan : callable
+        Lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
+    adapts : bool
+        Whether answers decide what is shown next: the server then follows its series.
+    chooses : callable
+        Whether a run's trials are chosen by the comparisons stored before it.
+    assign_by : callable or None
+        As `assign`, with the comparisons stored before, where `chooses` says so.
+    check_response : callable
+        The number that an answer, as stored, is to an attention check, which asks for one.
     """
 
     declaration: type[TrialDeclaration]
@@ -108,6 +135,7 @@ class Kind:
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     shares_clips: bool = False
     groups: bool = False
+    random_factors: bool = False
     adapts: bool = False
     chooses: "Callable[[Experiment], bool]" = never
     assign_by: "Callable[[Experiment, int, int, Sequence[Compared]], list[Trial]] | None" = None

@@ -16,13 +16,22 @@ class RatedScale:
 
     Attributes
     ----------
-    name: as the column `scale` of the view has it.
-    type: as declared: `points`, `slider`.
-    minimum, maximum: ends of the range, which answers may take. step: between the answers that there are.
-    reverse: whether a high answer means little of what is measured; stored answers are as they were chosen.
-    not_applicable: whether "cannot say" is an answer too; it is stored without a number.
-    question, low, high: what is asked, and the labels of the ends, by language.
-    member: path of the number in the stored answer (`trial_ratings.payload`), parts joined by dots.
+    name : str
+        As the column `scale` of the view has it.
+    type : str
+        As declared: `points`, `slider`.
+    minimum, maximum : float
+        Ends of the range, which answers may take.
+    step : float
+        Between the answers that there are.
+    reverse : bool
+        Whether a high answer means little of what is measured; stored answers are as they were chosen.
+    not_applicable : bool
+        Whether "cannot say" is an answer too; it is stored without a number.
+    question, low, high : Translated
+        What is asked, and the labels of the ends, by language.
+    member : str
+        Path of the number in the stored answer (`trial_ratings.payload`), parts joined by dots.
     """
 
     name: str

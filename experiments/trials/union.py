@@ -19,8 +19,12 @@ class ByKind:
 
     Attributes
     ----------
-    model: a kind's member of the union. implied: whether the first kind is meant where none is named.
-    further: members that are of no kind of trial, by their name.
+    model : callable
+        A kind's member of the union.
+    implied : bool
+        Whether the first kind is meant where none is named.
+    further : tuple of (str, type)
+        Members that are of no kind of trial, by their name.
     """
 
     model: Callable[[Kind], type[BaseModel]]

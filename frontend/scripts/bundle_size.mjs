@@ -2,7 +2,7 @@
 import { existsSync, readdirSync, readFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 
-const BUDGETS = { participant: 100 * 1024, admin: 400 * 1024 };
+const BUDGETS = { participant: 100 * 1024, admin: 250 * 1024 };
 const site = process.argv[2] ?? "participant";
 const budget = BUDGETS[site];
 if (budget === undefined) {
@@ -14,12 +14,12 @@ const bytesOf = (name) => gzipSync(readFileSync(new URL(name, folder)), { level:
 const sum = (names) => [...names].reduce((total, name) => total + bytesOf(name), 0);
 
 /** What `start` loads, by the manifest: its file, styles and everything it imports, but no page opened later. */
-function filesOf(manifest, start, found = new Set()) {
+function filesOf(manifest, start, reached = new Set()) {
   const { file, css = [], imports = [] } = manifest[start];
-  if (found.has(file)) return found;
-  for (const name of [file, ...css]) found.add(name);
-  for (const name of imports) filesOf(manifest, name, found);
-  return found;
+  if (reached.has(file)) return reached;
+  for (const name of [file, ...css]) reached.add(name);
+  for (const name of imports) filesOf(manifest, name, reached);
+  return reached;
 }
 
 function report(total, what) {
@@ -55,17 +55,46 @@ function participant(manifest) {
   report(sum(first) + language + kind, "participant's page up to the first trial of the largest kind");
 }
 
-/** The entry, and with the largest page, whose parts load when they are first opened. */
+/** Names of the pages that stand inside a study's frame, and so load with it, by the router. */
+function tabs() {
+  const router = readFileSync(new URL("../src/admin/router.tsx", import.meta.url), "utf8");
+  return [...router.matchAll(/\.\.\.tab,[^}]*?import\("[^"]*\/(\w+)"\)/g)].map(([, name]) => name);
+}
+
+/** The entry, and with the largest page; what a page loads once it is shown (charts, the builder's forms) is not counted. */
 function admin(manifest) {
   const entry = Object.keys(manifest).find((name) => manifest[name].isEntry);
   const first = filesOf(manifest, entry);
-  const pages = (manifest[entry].dynamicImports ?? []).map((name) => {
-    const files = filesOf(manifest, name, new Set(first));
-    return [sum(files), name];
-  });
+  const frame = filesOf(manifest, "studies/StudyLayout.tsx", new Set(first));
+  const inStudy = tabs();
+  const isTab = (page) => inStudy.some((name) => new RegExp(`(^|\\W|_)${name}\\W`).test(page));
+  const names = manifest[entry].dynamicImports ?? [];
+  const pages = names.map((name) => [sum(filesOf(manifest, name, new Set(isTab(name) ? frame : first))), name]);
   for (const [bytes, name] of pages.sort(([a], [b]) => b - a).slice(0, 5)) console.log(`${String(bytes).padStart(7)}  with ${name}`);
+  if (names.filter(isTab).length !== inStudy.length || inStudy.length === 0) {
+    console.error(`error: expected the ${inStudy.length} tabs of a study among the pages, got ${names.filter(isTab).join(", ")}`);
+    process.exitCode = 1;
+  }
   report(sum(first), "admin site, before any page");
   report(Math.max(...pages.map(([bytes]) => bytes)), "admin site, first load of the largest page");
+  checkStyles();
+}
+
+/** Fails unless src/admin/mantine.css imports the styles of exactly the components that the site uses. */
+function checkStyles() {
+  const classes = (text) => new Set(text.match(/\bm_[0-9a-f]{6,8}\b/g));
+  const scripts = readdirSync(folder).filter((name) => name.endsWith(".js"));
+  const used = classes(scripts.map((name) => readFileSync(new URL(name, folder), "utf8")).join("\n"));
+  const sheets = new URL("../node_modules/@mantine/core/styles/", import.meta.url);
+  const imported = readFileSync(new URL("../src/admin/mantine.css", import.meta.url), "utf8");
+  for (const name of readdirSync(sheets).filter((one) => one.endsWith(".css") && !one.endsWith(".layer.css"))) {
+    const own = [...classes(readFileSync(new URL(name, sheets), "utf8"))];
+    const line = `@import "@mantine/core/styles/${name}";`;
+    const [isUsed, isImported] = [own.length === 0 || own.some((one) => used.has(one)), imported.includes(line)];
+    if (isUsed === isImported) continue;
+    console.error(`error: expected src/admin/mantine.css ${isUsed ? "with" : "without"} ${line}, got it ${isUsed ? "without" : "with"}`);
+    process.exitCode = 1;
+  }
 }
 
 const manifestFile = new URL(".vite/manifest.json", folder);

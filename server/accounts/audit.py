@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from server.accounts.identity import Identity
+from server.accounts.identity import OPERATOR, Identity, Operator
 from server.audit import repository
 from server.audit.sealing import join_at_commit
 from server.clock import now
@@ -16,7 +16,7 @@ NOBODY: Literal["nobody"] = "nobody"
 
 def record(
     session: Session,
-    who: Identity | Literal["nobody"] | None,
+    identity: Identity | Operator | Literal["nobody"] | None,
     action: str,
     kind: str = "",
     target: str = "",
@@ -25,12 +25,16 @@ def record(
 ) -> None:
     """Add an entry in the caller's transaction, so that a change and its entry stand or fall together.
 
-    who: None for the command line.
+    Parameters
+    ----------
+    identity : Identity or Operator or {"nobody"} or None
+        None, as OPERATOR, for the command line.
     """
+    actor = None if identity == NOBODY else identity or OPERATOR
     entry = AuditEntry(
         at=now(),
-        account_id=who.account_id if isinstance(who, Identity) else None,
-        actor=who.name if isinstance(who, Identity) else who or "command line",
+        account_id=actor.account_id if actor else None,
+        actor=actor.name if actor else NOBODY,
         action=action,
         target_kind=kind,
         target=target[:200],

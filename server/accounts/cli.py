@@ -9,10 +9,10 @@ from experiments.errors import InputError
 from server.accounts import invitations, service
 from server.accounts.passwords import hash_password
 from server.accounts.people import invitation_url
-from server.cli_common import migrated_services, out
+from server.cli_common import migrated_services, one_of, out
 from server.db import open_database
 from server.errors import ApiError
-from server.models import ROLES, Role
+from server.models import ROLES
 from server.settings import Settings
 
 app = typer.Typer(help="Accounts of experimenters.", no_args_is_help=True)
@@ -23,13 +23,6 @@ def register(parent: typer.Typer) -> None:
     """Add `server admin` to the command line."""
     parent.add_typer(app, name="admin")
     parent.add_typer(account_app, name="account")
-
-
-def _known(role: str) -> Role:
-    known = next((one for one in ROLES if one == role), None)
-    if known is None:
-        raise InputError(f"expected the role owner, experimenter or viewer, got '{role}'")
-    return known
 
 
 @app.command("create")
@@ -50,7 +43,7 @@ def create(
     database = open_database(Settings())
     try:
         with database.write() as session:
-            service.create_account(session, name, password, _known(role))
+            service.create_account(session, name, password, one_of(ROLES, role, "the role"))
     except ApiError as error:
         raise InputError(error.message) from error
     Console().print(f"account '{name}' ({role}) created")
@@ -66,7 +59,7 @@ def link(
     Example: server admin link --role experimenter --label "Ada"
     """
     settings = Settings()
-    _, token = invitations.invite(open_database(settings), _known(role), label, None)
+    _, token = invitations.invite(open_database(settings), one_of(ROLES, role, "the role"), label, None)
     Console(soft_wrap=True).print(invitation_url(settings.public_url, token), highlight=False)
 
 
@@ -80,15 +73,19 @@ def reset_password(
         ),
     ] = "",
 ) -> None:
-    """Give an account a new password; its sessions and API tokens end, and the audit log says so.
+    """Give an account a new password; its sessions, API tokens and logins by providers end.
+
+    The audit log says so. The logins of an account that had no password stay.
 
     Example: server account reset-password ada
     """
     with migrated_services() as services:
         fresh = hash_password(password, name)
         with services.database.write() as session:
-            service.reset_password(session, name, fresh)
+            logins = service.reset_password(session, name, fresh)
     out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")
+    if logins:
+        out.print(logins)
 
 
 @account_app.command("reset-second-factor")

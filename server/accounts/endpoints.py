@@ -7,7 +7,16 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
 from server.accounts import invitations, second_factor, service, tokens
-from server.accounts.identity import COOKIE, Identity, Myself, NotSignedIn, account_of, check_origin, identify
+from server.accounts.identity import (
+    COOKIE,
+    FreshMyself,
+    Identity,
+    Myself,
+    NotSignedIn,
+    account_of,
+    check_origin,
+    identify,
+)
 from server.accounts.passwords import hash_password, password_fits
 from server.accounts.schemas import (
     AccountOut,
@@ -51,7 +60,8 @@ def account_out(account: Account) -> AccountOut:
     )
 
 
-def _set_cookie(response: Response, services: Services, token: str) -> None:
+def set_session_cookie(response: Response, services: Services, token: str) -> None:
+    """Give the browser its session; scripts and other sites do not get at it."""
     response.set_cookie(
         COOKIE,
         token,
@@ -113,7 +123,7 @@ async def sign_in(
     """Sign in; sets the session cookie. After some wrong attempts from one place the next must wait."""
     check_origin(request, services)
     token = await attempt(services, body, address_of(request), device_cookie, user_agent)
-    _set_cookie(response, services, token)
+    set_session_cookie(response, services, token)
     _set_device(response, services, body.name)
     return await run_in_threadpool(_just_signed_in, services, token)
 
@@ -172,10 +182,10 @@ def sign_out(services: ServicesDep, me: Myself, response: Response) -> None:
 def get_invitation(services: ServicesDep, token: str) -> InvitationState:
     """Whether a one-time link still works, and as what."""
     with services.database.read() as session:
-        found = invitations.find_invitation(session, token)
-        expired = "expired" if found.expires_at <= now() else "open"
+        invitation = invitations.find_invitation(session, token)
+        expired = "expired" if invitation.expires_at <= now() else "open"
         return InvitationState.model_validate(
-            {"role": found.role, "status": "used" if found.used_at else expired}
+            {"role": invitation.role, "status": "used" if invitation.used_at else expired}
         )
 
 
@@ -198,7 +208,7 @@ async def accept_invitation(
     cookie = await run_in_threadpool(
         invitations.accept_invitation, services, token, body.name, fresh, user_agent
     )
-    _set_cookie(response, services, cookie)
+    set_session_cookie(response, services, cookie)
     _set_device(response, services, body.name)
     return await run_in_threadpool(_just_signed_in, services, cookie)
 
@@ -229,12 +239,12 @@ def revoke_session(services: ServicesDep, me: Myself, session_id: Number) -> Non
 @router.put("/password", status_code=204)
 async def change_password(services: ServicesDep, me: Myself, body: ChangePassword) -> None:
     """Change the password; every other session and every API token ends."""
-    await _must_fit(services, me, body.password)
+    await must_fit(services, me, body.password)
     fresh = await services.passwords.run(lambda: hash_password(body.new_password, me.name))
     await run_in_threadpool(service.change_password, services, me, fresh)
 
 
-async def _must_fit(services: Services, me: Identity, password: str) -> None:
+async def must_fit(services: Services, me: Identity, password: str) -> None:
     """Ask for the present password; a stolen session may not try many."""
     key = f"session {me.session_id}"
     services.sign_ins.names.check(key)
@@ -247,8 +257,22 @@ async def _must_fit(services: Services, me: Identity, password: str) -> None:
     services.sign_ins.names.succeeded(key)
 
 
+async def must_prove(services: Services, me: Identity, proof: str) -> None:
+    """Ask for the present password, and where the account has none for a code of its second factor."""
+    if await run_in_threadpool(service.own_password, services, me):
+        await must_fit(services, me, proof)
+        return
+    key = f"session {me.session_id}"
+    services.sign_ins.names.check(key)
+    failure = await run_in_threadpool(service.own_code_failure, services, me, proof)
+    if failure is not None:
+        services.sign_ins.names.failed(key)
+        raise failure
+    services.sign_ins.names.succeeded(key)
+
+
 @router.post("/second-factor")
-def start_second_factor(services: ServicesDep, me: Myself) -> SecondFactorSetup:
+def start_second_factor(services: ServicesDep, me: FreshMyself) -> SecondFactorSetup:
     """Begin the set-up of a second factor: a secret for an authenticator app."""
     secret = service.start_second_factor(services, me)
     uri = second_factor.provisioning_uri(secret, me.name)
@@ -256,15 +280,15 @@ def start_second_factor(services: ServicesDep, me: Myself) -> SecondFactorSetup:
 
 
 @router.put("/second-factor")
-def confirm_second_factor(services: ServicesDep, me: Myself, body: ConfirmCode) -> RecoveryCodes:
+def confirm_second_factor(services: ServicesDep, me: FreshMyself, body: ConfirmCode) -> RecoveryCodes:
     """Turn the second factor on with the app's first code; gives the recovery codes, this once."""
     return RecoveryCodes(codes=service.confirm_second_factor(services, me, body.code))
 
 
 @router.delete("/second-factor", status_code=204)
 async def remove_second_factor(services: ServicesDep, me: Myself, body: ConfirmPassword) -> None:
-    """Turn the second factor off."""
-    await _must_fit(services, me, body.password)
+    """Turn the second factor off; asks for the password, and where the account has none for a code."""
+    await must_prove(services, me, body.password)
     await run_in_threadpool(service.remove_second_factor, services, me)
 
 
@@ -276,7 +300,7 @@ def list_tokens(services: ServicesDep, me: Myself) -> list[TokenOut]:
 
 
 @router.post("/tokens", status_code=201)
-def create_token(services: ServicesDep, me: Myself, body: NewToken) -> NewTokenOut:
+def create_token(services: ServicesDep, me: FreshMyself, body: NewToken) -> NewTokenOut:
     """Make an API token; its secret is shown this once. It can do no more than the account."""
     with services.database.write() as session:
         row, secret = tokens.create_token(session, me, body.name, list(body.scopes), body.days)

@@ -1,7 +1,7 @@
 """Who is asking: a signed-in browser or an API token, and what each may do."""
 
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Annotated, Final, Literal
 from urllib.parse import urlsplit
 
@@ -19,6 +19,8 @@ from server.tokens import hash_token
 Scope = Literal["read", "personal", "write", "export"]
 COOKIE = "palpebra_session"
 _SEEN_EVERY = timedelta(minutes=1)
+FRESH_FOR = timedelta(minutes=15)
+"""After signing in, what would outlive a stolen session may be changed for so long."""
 _cookie_scheme = APIKeyCookie(name=COOKIE, auto_error=False, description="A signed-in browser.")
 _bearer_scheme = HTTPBearer(auto_error=False, description="An API token with scopes.")
 
@@ -37,12 +39,25 @@ class NotAllowed(ApiError):
     code = "not_allowed"
 
 
+class SignInAgain(ApiError):
+    """What is asked for would outlive a stolen session, and this one began a while ago."""
+
+    status = 403
+    code = "sign_in_again"
+
+
 @dataclass(frozen=True)
 class Identity:
     """The account behind a request; `session_id` for a browser, `scopes` for a token.
 
-    role: on the server; what may be done with a study is asked by `server.studies.lookup.find_study`.
-    second_factor: the session began with one, or the token's account has one.
+    Attributes
+    ----------
+    role : str
+        On the server; what may be done with a study is asked by `server.studies.lookup.find_study`.
+    second_factor : bool
+        The session began with one, or the token's account has one.
+    signed_in_at : datetime or None
+        When the browser's session began; None for a token.
     """
 
     account_id: int
@@ -51,6 +66,7 @@ class Identity:
     session_id: int | None = None
     scopes: frozenset[str] | None = None
     second_factor: bool = False
+    signed_in_at: datetime | None = None
 
     @property
     def sees_persons(self) -> bool:
@@ -60,6 +76,9 @@ class Identity:
 
 class Operator:
     """Whoever has the machine: the command line and the server's own work. Every study is open to her."""
+
+    account_id: Final = None
+    name: Final = "command line"
 
 
 OPERATOR: Final = Operator()
@@ -104,6 +123,7 @@ def _by_cookie(services: Services, cookie: str) -> Identity:
             account.role,
             session_id=signed_in.id,
             second_factor=signed_in.second_factor,
+            signed_in_at=signed_in.created_at,
         )
         stale = now() - signed_in.last_seen_at > _SEEN_EVERY
     if stale:
@@ -137,10 +157,16 @@ def _by_token(services: Services, secret: str) -> Identity:
 
 
 class _Access:
-    """A dependency: lets in accounts of at least `role` on the server; tokens with one of `scopes` too."""
+    """A dependency: lets in accounts of at least `role` on the server; tokens with one of `scopes` too.
 
-    def __init__(self, role: Role, *scopes: Scope) -> None:
-        self.role, self.scopes = role, scopes
+    Parameters
+    ----------
+    fresh : bool, optional
+        Browsers alone that signed in within `FRESH_FOR`.
+    """
+
+    def __init__(self, role: Role, *scopes: Scope, fresh: bool = False) -> None:
+        self.role, self.scopes, self.fresh = role, scopes, fresh
 
     def __call__(
         self,
@@ -156,9 +182,18 @@ class _Access:
             if not self.scopes:
                 raise NotAllowed("This cannot be done with an API token; sign in in a browser.")
             if identity.scopes.isdisjoint(self.scopes):
-                wanted = " or ".join(f"'{scope}'" for scope in self.scopes)
-                raise NotAllowed(f"This needs a token with the scope {wanted}.")
+                scopes = " or ".join(f"'{scope}'" for scope in self.scopes)
+                raise NotAllowed(f"This needs a token with the scope {scopes}.")
+        if self.fresh:
+            must_be_fresh(identity)
         return identity
+
+
+def must_be_fresh(identity: Identity) -> None:
+    """SignInAgain where the browser's session began longer ago than `FRESH_FOR`."""
+    if identity.signed_in_at is None or now() - identity.signed_in_at > FRESH_FOR:
+        minutes = FRESH_FOR // timedelta(minutes=1)
+        raise SignInAgain(f"For this, please sign in again: you did so more than {minutes} minutes ago.")
 
 
 # Whoever is signed in, by what a token must carry. What she may do with a study the study's query decides.
@@ -175,10 +210,15 @@ Writer = Annotated[Identity, Depends(WRITER)]
 """May change things."""
 Myself = Annotated[Identity, Depends(_Access("viewer"))]
 """A signed-in browser: one's own account, and what no token opens."""
+FreshMyself = Annotated[Identity, Depends(_Access("viewer", fresh=True))]
+"""A browser that signed in a short while ago: for ways in that would outlive a stolen session."""
 Founder = Annotated[Identity, Depends(_Access("experimenter"))]
 """A signed-in browser of one who may make workspaces."""
 Owner = Annotated[Identity, Depends(_Access("owner"))]
 """A signed-in browser of one who manages this server: accounts, workspaces, the audit log."""
+
+FreshOwner = Annotated[Identity, Depends(_Access("owner", fresh=True))]
+"""An owner who signed in a short while ago: for accounts and invitations, which outlive sessions too."""
 
 
 def account_of(session: Session, identity: Identity) -> Account:

@@ -12,10 +12,10 @@ from server.clock import now
 from server.context import Services
 from server.db import Database
 from server.errors import Conflict, NotFound
-from server.models import DEFAULT_WORKSPACE, Invitation, Role
+from server.models import DEFAULT_WORKSPACE, Account, Invitation, Role
 from server.tokens import hash_token, new_token
 from server.workspaces.repository import default_workspace
-from server.workspaces.service import Place, find_workspace
+from server.workspaces.service import Membership, find_workspace
 
 INVITATION_DAYS = 7
 INVITATION_USED = Conflict("This invitation was used or has expired; ask for a new one.")
@@ -75,7 +75,7 @@ def find_invitation(session: Session, token: str) -> Invitation:
 
 
 def check_invitation(services: Services, token: str) -> None:
-    """NotFound or Conflict where a one-time link does not work, before a password is hashed for it."""
+    """NotFound or Conflict where an invitation does not work, before anything is done for it."""
     with services.database.read() as session:
         invitation = find_invitation(session, token)
         if invitation.used_at is not None or invitation.expires_at <= now():
@@ -85,11 +85,17 @@ def check_invitation(services: Services, token: str) -> None:
 def accept_invitation(services: Services, token: str, name: str, password_hash: str, user_agent: str) -> str:
     """Make the invited account and sign it in; return the session's token."""
     with services.database.write() as session:
-        invitation = find_invitation(session, token)
-        if not repository.use_invitation(session, invitation.id):
-            raise INVITATION_USED
-        role = known_role(invitation.role)
-        workspace = repository.workspace_of(session, invitation) or default_workspace(session)
-        place = Place(workspace, known_role(invitation.workspace_role or invitation.role))
-        account = add_account(session, name, password_hash, role, place)
+        account = invited_account(session, find_invitation(session, token), name, password_hash)
         return begin_session(services, session, account, user_agent)
+
+
+def invited_account(
+    session: Session, invitation: Invitation | None, name: str, password_hash: str
+) -> Account:
+    """Use an invitation up and make its account; Conflict where it was used or taken back meanwhile."""
+    if invitation is None or not repository.use_invitation(session, invitation.id):
+        raise INVITATION_USED
+    role = known_role(invitation.role)
+    workspace = repository.workspace_of(session, invitation) or default_workspace(session)
+    membership = Membership(workspace, known_role(invitation.workspace_role or invitation.role))
+    return add_account(session, name, password_hash, role, membership)

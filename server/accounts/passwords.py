@@ -66,9 +66,9 @@ def hash_password(password: str, name: str) -> str:
 
 
 def password_fits(password: str, stored: str | None) -> bool:
-    """True where `password` has the hash `stored`; takes as long where there is no account."""
+    """True where `password` has the hash `stored`; takes as long where there is none."""
     fits = _hasher().verify(password, stored or _nobody())
-    return fits and stored is not None
+    return fits and bool(stored)
 
 
 class PasswordWork:

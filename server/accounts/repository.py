@@ -2,11 +2,20 @@
 
 from typing import Any, cast
 
-from sqlalchemy import CursorResult, func, select, update
+from sqlalchemy import CursorResult, delete, func, select, update
 from sqlalchemy.orm import Session
 
 from server.clock import now
-from server.models import Account, AdminSession, ApiToken, Invitation, Workspace
+from server.models import (
+    Account,
+    AccountLogin,
+    AdminSession,
+    ApiToken,
+    Invitation,
+    LoginAttempt,
+    MailedLink,
+    Workspace,
+)
 
 
 def any_accounts(session: Session) -> bool:
@@ -19,15 +28,29 @@ def accounts(session: Session) -> list[Account]:
     return list(session.scalars(select(Account).order_by(Account.id)))
 
 
-def account(session: Session, account_id: int, *, fresh: bool = False) -> Account | None:
-    """An account by its number; `fresh` reads it again where the session holds it."""
-    return session.get(Account, account_id, populate_existing=fresh)
+def account(session: Session, account_id: int, *, fresh: bool = False, lock: bool = False) -> Account | None:
+    """An account by its number.
+
+    Parameters
+    ----------
+    fresh : bool, optional
+        Read it again where the session has it.
+    lock : bool, optional
+        Read it again, and hold it until the commit.
+    """
+    return session.get(Account, account_id, populate_existing=fresh or lock, with_for_update=lock or None)
 
 
 def account_named(session: Session, name: str, *, lock: bool = False) -> Account | None:
-    """An account by its name in any spelling of capitals; `lock` holds it until the commit."""
+    """An account by its name in any spelling of capitals, its own first; `lock` holds it until the commit."""
     query = select(Account).where(func.lower(Account.name) == name.lower())
+    query = query.order_by(Account.name != name, Account.id).limit(1)
     return session.scalar(query.with_for_update() if lock else query)
+
+
+def hold(session: Session, account_id: int) -> None:
+    """Hold an account until the commit: nothing is begun in its name while a new password ends everything."""
+    session.execute(select(Account.id).where(Account.id == account_id).with_for_update())
 
 
 def hold_owners(session: Session) -> None:
@@ -67,6 +90,12 @@ def open_sessions(session: Session, account_id: int) -> list[AdminSession]:
     return list(session.scalars(query.order_by(AdminSession.last_seen_at.desc())))
 
 
+def end_sign_ins_that_ask_for_a_code(session: Session, account_id: int) -> None:
+    """End the sign-ins of an account that its provider confirmed and that wait for its second factor."""
+    waiting = delete(LoginAttempt).where(LoginAttempt.account_id == account_id)
+    session.execute(waiting.where(LoginAttempt.purpose == "code"))
+
+
 def token_by_hash(session: Session, token_hash: str) -> ApiToken | None:
     """An API token by the hash of its secret."""
     return session.scalar(select(ApiToken).where(ApiToken.token_hash == token_hash))
@@ -82,6 +111,18 @@ def tokens(session: Session, account_id: int) -> list[ApiToken]:
     """All API tokens of an account, revoked ones too."""
     query = select(ApiToken).where(ApiToken.account_id == account_id)
     return list(session.scalars(query.order_by(ApiToken.id)))
+
+
+def forget_under_way(session: Session, account_id: int) -> None:
+    """Remove what was begun in an account's name: links sent by mail, and sign-ins at a provider."""
+    session.execute(delete(MailedLink).where(MailedLink.account_id == account_id))
+    session.execute(delete(LoginAttempt).where(LoginAttempt.account_id == account_id))
+
+
+def logins(session: Session, account_id: int) -> list[AccountLogin]:
+    """The logins of an account with providers, the oldest first."""
+    query = select(AccountLogin).where(AccountLogin.account_id == account_id)
+    return list(session.scalars(query.order_by(AccountLogin.id)))
 
 
 def invitation(session: Session, invitation_id: int) -> Invitation | None:

@@ -46,7 +46,7 @@ class ConfirmCode(_In):
 
 
 class ConfirmPassword(_In):
-    """The present password, asked for again before something is weakened."""
+    """The present password, asked for again before something is weakened; a code where there is none."""
 
     password: Password
 

@@ -15,15 +15,10 @@ from server.clock import now
 from server.context import Services
 from server.db import Database
 from server.errors import ApiError, Conflict, NotFound
-from server.models import (
-    ROLES,
-    Account,
-    AdminSession,
-    Role,
-)
+from server.models import ROLES, Account, AdminSession, Role
 from server.tokens import hash_token, new_token
 from server.workspaces.repository import default_workspace, set_member
-from server.workspaces.service import Place
+from server.workspaces.service import Membership
 
 
 class WrongCredentials(ApiError):
@@ -67,15 +62,18 @@ def open_session(
 ) -> tuple[str | None, ApiError | None]:
     """After a right password: the token of a new session (the cookie's value), or why there is none.
 
-    checked: the stored hash that the password fitted, None where it fitted none. The account is held
-    meanwhile, so that a code works once however many ask at once; failures are written down too.
+    Parameters
+    ----------
+    checked : str or None
+        The stored hash that the password fitted, None where it fitted none. The account is held meanwhile, so
+        that a code works once however many ask at once; failures are written down too.
     """
     with services.database.write() as session:
         account = repository.account_named(session, name, lock=True)
         if account is None or account.disabled_at is not None or account.password_hash != checked:
             failure: ApiError | None = WrongCredentials("Name or password are wrong.")
         else:
-            failure = _second_factor_failure(services, account, code)
+            failure = second_factor_failure(services, account, code)
         if account is not None and failure is None:
             token = begin_session(services, session, account, user_agent)
             record(session, identity_of(account), "signed in", "account", account.name)
@@ -95,7 +93,8 @@ def record_failure(services: Services, session: Session, account: Account | None
     record(session, NOBODY, "sign-in failed", "account", name, **details)
 
 
-def _second_factor_failure(services: Services, account: Account, code: str | None) -> ApiError | None:
+def second_factor_failure(services: Services, account: Account, code: str | None) -> ApiError | None:
+    """Why a code is not enough; None where it fits, or none is asked for."""
     if account.totp_secret is None or account.totp_confirmed_at is None:
         return None
     if not code:
@@ -112,15 +111,32 @@ def _second_factor_failure(services: Services, account: Account, code: str | Non
     return WrongCredentials("That code is wrong or was used before.")
 
 
-def begin_session(services: Services, session: Session, account: Account, user_agent: str) -> str:
-    """Sign an account in that has just been recognised; return the session's token."""
+def begin_session(
+    services: Services,
+    session: Session,
+    account: Account,
+    user_agent: str,
+    *,
+    second_factor: bool | None = None,
+    provider: str | None = None,
+) -> str:
+    """Sign an account in that has just been recognised; return the session's token.
+
+    Parameters
+    ----------
+    second_factor : bool, optional
+        Whether one was given; where not said, what the account has was asked for.
+    provider : str, optional
+        Who recognised her; None for a password.
+    """
     token = new_token()
     session.add(
         AdminSession(
             account_id=account.id,
             token_hash=hash_token(token),
-            second_factor=account.totp_confirmed_at is not None,
+            second_factor=account.totp_confirmed_at is not None if second_factor is None else second_factor,
             user_agent=user_agent[:300],
+            provider=provider,
             expires_at=now() + timedelta(hours=services.settings.session_hours),
         )
     )
@@ -129,31 +145,33 @@ def begin_session(services: Services, session: Session, account: Account, user_a
 
 def create_account(session: Session, name: str, password: str, role: Role) -> Account:
     """Add an account; Conflict where the name is taken."""
-    if repository.account_named(session, name) is not None:
-        raise Conflict(f"There is already an account called '{name}'; choose another name.")
     return add_account(session, name, hash_password(password, name), role)
 
 
 def add_account(
-    session: Session, name: str, password_hash: str, role: Role, place: Place | None = None
+    session: Session, name: str, password_hash: str, role: Role, membership: Membership | None = None
 ) -> Account:
     """Add an account whose password was hashed before; Conflict where the name is taken.
 
-    place: where it belongs, and as what; the default workspace, in the same role, where None.
+    Parameters
+    ----------
+    membership : Membership, optional
+        Where it belongs, and as what; the default workspace, in the same role, where None.
     """
+    taken = Conflict(f"There is already an account called '{name}'; choose another name.")
     if repository.account_named(session, name) is not None:
-        raise Conflict(f"There is already an account called '{name}'; choose another name.")
+        raise taken
     account = Account(name=name, password_hash=password_hash, role=role)
     session.add(account)
     try:
         session.flush()
     except IntegrityError as error:  # somebody took it at this very moment
-        raise Conflict(f"There is already an account called '{name}'; choose another name.") from error
-    place = place or Place(default_workspace(session), role)
-    set_member(session, place.workspace, account, place.role)
+        raise taken from error
+    membership = membership or Membership(default_workspace(session), role)
+    set_member(session, membership.workspace, account, membership.role)
     record(
         session, identity_of(account), "account created", "account", name, role=role,
-        workspace=place.workspace.name, workspace_role=place.role,
+        workspace=membership.workspace.name, workspace_role=membership.role,
     )  # fmt: skip
     return account
 
@@ -163,38 +181,81 @@ def known_role(word: str) -> Role:
     return ROLES[ROLES.index(word)]
 
 
-def change_password(services: Services, who: Identity, fresh: str) -> None:
+def change_password(services: Services, identity: Identity, fresh: str) -> None:
     """Give oneself a new password (its hash); every other session and every API token ends."""
     with services.database.write() as session:
-        account_of(session, who).password_hash = fresh
-        end_everything(session, who.account_id, keep_session=who.session_id)
-        record(session, who, "password changed", "account", who.name)
+        account_of(session, identity).password_hash = fresh
+        end_everything(session, identity.account_id, keep_session=identity.session_id)
+        record(session, identity, "password changed", "account", identity.name)
 
 
-def own_password(services: Services, who: Identity) -> str:
+def own_password(services: Services, identity: Identity) -> str:
     """The hash of one's own password."""
     with services.database.read() as session:
-        return account_of(session, who).password_hash
+        return account_of(session, identity).password_hash
 
 
 def must_fit(password: str, stored: str) -> None:
     """WrongCredentials where this is not the present password."""
+    if not stored:
+        raise Conflict("This account has no password; an owner of the server can give it one.")
     if not password_fits(password, stored):
         raise WrongCredentials("The present password is wrong.")
 
 
-def reset_password(session: Session, name: str, fresh: str) -> None:
-    """From the command line: give an account a new password (its hash); sessions and tokens end."""
+def own_code_failure(services: Services, identity: Identity, code: str) -> ApiError | None:
+    """Why this is no code of one's own second factor; None where it is, and so is used up."""
+    with services.database.write() as session:
+        account = account_of(session, identity)
+        repository.hold(session, account.id)
+        session.refresh(account)
+        if account.totp_confirmed_at is None:
+            return Conflict(
+                "This account has neither password nor second factor; set up a second factor first."
+            )
+        return second_factor_failure(services, account, code)
+
+
+def reset_password(session: Session, name: str, fresh: str) -> str:
+    """From the command line: give an account a new password (its hash); says what became of its logins."""
     account = _named(session, name)
-    account.password_hash = fresh
-    end_everything(session, account.id)
+    logins = renew(session, None, account, fresh)
     record(session, None, "password reset", "account", account.name)
+    return logins
+
+
+def renew(session: Session, actor: Identity | None, account: Account, fresh: str) -> str:
+    """Give an account a new password (its hash) for one that is lost; sessions, tokens and logins end.
+
+    A login may be that of whoever stole the password. The logins of an account without any password stay:
+    they are how its own person signs in.
+
+    Returns
+    -------
+    str
+        A sentence for her about the logins; empty where there were none.
+    """
+    had_password, account.password_hash = account.password_hash, fresh
+    end_everything(session, account.id)
+    logins = repository.logins(session, account.id)
+    issuers = ", ".join(sorted({login.issuer for login in logins}))
+    if not logins:
+        return ""
+    if not had_password:
+        return f"It is signed in to by {issuers} as before; see under My account that the logins are yours."
+    for login in logins:
+        record(
+            session, actor, "login removed", "account", account.name,
+            provider=login.provider, issuer=login.issuer,
+        )  # fmt: skip
+        session.delete(login)
+    return f"Its logins by {issuers} are removed; add your own again under My account."
 
 
 def reset_second_factor(session: Session, name: str) -> None:
     """From the command line: turn an account's second factor off; sessions and tokens end."""
     account = _named(session, name)
-    _without_second_factor(account)
+    _without_second_factor(session, account)
     end_everything(session, account.id)
     record(session, None, "second factor reset", "account", account.name)
 
@@ -207,21 +268,21 @@ def _named(session: Session, name: str) -> Account:
     return account
 
 
-def start_second_factor(services: Services, who: Identity) -> str:
+def start_second_factor(services: Services, identity: Identity) -> str:
     """Give the account a fresh, unconfirmed secret and return it."""
     with services.database.write() as session:
-        account = account_of(session, who)
+        account = account_of(session, identity)
         if account.totp_confirmed_at is not None:
             raise Conflict("A second factor is set up already; remove it first.")
         account.totp_secret = second_factor.new_seed()
         return second_factor.secret_of(services.settings.key, account.totp_secret)
 
 
-def confirm_second_factor(services: Services, who: Identity, code: str) -> list[str]:
+def confirm_second_factor(services: Services, identity: Identity, code: str) -> list[str]:
     """Turn the second factor on once the app's first code fits; return the recovery codes."""
     codes = second_factor.new_recovery_codes()
     with services.database.write() as session:
-        account = account_of(session, who)
+        account = account_of(session, identity)
         if account.totp_secret is None or account.totp_confirmed_at is not None:
             raise Conflict("There is no second factor to confirm; start its set-up first.")
         secret = second_factor.secret_of(services.settings.key, account.totp_secret)
@@ -229,29 +290,31 @@ def confirm_second_factor(services: Services, who: Identity, code: str) -> list[
         if step is None:
             raise WrongCredentials("That code does not fit; check the clock of your phone and try again.")
         account.totp_confirmed_at, account.totp_last_step = now(), step
-        if (current := repository.session_of(session, who.account_id, who.session_id)) is not None:
+        if (current := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
             current.second_factor = True
         account.recovery_code_hashes = [second_factor.hash_recovery_code(c) for c in codes]
-        record(session, who, "second factor set up", "account", who.name)
+        record(session, identity, "second factor set up", "account", identity.name)
     return codes
 
 
-def remove_second_factor(services: Services, who: Identity) -> None:
+def remove_second_factor(services: Services, identity: Identity) -> None:
     """Turn the second factor off again; the password was asked for."""
     with services.database.write() as session:
-        _without_second_factor(account_of(session, who))
-        for row in repository.open_sessions(session, who.account_id):
+        _without_second_factor(session, account_of(session, identity))
+        for row in repository.open_sessions(session, identity.account_id):
             row.second_factor = False
-        record(session, who, "second factor removed", "account", who.name)
+        record(session, identity, "second factor removed", "account", identity.name)
 
 
-def _without_second_factor(account: Account) -> None:
+def _without_second_factor(session: Session, account: Account) -> None:
     account.totp_secret = account.totp_confirmed_at = account.totp_last_step = None
     account.recovery_code_hashes = []
+    # Who stands before the question for a code has shown no second factor, and there is none to show.
+    repository.end_sign_ins_that_ask_for_a_code(session, account.id)
 
 
 def change_account(
-    database: Database, who: Identity, account_id: int, role: Role | None, disabled: bool | None
+    database: Database, identity: Identity, account_id: int, role: Role | None, disabled: bool | None
 ) -> Account:
     """Change another account's role, or disable it and end its sessions; one owner must remain."""
     with database.write() as session:
@@ -267,7 +330,15 @@ def change_account(
             raise Conflict("One owner must remain; make another account an owner first.")
         if account.disabled_at is not None:
             end_everything(session, account.id)
-        record(session, who, "account changed", "account", account.name, role=account.role, disabled=disabled)
+        record(
+            session,
+            identity,
+            "account changed",
+            "account",
+            account.name,
+            role=account.role,
+            disabled=disabled,
+        )
     return account
 
 

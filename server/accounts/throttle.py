@@ -11,9 +11,10 @@ import ipaddress
 import secrets
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
-from server.errors import TooManyRequests
+from server.errors import ApiError, TooManyRequests
 from server.rate_limit import RateLimit
 from server.settings import Settings
 from server.tokens import derived_token, new_token
@@ -25,7 +26,7 @@ LONGEST_WAIT_S = 900.0
 FORGOTTEN_S = 6 * 3600.0
 RECORDS_PER_MINUTE = 20
 _MAX_KEYS = 20_000
-_EVERYBODY = "everybody"
+_EVERYBODY, _EVERYBODY_BACK = "everybody", "everybody who comes back"
 
 
 def address_range(address: str) -> str:
@@ -92,6 +93,7 @@ class SignInThrottle:
         self.overall = RateLimit(settings.logins_per_minute_overall)
         self._records, self._unwritten = RateLimit(RECORDS_PER_MINUTE), 0
         self.per_device = RateLimit(settings.logins_per_minute)
+        self.logouts = RateLimit(settings.logins_per_minute)
 
     def key(self, name: str, address: str, device: str | None) -> str:
         """What failures are counted by: the name, and the device or the range of addresses; unreadable."""
@@ -106,6 +108,25 @@ class SignInThrottle:
             return
         self.per_range.hit(self._hidden(address_range(address)))
         self.overall.hit(_EVERYBODY)
+
+    def come_back(self, address: str) -> None:
+        """Count a browser that a provider sent back; TooManyRequests where there were too many.
+
+        Apart from the attempts: its own was counted when it began, and to follow a link takes nobody's away.
+        """
+        self.per_range.hit(self._hidden(f"back at {address_range(address)}"))
+        self.overall.hit(_EVERYBODY_BACK)
+
+    @contextmanager
+    def logout(self, provider: str, address: str) -> Iterator[None]:
+        """Count refused logout tokens of a provider; TooManyRequests where too many came before."""
+        key = self._hidden(f"logout {provider} from {address_range(address)}")
+        self.logouts.check(key)
+        try:
+            yield
+        except ApiError:
+            self.logouts.hit(key)
+            raise
 
     def written(self) -> int | None:
         """How many failed sign-ins were not written down since the last; None: do not write this one.

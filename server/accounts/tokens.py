@@ -63,9 +63,15 @@ def revoke_token(database: Database, owner: Identity, token_id: int) -> None:
 
 
 def end_everything(session: Session, account_id: int, keep_session: int | None = None) -> None:
-    """End the sessions of an account, but for one, and revoke its API tokens."""
+    """End the sessions of an account, but for one, revoke its API tokens, and take back what is under way.
+
+    Whoever was in a stolen session may have asked for a link that makes an address of hers the account's, or
+    begun to add a login of hers.
+    """
+    repository.hold(session, account_id)
     for row in repository.sessions(session, account_id):
         if row.id != keep_session:
             row.revoked_at = row.revoked_at or now()
     for token in repository.tokens(session, account_id):
         token.revoked_at = token.revoked_at or now()
+    repository.forget_under_way(session, account_id)

@@ -42,13 +42,13 @@ def verify_chain(
     """
     kept = _head(head) if head else None
     with migrated_services() as services, services.database.snapshot() as session:
-        found = verify(session, services.settings.key, kept)
-    if found.broken is not None:
-        raise InputError(f"the audit log is broken: {found.broken}")
-    notes = [f"{found.position} entries in the chain"]
-    notes += [f"details of {found.erased} erased with their persons"] if found.erased else []
-    notes += [f"{found.before} rows from before there was a chain"] if found.before else []
-    out.print(f"whole: {', '.join(notes)}\nhead {found.position}:{found.hash}")
+        chain = verify(session, services.settings.key, kept)
+    if chain.broken is not None:
+        raise InputError(f"the audit log is broken: {chain.broken}")
+    notes = [f"{chain.position} entries in the chain"]
+    notes += [f"details of {chain.erased} erased with their persons"] if chain.erased else []
+    notes += [f"{chain.before} rows from before there was a chain"] if chain.before else []
+    out.print(f"whole: {', '.join(notes)}\nhead {chain.position}:{chain.hash}")
 
 
 def _head(text: str) -> tuple[int, str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from sqlalchemy import func, select, text
+from sqlalchemy import case, func, not_, select, text, true
 from sqlalchemy.orm import Session
 
 from server.models import AuditEntry
@@ -37,10 +37,12 @@ def first_id(session: Session) -> int | None:
     return session.scalar(select(func.min(AuditEntry.id)).where(AuditEntry.position.is_not(None)))
 
 
-def unchained(session: Session, from_id: int | None) -> list[int]:
-    """Rows that stand in no chain: those below the chain's first row (None), or from it on."""
-    query = select(AuditEntry.id).where(AuditEntry.position.is_(None)).order_by(AuditEntry.id)
-    return list(session.scalars(query if from_id is None else query.where(AuditEntry.id >= from_id)))
+def unchained(session: Session, first: int | None) -> tuple[int, int | None]:
+    """Of the rows in no chain, how many are older than its first row, and the number of one that is not."""
+    older = true() if first is None else AuditEntry.id < first
+    count, stray = func.count(case((older, 1))), func.min(case((not_(older), AuditEntry.id)))
+    row = session.execute(select(count, stray).where(AuditEntry.position.is_(None))).one()
+    return row[0], row[1]
 
 
 def erased_runs(session: Session) -> set[str]:

@@ -13,8 +13,16 @@ from server.models import AuditEntry
 class Verdict:
     """What going along the chain gave.
 
-    position, hash: of the last entry that fits. erased: entries whose details were erased with a person.
-    before: rows from before there was a chain. broken: what does not fit first; None where all does.
+    Attributes
+    ----------
+    position, hash : int, str
+        Of the last entry that fits.
+    erased : int
+        Entries whose details were erased with a person.
+    before : int
+        Rows from before there was a chain.
+    broken : str or None
+        What does not fit first; None where all does.
     """
 
     position: int
@@ -39,10 +47,10 @@ def verify(session: Session, secret: bytes, kept: tuple[int, str] | None = None)
     if broken is None and not seen and kept is not None:
         broken = f"entry {kept[0]}, whose hash was kept, is not in the chain: it was changed or cut off"
     first = repository.first_id(session)
-    if broken is None and first is not None and (strays := repository.unchained(session, first)):
-        broken = f"row {strays[0]} stands between the chain's rows without being in it: it was put in"
-    before = [row for row in repository.unchained(session, None) if first is None or row < first]
-    return Verdict(position, previous, erased, len(before), broken)
+    before, stray = repository.unchained(session, first)
+    if broken is None and stray is not None:
+        broken = f"row {stray} stands between the chain's rows without being in it: it was put in"
+    return Verdict(position, previous, erased, before, broken)
 
 
 def _problem(key: bytes, last: int, previous: str, entry: AuditEntry, erased_runs: set[str]) -> str | None:

@@ -43,13 +43,15 @@ SEAL = "materials/sealed-plan.json"
 
 
 @dataclass(frozen=True)
-class Wanted:
+class CapsuleContents:
     """What a capsule holds.
 
     Attributes
     ----------
-    clips: whether the clips are in it; their hashes are in the manifest always.
-    sensitivity: whether the report has the parts that take long.
+    clips : bool
+        Whether the clips are in it; their hashes are in the manifest always.
+    sensitivity : bool
+        Whether the report has the parts that take long.
     """
 
     origin: CapsuleOrigin = "participant"
@@ -58,7 +60,11 @@ class Wanted:
 
 
 def build_capsule(
-    services: Services, name: str, wanted: Wanted, target: Path, progress: Progress = lambda _, __: None
+    services: Services,
+    name: str,
+    contents: CapsuleContents,
+    target: Path,
+    progress: Progress = lambda _, __: None,
 ) -> Capsule:
     """Write the capsule of a study to `target`, whole or not at all.
 
@@ -76,11 +82,11 @@ def build_capsule(
         with services.database.snapshot() as session:
             study = find_study(session, name, OPERATOR, "view")
             version = active_version(session, study)
-            source = _write_study(session, study, version, folder, made, wanted)
+            source = _write_study(session, study, version, folder, made, contents)
             experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
             known = counted(session, study, source.origin, source.series)
         # The snapshot has ended: what follows may take an hour, and the database must not wait for it.
-        if wanted.clips:
+        if contents.clips:
             progress(0.15, "copying clips")
             _copy_clips(services.clips, manifest, folder)
         progress(0.3, "analysing")
@@ -102,9 +108,9 @@ def _without_answers(manifest: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _write_study(
-    session: Session, study: Study, version: StudyVersion, folder: Path, made: str, wanted: Wanted
+    session: Session, study: Study, version: StudyVersion, folder: Path, made: str, contents: CapsuleContents
 ) -> ReportSource:
-    exported: Folder = dataset_folder(session, study, made, wanted.origin)
+    exported: Folder = dataset_folder(session, study, made, contents.origin)
     for path, pieces in exported.members:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         with (folder / path).open("wb") as stream:
@@ -124,9 +130,9 @@ def _write_study(
         definition=f"materials/{experiment.name}.toml",
         answers=exported.answers,
         runs=exported.runs,
-        origin=wanted.origin,
+        origin=contents.origin,
         series=version.series,
-        sensitivity=wanted.sensitivity,
+        sensitivity=contents.sensitivity,
         renamed=exported.renamed,
         seal=SEAL if seal else None,
         rebuilt=(),
@@ -143,7 +149,7 @@ def _plan(experiment: Experiment) -> dict[str, object]:
 def _copy_clips(store: ClipStore, manifest: Manifest, folder: Path) -> None:
     clips = folder / "materials" / "clips"
     clips.mkdir(parents=True)
-    for clip in manifest.clips:
+    for clip in manifest.files:
         target, size = clips / clip.file, store.size(clip.sha256)
         if size is None:
             raise InputError(f"clip {clip.file} is missing from the clip store; run: server doctor")

@@ -9,7 +9,7 @@ from rich.console import Console
 from experiments.errors import InputError
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
-from server.capsules.build import CapsuleOrigin, Wanted, build_capsule
+from server.capsules.build import CapsuleContents, CapsuleOrigin, build_capsule
 from server.cli_common import migrated_services, out
 from server.studies.lookup import active_definition, find_study
 
@@ -51,7 +51,7 @@ def capsule(
         made = build_capsule(
             services,
             study,
-            Wanted(origin, clips, sensitivity),
+            CapsuleContents(origin, clips, sensitivity),
             out_file,
             lambda _, step: status.update(f"capsule: {step}"),
         )

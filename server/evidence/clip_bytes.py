@@ -2,7 +2,10 @@
 
 import hashlib
 import hmac
+import math
+import time
 from collections import OrderedDict
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 
@@ -10,8 +13,7 @@ from server.storage.clips import ClipStore, FolderStore
 
 MAX_KEPT_BYTES = 64 << 20
 MAX_CLIP_BYTES = 32 << 20
-"""Digests of larger clips stay unchecked: a rating does not wait so long."""
-
+"""Larger clips are hashed piece by piece in the background: a rating does not wait so long."""
 
 MAX_HASHES = 200_000
 
@@ -26,12 +28,12 @@ def clip_digest(ticket: str, *hashes: bytes) -> str:
 
     64 hexadecimal digits of HMAC-SHA-256(ticket, SHA-512(first clip) || SHA-512(second clip) ...).
     """
-    return hmac.digest(ticket.encode(), b"".join(hashes), hashlib.sha256).hex()
+    return hmac.digest(ticket.encode(), b"".join(hashes), "sha256").hex()
 
 
 def older_digest(ticket: str, clips: bytes) -> str:
     """As pages make it that were open before: of the clips' bytes themselves, which takes longer."""
-    return hmac.digest(ticket.encode(), clips, hashlib.sha256).hex()
+    return hmac.digest(ticket.encode(), clips, "sha256").hex()
 
 
 class ClipBytes:
@@ -45,6 +47,7 @@ class ClipBytes:
         self._hashes: dict[str, bytes] = {}
         self._lock = Lock()
         self._fetching: set[str] = set()
+        self._prepared: set[int] = set()
         self._pool: ThreadPoolExecutor | None = None
 
     def at_once(self, sha256: str, size: int) -> bytes | None:
@@ -54,15 +57,52 @@ class ClipBytes:
             return kept
         if self._local:
             return self._read(sha256, size)
-        self._fetch(sha256, size)
-        return None
+        return self._fetch(sha256, size)
 
     def hash_at_once(self, sha256: str, size: int) -> bytes | None:
         """The `clip_hash` of a clip where it can be had without waiting."""
         known = self._hashes.get(sha256)
-        if known is None and self.at_once(sha256, size) is not None:
-            known = self._hashes.get(sha256)
-        return known
+        if known is not None:
+            return known
+        if size > MAX_CLIP_BYTES:
+            self._in_background(sha256, size, self._hash_in_pieces)
+            return None
+        return None if self.at_once(sha256, size) is None else self._hashes.get(sha256)
+
+    def hash_now(self, sha256: str, size: int, limit: float) -> bytes | None:
+        """The `clip_hash` of a clip, read for it where it must be; None where it cannot be read whole.
+
+        It is read until `limit` by the monotonic clock.
+        """
+        if sha256 not in self._hashes:
+            self._hash_in_pieces(sha256, size, limit)
+        return self._hashes.get(sha256)
+
+    def feed(self, sha256: str, size: int, take: Callable[[bytes], object], limit: float = math.inf) -> bool:
+        """Give a clip to `take` piece by piece; False where it could not be read whole by `limit`."""
+        length = 0
+        try:
+            for piece in self._store.read(sha256, 0, size):
+                if time.monotonic() > limit:
+                    return False
+                take(piece)
+                length += len(piece)
+        except Exception:
+            return False
+        return length == size
+
+    def prepare(self, version: int, clips: Iterable[tuple[str, int]]) -> None:
+        """Hash the clips of a study's version, hash and size of each, before they are answered.
+
+        Once a version and process: all where clips lie in an object store, of a folder those that are large.
+        """
+        with self._lock:
+            if version in self._prepared:
+                return
+            self._prepared.add(version)
+        for sha256, size in clips:
+            if not self._local or size > MAX_CLIP_BYTES:
+                self.hash_at_once(sha256, size)
 
     def _in_memory(self, sha256: str) -> bytes | None:
         with self._lock:
@@ -92,22 +132,39 @@ class ClipBytes:
             while self._bytes > MAX_KEPT_BYTES:
                 self._bytes -= len(self._kept.popitem(last=False)[1])
 
-    def _fetch(self, sha256: str, size: int) -> None:
+    def _fetch(self, sha256: str, size: int) -> bytes | None:
+        """The clip where it has come since memory was looked at; otherwise it is on its way."""
+        if not self._in_background(sha256, size, self._read):
+            with self._lock:
+                return self._kept.get(sha256)
+        return None
+
+    def _hash_in_pieces(self, sha256: str, size: int, limit: float = math.inf) -> None:
+        """Hash a clip that is too large for the memory; nothing where it cannot be read whole."""
+        hashed = hashlib.sha512()
+        is_whole = self.feed(sha256, size, hashed.update, limit)
         with self._lock:
-            if sha256 in self._fetching:
-                return
+            if is_whole and len(self._hashes) < MAX_HASHES:
+                self._hashes[sha256] = hashed.digest()
+
+    def _in_background(self, sha256: str, size: int, make: Callable[[str, int], object]) -> bool:
+        """Make something of a clip in the one thread for it; False where it is in memory or on its way."""
+        with self._lock:
+            if sha256 in self._fetching or sha256 in self._kept:
+                return False
             self._fetching.add(sha256)
             if self._pool is None:
                 self._pool = ThreadPoolExecutor(1, "palpebra-clips")
 
-        def fetch() -> None:
+        def run() -> None:
             try:
-                self._read(sha256, size)
+                make(sha256, size)
             finally:
                 with self._lock:
                     self._fetching.discard(sha256)
 
-        self._pool.submit(fetch)
+        self._pool.submit(run)
+        return True
 
     def close(self) -> None:
         """Fetch nothing more."""

@@ -22,11 +22,24 @@ SEEN, POWER = 0.95, 0.99
 class JudgedAnswer:
     """One answer with its evidence, as far as it brought any.
 
-    part: practice, main, attention or check. expected: what an attention check asked for, or what a motion
-    check's clip shows. choices: how many answers a motion check offered. void: the check tells nothing, since
-    its play failed or it was passed over. other_way: it was answered the way offered to those who cannot see
-    it. needs_digest: it rated a clip. issued_at: of its ticket, None where it had none. press_ms: median
-    length of its presses.
+    Attributes
+    ----------
+    part : str
+        `practice`, `main`, `attention` or `check`.
+    expected : int or None
+        What an attention check asked for, or what a motion check's clip shows.
+    choices : int
+        How many answers a motion check offered.
+    void : bool
+        The check tells nothing, since its play failed or it was passed over.
+    other_way : bool
+        It was answered the way offered to those who cannot see it.
+    needs_digest : bool
+        It rated a clip.
+    issued_at : datetime or None
+        Of its ticket, None where it had none.
+    press_ms : float or None
+        Median length of its presses.
     """
 
     trial_index: int
@@ -53,22 +66,43 @@ class JudgedAnswer:
 class Signals:
     """The signals of one run. Shares are from 0 to 1, times in milliseconds.
 
-    tickets: share of answers with a good ticket. digests: share of rated clips, of those that could be
-    checked, whose digest was right.
-    clip_time: length of the clips over the server's time from the first ticket to the last answer.
-    claimed_time: the same with the response times that the page claims added to the clips.
-    order: share of first plays that came in the order of the trials. late: share of late deliveries.
-    interaction: share of answers with a press reported. trusted: share of presses made by input, not by
-    scripts.
-    press_ms, press_spread: median and standard deviation of the presses' lengths.
-    rt_median, rt_spread: median response time, standard deviation of its natural logarithm.
-    same_answer: share of the most frequent answer. cycle: share of answers equal to the one some trials
-    before, at the best distance from two to four. checks: share of attention checks answered as asked.
-    motion_checks: share of motion checks answered rightly, of the `motion_checks_asked` that tell something.
-    motion_checks_guessed: how likely guesses are right as often as that; None where too few were asked to
-    tell guesses from people.
-    motion_checks_other_way: how many were answered the other way that the study offers.
-    motion_checks_void: how many tell nothing, since their play failed or they were passed over.
+    Attributes
+    ----------
+    tickets : float or None
+        Share of answers with a good ticket.
+    digests : float or None
+        Share of rated clips, of those that could be checked, whose digest was right.
+    clip_time : float or None
+        Length of the clips over the server's time from the first ticket to the last answer.
+    claimed_time : float or None
+        The same with the response times that the page claims added to the clips.
+    order : float or None
+        Share of first plays that came in the order of the trials.
+    late : float or None
+        Share of late deliveries.
+    interaction : float or None
+        Share of answers with a press reported.
+    trusted : float or None
+        Share of presses made by input, not by scripts.
+    press_ms, press_spread : float or None
+        Median and standard deviation of the presses' lengths.
+    rt_median, rt_spread : float or None
+        Median response time, standard deviation of its natural logarithm.
+    same_answer : float or None
+        Share of the most frequent answer.
+    cycle : float or None
+        Share of answers equal to the one some trials before, at the best distance from two to four.
+    checks : float or None
+        Share of attention checks answered as asked.
+    motion_checks : float or None
+        Share of motion checks answered rightly, of the `motion_checks_asked` that tell something.
+    motion_checks_guessed : float or None
+        How likely guesses are right as often as that; None where too few were asked to tell guesses from
+        people.
+    motion_checks_other_way : float or None
+        How many were answered the other way that the study offers.
+    motion_checks_void : float or None
+        How many tell nothing, since their play failed or they were passed over.
     """
 
     tickets: float | None = None
@@ -97,7 +131,13 @@ SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
 
 
 def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> Signals:
-    """The signals of a run's answers, in any order; passed_over: choices of the checks without an answer."""
+    """The signals of a run's answers, in any order.
+
+    Parameters
+    ----------
+    passed_over : sequence of int, optional
+        Choices of the checks without an answer.
+    """
     if not answers:
         return Signals()
     came = sorted(answers, key=lambda one: (one.received_at, one.trial_index))

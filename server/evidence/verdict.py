@@ -79,10 +79,15 @@ def judge(
 ) -> Judgement:
     """The verdict on a run whose page was asked for evidence.
 
-    refused: answers of the run were refused for their evidence, which happens to no page of this program.
-    passed_over: number of choices of each motion check that was left out.
     Where motion checks were answered the other way that the study offers, or too many of them tell nothing,
     the verdict is at most unclear; not so where they were too few to tell anything.
+
+    Parameters
+    ----------
+    refused : bool, optional
+        Answers of the run were refused for their evidence, which happens to no page of this program.
+    passed_over : sequence of int, optional
+        Number of choices of each motion check that was left out.
     """
     signals = signals_of(answers, passed_over)
     points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused

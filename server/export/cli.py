@@ -78,20 +78,20 @@ def export(
     if (bom or guard) and form not in CSV_FORMATS:
         raise InputError(f"--bom and --guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
     with migrated_services() as services, services.database.snapshot() as session:
-        found = find_study(session, study, OPERATOR, "view")
+        known = find_study(session, study, OPERATOR, "view")
         if form != "codebook":
             action = "identities downloaded" if form == "identities" else "data downloaded"
             with services.database.write() as noted:
                 record(noted, None, action, "study", study, what=form, origin=origin)
         try:
-            size = _write(out_file, proofed(FORMATS[form](session, found, origin), form, bom, guard))
+            size = _write(out_file, proofed(FORMATS[form](session, known, origin), form, bom, guard))
             if form == "csv" and scripts and str(out_file) != "-":
-                beside = _write_scripts(out_file, active_definition(session, found))
+                beside = _write_scripts(out_file, active_definition(session, known))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
             ) from error
-        there = runs_by_origin(session, found)
+        there = runs_by_origin(session, known)
     if str(out_file) != "-":
         out.print(f"{out_file}: {size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
     if form not in ("codebook", "identities") and origin != "all" and origin not in there and there:

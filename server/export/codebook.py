@@ -13,15 +13,15 @@ from server.export.wide import wide_columns
 
 def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
     """The CSV's factor columns, which stand in the place of the view's `levels`: those of all versions."""
-    found: dict[str, Column] = {}
+    columns: dict[str, Column] = {}
     for factor in (factor for definition in definitions for factor in definition.factors):
-        before = dict(found[factor.name].labels) if factor.name in found else {}
+        before = dict(columns[factor.name].labels) if factor.name in columns else {}
         labels = {**before, **{level.name: level.label for level in factor.levels}}
         meaning = f"Level of the factor {factor.label}."
-        found[factor.name] = Column(
+        columns[factor.name] = Column(
             factor.name, "text", meaning, values=tuple(labels), labels=tuple(labels.items())
         )
-    return list(found.values())
+    return list(columns.values())
 
 
 def rating_columns(definitions: Iterable[Experiment]) -> list[Column]:
@@ -73,21 +73,21 @@ def variables_measured(columns: list[Column]) -> list[dict[str, Any]]:
 
 
 def _variable(column: Column) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    variable: dict[str, Any] = {
         "@type": "PropertyValue",
         "name": column.name,
         "description": column.description,
         "additionalType": column.type,
     }
     if column.unit:
-        found["unitText"] = column.unit
+        variable["unitText"] = column.unit
     if column.minimum is not None:
-        found["minValue"] = column.minimum
+        variable["minValue"] = column.minimum
     if column.maximum is not None:
-        found["maxValue"] = column.maximum
+        variable["maxValue"] = column.maximum
     if column.values:
-        found["valueReference"] = [_term(value, dict(column.labels)) for value in column.values]
-    return found
+        variable["valueReference"] = [_term(value, dict(column.labels)) for value in column.values]
+    return variable
 
 
 def _term(value: str, labels: dict[str, str]) -> dict[str, str]:

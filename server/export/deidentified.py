@@ -19,12 +19,12 @@ MOVED = "All times of the dataset are moved alike, so that its first run starts 
 
 def deidentified(table: ExportTable, first: datetime | None) -> ExportTable:
     """The table without identifying columns, its times counted from `first`."""
-    kept = [place for place, column in enumerate(table.columns) if not column.identifying]
-    columns = [table.columns[place] for place in kept]
-    times = frozenset(place for place, column in enumerate(columns) if column.type == "time")
+    kept = [index for index, column in enumerate(table.columns) if not column.identifying]
+    columns = [table.columns[index] for index in kept]
+    times = frozenset(index for index, column in enumerate(columns) if column.type == "time")
     described = [
-        replace(column, description=f"{column.description} {MOVED}") if place in times else column
-        for place, column in enumerate(columns)
+        replace(column, description=f"{column.description} {MOVED}") if index in times else column
+        for index, column in enumerate(columns)
     ]
     shift = EPOCH - first.astimezone(UTC) if first else timedelta()
     return replace(table, columns=described, rows=_moved(table.rows, kept, times, shift))
@@ -34,9 +34,9 @@ def _moved(
     rows: Iterator[Sequence[Any]], kept: list[int], times: frozenset[int], shift: timedelta
 ) -> Iterator[Sequence[Any]]:
     for row in rows:
-        cells = [row[place] for place in kept]
-        for place in times:
-            cells[place] = _shifted(cells[place], shift)
+        cells = [row[index] for index in kept]
+        for index in times:
+            cells[index] = _shifted(cells[index], shift)
         yield cells
 
 

@@ -2,18 +2,19 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Literal
 
 from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.export import codebook, identities, psych_ds, repository, runs
-from server.export.converted import columns_json, converted
+from server.export.converted import Ending, columns_json, converted
 from server.export.excel import guarded, marked
 from server.export.origins import ExportOrigin
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.ratings_csv import rating_count
-from server.export.tables import answers_table, runs_table, wide_table
+from server.export.tables import ExportTable, answers_table, runs_table, wide_table
 from server.export.wide import cells_of
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
@@ -68,6 +69,24 @@ def identities_csv(session: Session, study: Study, origin: ExportOrigin) -> Iter
     yield from csv_pieces(whole(rows, repository.known_person_count(session, study), extra=1))
 
 
+@dataclass(frozen=True)
+class Conversion:
+    """A table that is converted as a whole, and into what."""
+
+    table: Callable[[Session, Study, ExportOrigin], ExportTable]
+    ending: Ending
+
+    def pieces(self, session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+        """The converted file."""
+        return converted(self.table(session, study, origin), self.ending)
+
+
+CONVERSIONS: dict[Format, Conversion] = {
+    "spss": Conversion(answers_table, "sav"),
+    "spss-wide": Conversion(wide_table, "sav"),
+    "parquet": Conversion(answers_table, "parquet"),
+    "parquet-wide": Conversion(wide_table, "parquet"),
+}
 FORMATS: dict[Format, Pieces] = {
     "csv": ratings_csv,
     "wide": wide_csv,
@@ -76,10 +95,7 @@ FORMATS: dict[Format, Pieces] = {
     "codebook": codebook_markdown,
     "psych-ds": psych_ds_zip,
     "identities": identities_csv,
-    "spss": lambda *of: converted(answers_table(*of), "sav"),
-    "spss-wide": lambda *of: converted(wide_table(*of), "sav"),
-    "parquet": lambda *of: converted(answers_table(*of), "parquet"),
-    "parquet-wide": lambda *of: converted(wide_table(*of), "parquet"),
+    **{form: conversion.pieces for form, conversion in CONVERSIONS.items()},
     "columns": lambda *of: iter([columns_json(answers_table(*of).columns)]),
 }
 

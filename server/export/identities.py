@@ -19,7 +19,19 @@ def identity_rows(session: Session, study: Study) -> Iterator[list[Any]]:
             study.name,
             person.run,
             person.participant,
-            person.identifier or "",
+            person.known_as.identifier,
             person.label if person.link_kind == "personal" else "",
-            json.dumps(person.parameters or {}, sort_keys=True, ensure_ascii=False),
+            json.dumps(dict(person.known_as.parameters), sort_keys=True, ensure_ascii=False),
         ]
+
+
+def check_readable(session: Session, study: Study) -> None:
+    """See that every id opens before the first is given.
+
+    Raises
+    ------
+    UnreadableError
+        A key is under another secret key.
+    """
+    for _ in repository.known_people(session, study):
+        pass

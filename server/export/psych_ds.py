@@ -34,8 +34,12 @@ class Folder:
 
     Attributes
     ----------
-    members: path and bytes of each file, tables last; taken once.
-    answers, runs: paths of those tables. renamed: factors that have another name in this folder.
+    members : iterator of Member
+        Path and bytes of each file, tables last; taken once.
+    answers, runs : str
+        Paths of those tables.
+    renamed : dict of str to str
+        Factors that have another name in this folder.
     """
 
     members: Iterator[Member]
@@ -121,7 +125,7 @@ def description(study: Study, definition: Experiment, columns: list[Column], mad
     technique, about = definition.trial.kind.replace("_", " "), definition.dataset
     given = KINDS[definition.trial.kind].view.name.capitalize()
     usual = f"{definition.title}. {given} of short clips collected with Palpebra."
-    found: dict[str, Any] = {
+    dataset: dict[str, Any] = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": study.name,
@@ -133,10 +137,10 @@ def description(study: Study, definition: Experiment, columns: list[Column], mad
         "keywords": [technique, "video clips", *(f.label for f in definition.factors), *about.keywords],
     }
     if about.creators:
-        found["creator"] = [_creator(creator) for creator in about.creators]
+        dataset["creator"] = [_creator(creator) for creator in about.creators]
     if about.licence_page:
-        found["license"] = about.licence_page
-    return found | {"variableMeasured": variables_measured(list(variables.values()))}
+        dataset["license"] = about.licence_page
+    return dataset | {"variableMeasured": variables_measured(list(variables.values()))}
 
 
 def _creator(creator: Creator) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.definition import Experiment
+from experiments.design import rated_levels
 from experiments.trials import KINDS
 from experiments.trials.scales import scales_of
 
@@ -25,16 +26,19 @@ def script(
 
     Parameters
     ----------
-    data: the CSV it reads where it is not told another: a path from the script's own folder.
-    names: what factors are called in that CSV, where it is not their own name.
+    data : str
+        The CSV it reads where it is not told another: a path from the script's own folder.
+    names : mapping of str to str, optional
+        What factors are called in that CSV, where it is not their own name.
     """
     column = dict(names or {})
     factors: list[dict[str, Any]] = [
         {
             "name": column.get(factor.name, factor.name),
             "label": factor.label,
-            "levels": [level.name for level in factor.levels],
+            "levels": rated_levels(experiment, factor.name),
             "between": factor.between,
+            "random": factor.random,
         }
         for factor in experiment.factors
     ]
@@ -52,8 +56,7 @@ def script(
 
 
 def _in_plan(experiment: Experiment, factor: Mapping[str, Any], column: Mapping[str, str]) -> bool:
-    planned = {column.get(name, name) for name in experiment.analysis.factors}
-    return not planned or factor["name"] in planned
+    return factor["name"] in {column.get(name, name) for name in experiment.compared_factors}
 
 
 def _environment() -> Environment:

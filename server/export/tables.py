@@ -29,8 +29,14 @@ class ExportTable:
 
     Attributes
     ----------
-    name: as files are called by it. columns: in order. rows: without a header; taken once.
-    count: of the rows, which `rows` is held to.
+    name : str
+        As files are called by it.
+    columns : list of Column
+        In order.
+    rows : iterator of Row
+        Without a header; taken once.
+    count : int
+        Of the rows, which `rows` is held to.
     """
 
     name: str

@@ -12,6 +12,7 @@ from experiments.columns import RUN_COLUMNS, Column
 from experiments.columns.form_columns import FormColumn, run_columns
 from experiments.columns.names import plain_name, unlike
 from experiments.definition import Experiment
+from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials.scales import RatedScale, scales_of
 from server.export.origins import ExportOrigin
@@ -55,10 +56,14 @@ def cells_of(experiment: Experiment) -> list[Cell]:
             f"{experiment.trial.kind}: take the long table (answers)"
         )
     within = [factor for factor in experiment.factors if not factor.between]
+    rated = [
+        [level for level in factor.levels if level.name in rated_levels(experiment, factor.name)]
+        for factor in within
+    ]
     cells: list[Cell] = []
     taken = {name.casefold() for name in _TAKEN}
     for scale in scales:
-        for levels in product(*(factor.levels for factor in within)):
+        for levels in product(*rated):
             name = unlike("_".join((scale.name, *(plain_name(one.name) for one in levels))), taken)
             said = ", ".join(f"{f.label}: {one.label}" for f, one in zip(within, levels, strict=True))
             column = Column(
@@ -112,7 +117,7 @@ def wide_rows(
     for row in run_rows(session, study, origin, forms):
         groups, count, means = by_run.get(row[at], ({}, 0, {}))
         yield [
-            *(row[place] for place in kept),
+            *(row[index] for index in kept),
             *(groups.get(name, "") for name in between),
             count,
             *(means.get((cell.scale, cell.levels), "") for cell in cells),
@@ -140,7 +145,7 @@ def _by_run(
         # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier one
         # of its trial; a later one without an answer leaves the earlier standing.
         if row[response] is not None:
-            levels = tuple(str(row[place]) for place in within)
+            levels = tuple(str(row[index]) for index in within)
             answers[row[trial], row[scale]] = (levels, float(row[response]))
         groups[row[run]] = {name: str(row[header.index(name)]) for name in between}
     return {name: (groups[name], len(answers), _means(answers)) for name, answers in last.items()}

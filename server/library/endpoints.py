@@ -43,7 +43,7 @@ class BlinkLibrary(BaseModel):
 
 
 @router.get("/library")
-def get_library(services: ServicesDep, _who: Viewer) -> BlinkLibrary:
+def get_library(services: ServicesDep, _identity: Viewer) -> BlinkLibrary:
     """Recorded profiles and the PCA model."""
     folder = services.settings.library_folder
     if not (folder / "profiles.csv").is_file():

@@ -23,18 +23,18 @@ class Strips(BaseModel):
 
 
 @router.get("")
-def get_strips(services: ServicesDep, _who: Viewer) -> Strips:
+def get_strips(services: ServicesDep, _identity: Viewer) -> Strips:
     """What strips there are; none where they have not been made on this server."""
-    found = _declared(services.settings.strips_folder)
-    return found or Strips(width_px=1, height_px=1, closures=[], characters=[])
+    strips = _declared(services.settings.strips_folder)
+    return strips or Strips(width_px=1, height_px=1, closures=[], characters=[])
 
 
 @router.get("/{name}.webp", response_class=Response)
-def get_strip(services: ServicesDep, _who: Viewer, name: str) -> Response:
+def get_strip(services: ServicesDep, _identity: Viewer, name: str) -> Response:
     """The strip of one character."""
     folder = services.settings.strips_folder
-    found = _declared(folder)
-    if found is None or name not in found.characters:
+    strips = _declared(folder)
+    if strips is None or name not in strips.characters:
         raise NotFound(
             f"There is no picture strip of '{name}'; run `stimuli strips --out DATA_FOLDER/stimuli/strips`."
         )

@@ -58,8 +58,8 @@ def methods(
             f"expected {service.RESULTS} in {report}, found none; run `analysis run --out` first"
         )
     with migrated_services() as services, services.database.read() as session:
-        found = service.methods_of(
+        methods = service.methods_of(
             session, find_study(session, study, OPERATOR, "view"), origin.value, series, results
         )
-    written = {Form.TEXT: found.text, Form.LATEX: found.latex, Form.JSON: found.json}[form]()
+    written = {Form.TEXT: methods.text, Form.LATEX: methods.latex, Form.JSON: methods.json}[form]()
     typer.echo(written, nl=False)

@@ -37,29 +37,29 @@ class MethodsOut(BaseModel):
 @router.get("")
 def get_methods(
     services: ServicesDep,
-    who: Viewer,
+    identity: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
     series: Number | None = None,
 ) -> MethodsOut:
     """Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts."""
     with services.database.read() as session:
-        found = service.methods_of(session, find_study(session, study, who, "view"), origin, series)
-    listed = [MethodsNumber.model_validate(vars(number)) for number in found.numbers.values()]
+        methods = service.methods_of(session, find_study(session, study, identity, "view"), origin, series)
+    listed = [MethodsNumber.model_validate(vars(number)) for number in methods.numbers.values()]
     return MethodsOut(
-        origin=origin, series=found.series, paragraph=found.plain(), latex=found.latex(), numbers=listed
+        origin=origin, series=methods.series, paragraph=methods.plain(), latex=methods.latex(), numbers=listed
     )
 
 
 @router.get("/methods.txt", response_class=Response)
 def get_methods_text(
     services: ServicesDep,
-    who: Viewer,
+    identity: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
     series: Number | None = None,
 ) -> Response:
     """The paragraph as plain text, with the query of each number below it."""
     with services.database.read() as session:
-        found = service.methods_of(session, find_study(session, study, who, "view"), origin, series)
-    return Response(found.text(), media_type="text/plain; charset=utf-8")
+        methods = service.methods_of(session, find_study(session, study, identity, "view"), origin, series)
+    return Response(methods.text(), media_type="text/plain; charset=utf-8")

@@ -94,29 +94,32 @@ def _escaped(text: str) -> str:
 
 
 def sentences(
-    experiment: Experiment, recruiter: str, found: Mapping[str, Number], rules: Sequence[tuple[str, str]]
+    experiment: Experiment, recruiter: str, counted: Mapping[str, Number], rules: Sequence[tuple[str, str]]
 ) -> tuple[str, ...]:
     """The sentences that apply to a study.
 
-    rules: name of the number and words of each declared exclusion that a report has applied.
+    Parameters
+    ----------
+    rules : sequence of (str, str)
+        Name of the number and words of each declared exclusion that a report has applied.
     """
     return (
-        *_recruitment(recruiter, found),
+        *_recruitment(recruiter, counted),
         *_screening(experiment),
-        *_checks(experiment),
+        *_checks(experiment, counted),
         *_warnings(experiment),
         *_exclusions(experiment, rules),
         *_display(experiment),
-        *_evidence(found),
+        *_evidence(counted),
     )
 
 
-def _recruitment(recruiter: str, found: Mapping[str, Number]) -> list[str]:
+def _recruitment(recruiter: str, counted: Mapping[str, Number]) -> list[str]:
     through = "" if recruiter == "generic" else f", recruited through {RECRUITERS[recruiter]}"
     lines = [f"Visits begun: {{begun}}{through}; consent was given in {{agreed}}."]
-    if found["by_personal_link"].value:
+    if counted["by_personal_link"].value:
         lines.append("By personal link came {by_personal_link}.")
-    if found["by_recruiter"].value:
+    if counted["by_recruiter"].value:
         lines.append("The recruiter named the person in {by_recruiter}; data bear pseudonyms of this study.")
     lines.append(
         "Of all visits {complete} were completed, {withdrew} ended at the person's wish, "
@@ -133,10 +136,37 @@ def _screening(experiment: Experiment) -> list[str]:
     return [f"Rules of screening, declared before the data: {names}."] if names else []
 
 
-def _checks(experiment: Experiment) -> list[str]:
-    each = experiment.attention.per_block
-    declared = f"{each} instructed answer{'s' * (each != 1)} a block"
-    return [f"Attention was checked by {declared}; completed visits hold {{checks}}."] if each else []
+def declared(experiment: Experiment) -> dict[str, Number]:
+    """The numbers of the paragraph that stand in the declaration."""
+    keys = {
+        "attention_per_block": ("attention.per_block", experiment.attention.per_block),
+        "motion_checks_per_block": (
+            "evidence.motion_checks.per_block",
+            experiment.evidence.motion_checks.per_block,
+        ),
+    }
+    return {name: Number(name, value, f"declaration: {key}") for name, (key, value) in keys.items()}
+
+
+def _checks(experiment: Experiment, counted: Mapping[str, Number]) -> list[str]:
+    lines = []
+    if each := experiment.attention.per_block:
+        answers = f"{{attention_per_block}} instructed answer{'s' * (each != 1)} a block"
+        lines.append(f"Attention was checked by {answers}; completed visits hold {{checks}}.")
+    motion = experiment.evidence.motion_checks
+    if motion.per_block:
+        kinds = ", ".join(kind.replace("_", " ") for kind in motion.kinds)
+        lines.append(
+            f"In each block {{motion_checks_per_block}} short clip{'s' * (motion.per_block != 1)} showed "
+            f"what was asked by motion alone ({kinds}); of {{motion_checks}} answers to them in completed "
+            "visits {motion_checks_right} were right."
+        )
+    if counted["motion_checks_other_way"].value:
+        lines.append(
+            "{motion_checks_other_way} were answered the other way that is offered to people who cannot "
+            "see such clips."
+        )
+    return lines
 
 
 def _warnings(experiment: Experiment) -> list[str]:
@@ -168,8 +198,8 @@ def _display(experiment: Experiment) -> list[str]:
     return lines
 
 
-def _evidence(found: Mapping[str, Number]) -> list[str]:
-    judged = sum(found[name].value for name in ("likely", "unclear", "unlikely"))
+def _evidence(counted: Mapping[str, Number]) -> list[str]:
+    judged = sum(counted[name].value for name in ("likely", "unclear", "unlikely"))
     if not judged:
         return [
             "Whether answers were given by people was not judged ({not_judged} completed visits bring no "
@@ -181,4 +211,6 @@ def _evidence(found: Mapping[str, Number]) -> list[str]:
         "person's, {unclear} unclear, {unlikely} unlikely, and {not_judged} could not be judged.",
         "This is evidence, not proof: it does not tell a person who lets a program choose the answers.",
     ]
-    return [*lines, "Answers were refused in {refused} visits."] if found["refused"].value else lines
+    return (
+        [*lines, "Answers or views were refused in {refused} visits."] if counted["refused"].value else lines
+    )

@@ -16,11 +16,14 @@ PLAYS = (
     "WHERE r.study_id = :study AND r.origin = :origin AND v.series = :series AND r.status = 'complete'"
 )
 COMPLETE = "r.status = 'complete'"
+ASKED = "a.kind = 'check' AND t.verdict <> 'failed'"
+OTHER_WAY = "coalesce(CAST(t.payload ->> 'other_way' AS text), '0') IN ('1', 'true')"
+"""As SQLite and PostgreSQL write a true of JSON."""
 OF_RUNS: dict[str, str] = {
     "begun": "TRUE",
     "by_personal_link": "EXISTS (SELECT 1 FROM links l WHERE l.id = r.link_id AND l.kind = 'personal')",
     "by_recruiter": "EXISTS (SELECT 1 FROM recruiter_identities i "
-    "WHERE i.study_run_id = r.id AND i.identifier <> '')",
+    "WHERE i.study_run_id = r.id AND i.identifier_hash <> '')",
     "agreed": "r.consented_at IS NOT NULL",
     "screened_out": "r.status = 'screened_out'",
     "withdrew": "r.status = 'withdrawn'",
@@ -36,10 +39,13 @@ OF_RUNS: dict[str, str] = {
     "ended_by_warnings": "EXISTS (SELECT 1 FROM run_events e WHERE e.study_run_id = r.id "
     "AND e.type = 'screened_out' AND CAST(e.data AS text) LIKE '%\"lapse\"%')",
     "refused": "EXISTS (SELECT 1 FROM run_events e "
-    "WHERE e.study_run_id = r.id AND e.type = 'answer_refused')",
+    "WHERE e.study_run_id = r.id AND e.type IN ('answer_refused', 'view_refused'))",
 }
 OF_PLAYS: dict[str, str] = {
     "checks": "a.kind = 'attention'",
+    "motion_checks": f"{ASKED} AND NOT {OTHER_WAY}",
+    "motion_checks_right": f"{ASKED} AND CAST(t.payload ->> 'check' AS integer) = a.expected_response",
+    "motion_checks_other_way": f"a.kind = 'check' AND {OTHER_WAY}",
     "plays": "a.kind = 'main'",
     "plays_good": "a.kind = 'main' AND t.verdict = 'good'",
     "plays_uncertain": "a.kind = 'main' AND t.verdict = 'uncertain'",
@@ -56,7 +62,7 @@ QUERIES: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Number:
-    """A number and where it comes from: a query of the database, or the key of a report."""
+    """A number and where it comes from: a query, the key of a report, or that of the declaration."""
 
     name: str
     value: int

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.files import whole_file
-from server.methods.paragraph import Methods, sentences
+from server.methods.paragraph import Methods, declared, sentences
 from server.methods.repository import Number, numbers
 from server.models import Study
 from server.participants.recruiter import Recruiter
@@ -17,7 +17,7 @@ from server.studies.lookup import definition_of
 from server.studies.series import version_of_series
 
 RESULTS = "results.json"
-PLACE = "<!-- after the method -->"
+METHOD_MARK = "<!-- after the method -->"
 """Where `analysis run` leaves room in its page."""
 
 
@@ -44,30 +44,31 @@ def counted(session: Session, study: Study, origin: str, series: int | None) -> 
     """What the database has to say of a series: its declaration and every number."""
     version = version_of_series(session, study, series)
     recruiter = Recruiter.model_validate(study.recruiter).kind if study.recruiter else "generic"
-    found = numbers(session, study.id, origin, version.series)
-    return Counted(study.name, origin, version.series, definition_of(version), recruiter, found)
+    experiment = definition_of(version)
+    counts = numbers(session, study.id, origin, version.series) | declared(experiment)
+    return Counted(study.name, origin, version.series, experiment, recruiter, counts)
 
 
 def paragraph_of(known: Counted, results: dict[str, Any] | None) -> Methods:
     """The paragraph of what was counted, and of the results of a report."""
     excluded = _excluded(results)
     rules = [(name, words) for name, (words, _) in excluded.items()]
-    found = known.numbers | {name: number for name, (_, number) in excluded.items()}
-    lines = sentences(known.experiment, known.recruiter, found, rules)
-    return Methods(known.study, known.origin, known.series, lines, found)
+    counts = known.numbers | {name: number for name, (_, number) in excluded.items()}
+    lines = sentences(known.experiment, known.recruiter, counts, rules)
+    return Methods(known.study, known.origin, known.series, lines, counts)
 
 
 def read_results(folder: Path) -> dict[str, Any] | None:
     """The numbers of the report in this folder; None where it has none."""
     path = folder / RESULTS
-    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-    return found if isinstance(found, dict) else None
+    results = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    return results if isinstance(results, dict) else None
 
 
 def write(folder: Path, methods: Methods) -> None:
     """Put the paragraph into a report, and beside it as text, as LaTeX, and with its numbers as JSON."""
     page = folder / "report.html"
-    written = page.read_text(encoding="utf-8").replace(PLACE, methods.html(), 1)
+    written = page.read_text(encoding="utf-8").replace(METHOD_MARK, methods.html(), 1)
     with whole_file(page) as temporary:
         temporary.write_text(written, encoding="utf-8")
     write_beside(folder, methods)
@@ -87,16 +88,16 @@ def _excluded(results: dict[str, Any] | None) -> dict[str, tuple[str, Number]]:
         for reason in run["reasons"]:
             rule = str(reason).split(":", 1)[0]
             counts[rule] = counts.get(rule, 0) + 1
-    found = {
+    excluded = {
         f"visits_{_key(rule)}": (f"visits by {_words(rule)}", count, "exclusions.runs[].reasons")
         for rule, count in counts.items()
     }
     for dropped in left_out.get("trials", []):
         words = f"trials by {_words(dropped['rule'])}"
-        found[f"trials_{_key(dropped['rule'])}"] = (words, int(dropped["trials"]), "exclusions.trials[]")
+        excluded[f"trials_{_key(dropped['rule'])}"] = (words, int(dropped["trials"]), "exclusions.trials[]")
     return {
-        name: (words, Number(name, count, f"{RESULTS} of the report: {place} of this rule"))
-        for name, (words, count, place) in found.items()
+        name: (words, Number(name, count, f"{RESULTS} of the report: {source} of this rule"))
+        for name, (words, count, source) in excluded.items()
     }
 
 

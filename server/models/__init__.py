@@ -12,24 +12,15 @@ from server.models.accounts import (
 )
 from server.models.base import Base, UtcDateTime
 from server.models.evidence import AnswerEvidence
-from server.models.runs import (
-    NO_SLOT,
-    RUN_STATUSES,
-    STAGES,
-    AssignedTrial,
-    Calibration,
-    FormAnswer,
-    Rating,
-    RecruiterIdentity,
-    RunEvent,
-    StudyRun,
-    TrialClip,
-    View,
-    ViewClip,
-)
+from server.models.logins import AccountLogin, LoginAttempt, Purpose
+from server.models.mail import LetterPurpose, MailedLink
+from server.models.runs import NO_SLOT, RUN_STATUSES, STAGES, IdentityKey, RecruiterIdentity, StudyRun
 from server.models.series import SeriesAnswer, SeriesOffer, SeriesTrial
 from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
 from server.models.tallies import RunTally
+from server.models.trials import AssignedTrial, Rating, TrialClip
+from server.models.views import View, ViewClip
+from server.models.visit import Calibration, FormAnswer, RunEvent
 from server.models.workspaces import (
     DEFAULT_WORKSPACE,
     RIGHTS,
@@ -47,6 +38,7 @@ __all__ = [
     "RUN_STATUSES",
     "STAGES",
     "Account",
+    "AccountLogin",
     "AdminSession",
     "AnswerEvidence",
     "ApiToken",
@@ -56,9 +48,14 @@ __all__ = [
     "Calibration",
     "Clip",
     "FormAnswer",
+    "IdentityKey",
     "Invitation",
     "Job",
+    "LetterPurpose",
     "Link",
+    "LoginAttempt",
+    "MailedLink",
+    "Purpose",
     "Rating",
     "RecruiterIdentity",
     "Right",

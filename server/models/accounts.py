@@ -17,8 +17,11 @@ ROLES: tuple[Role, ...] = get_args(Role)
 class Account(Base):
     """A person who runs studies. Passwords are argon2 hashes; recovery codes are hashed too.
 
-    role: on the server itself. Owners manage accounts and workspaces and read the audit log, experimenters
-    may make workspaces, viewers neither. What somebody may do with studies is the workspaces' to say.
+    Attributes
+    ----------
+    role : str
+        On the server itself. Owners manage accounts and workspaces and read the audit log, experimenters may
+        make workspaces, viewers neither. What somebody may do with studies is the workspaces' to say.
     """
 
     __tablename__ = "accounts"
@@ -40,8 +43,12 @@ class Account(Base):
 class Invitation(Base):
     """A one-time link to create an account, the first owner's included; only the token's hash is stored.
 
-    role: on the server. workspace_id, workspace_role: where the account will belong, and as what; the default
-    workspace, and the same role, where not given.
+    Attributes
+    ----------
+    role : str
+        On the server.
+    workspace_id, workspace_role : int or None, str or None
+        Where the account will belong, and as what; the default workspace, and the same role, where not given.
     """
 
     __tablename__ = "invitations"
@@ -60,7 +67,13 @@ class Invitation(Base):
 
 
 class AdminSession(Base):
-    """A signed-in browser. The cookie's token is stored hashed. No internet address is stored."""
+    """A signed-in browser. The cookie's token is stored hashed. No internet address is stored.
+
+    Attributes
+    ----------
+    provider : str or None
+        Who signed it in (`server.providers`) and may so sign it out; None for a password.
+    """
 
     __tablename__ = "admin_sessions"
 
@@ -73,6 +86,7 @@ class AdminSession(Base):
     last_seen_at: Mapped[datetime] = mapped_column(default=now)
     expires_at: Mapped[datetime]
     revoked_at: Mapped[datetime | None]
+    provider: Mapped[str | None] = mapped_column(String(30))
 
     account: Mapped[Account] = relationship()
 
@@ -98,8 +112,12 @@ class ApiToken(Base):
 class AuditEntry(Base):
     """Who did what and when; rows are only ever added, and chained by hashes (`server.audit.chain`).
 
-    position: in the chain; None for rows from before there was one. details_salt: None where the details were
-    erased with a person.
+    Attributes
+    ----------
+    position : int or None
+        In the chain; None for rows from before there was one.
+    details_salt : str or None
+        None where the details were erased with a person.
     """
 
     __tablename__ = "audit_entries"

@@ -1,9 +1,11 @@
 """What every table shares: names of constraints, time stamps in UTC, lists of allowed words."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, MetaData
+from sqlalchemy.dialects import sqlite
 from sqlalchemy.orm import DeclarativeBase
 from sqlalchemy.types import TypeDecorator, TypeEngine
 
@@ -16,6 +18,18 @@ CONVENTION = {
 }
 
 
+class _IsoText(sqlite.DATETIME):
+    """A moment as SQLAlchemy writes it for SQLite, by Python's own C code: a rating has a dozen."""
+
+    def bind_processor(self, _dialect: Dialect) -> Callable[[datetime | None], str | None]:
+        """What makes the text of a moment."""
+
+        def text(moment: datetime | None) -> str | None:
+            return None if moment is None else moment.isoformat(" ", "microseconds")
+
+        return text
+
+
 class UtcDateTime(TypeDecorator[datetime]):
     """A moment in UTC: `timestamptz` in PostgreSQL, ISO text without a zone in SQLite."""
 
@@ -24,7 +38,9 @@ class UtcDateTime(TypeDecorator[datetime]):
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
         """The column type of this database."""
-        return dialect.type_descriptor(DateTime(timezone=dialect.name == "postgresql"))
+        if dialect.name == "sqlite":
+            return dialect.type_descriptor(_IsoText())  # type: ignore[no-untyped-call]
+        return dialect.type_descriptor(DateTime(timezone=True))
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """Refuse a time without a zone; store UTC."""
@@ -32,7 +48,7 @@ class UtcDateTime(TypeDecorator[datetime]):
             return None
         if value.tzinfo is None:
             raise ValueError(f"expected a time with its zone, got {value.isoformat()}")
-        moment = value.astimezone(UTC)
+        moment = value if value.tzinfo is UTC else value.astimezone(UTC)
         return moment if dialect.name == "postgresql" else moment.replace(tzinfo=None)
 
     def process_result_value(self, value: datetime | None, _dialect: Dialect) -> datetime | None:

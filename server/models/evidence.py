@@ -12,9 +12,18 @@ from server.models.base import Base
 class AnswerEvidence(Base):
     """The evidence of one answer: one play of one trial.
 
-    issued_at: of the ticket's batch, by the server's clock. clip_ms: how long the clip lasts, over all views.
-    digest_right: None where no digest was needed, or the clip was not at hand to check it.
-    late: it came long after it was given. interaction: the page's summary of presses.
+    Attributes
+    ----------
+    issued_at : datetime
+        Of the ticket's batch, by the server's clock.
+    clip_ms : float
+        How long the clip lasts, over all views.
+    digest_right : bool or None
+        None where no digest was needed, or as long as the clip was not at hand to check it.
+    late : bool
+        It came long after it was given.
+    interaction : dict of str to Any or None
+        The page's summary of presses.
     """
 
     __tablename__ = "answer_evidence"

@@ -11,8 +11,14 @@ _TRIAL = ["assigned_trials.study_run_id", "assigned_trials.trial_index"]
 class SeriesTrial(Base):
     """A trial that shows a stimulus of the grid; practice belongs to no series.
 
-    position: in its series, from 1. role: of the clip that is the stimulus. closed: the series ended before
-    it, so that it needs no answer.
+    Attributes
+    ----------
+    position : int or None
+        In its series, from 1.
+    role : str
+        Of the clip that is the stimulus.
+    closed : bool
+        The series ended before it, so that it needs no answer.
     """
 
     __tablename__ = "series_trials"
@@ -30,7 +36,13 @@ class SeriesTrial(Base):
 
 
 class SeriesOffer(Base):
-    """A stimulus that the server has chosen for a trial. known: answers of the series the choice rests on."""
+    """A stimulus that the server has chosen for a trial.
+
+    Attributes
+    ----------
+    known : int
+        Answers of the series the choice rests on.
+    """
 
     __tablename__ = "series_offers"
     __table_args__ = (
@@ -47,9 +59,19 @@ class SeriesOffer(Base):
 class SeriesAnswer(Base):
     """What one play of such a trial says to its series; written with the rating of that play.
 
-    value: number of the stimulus shown. positive: yes, or the right one of two. counts: whether it moves the
-    estimate. number: its place among those that do, from 1. known, ahead: earlier answers of the series that
-    the choice of the stimulus knew, and did not. The estimate after it is written when it has been reckoned.
+    Attributes
+    ----------
+    value : float
+        Number of the stimulus shown.
+    positive : bool or None
+        Yes, or the right one of two.
+    counts : bool
+        Whether it moves the estimate.
+    number : int or None
+        Its place among those that do, from 1.
+    known, ahead : int
+        Earlier answers of the series that the choice of the stimulus knew, and did not. The estimate after it
+        is written when it has been reckoned.
     """
 
     __tablename__ = "series_answers"

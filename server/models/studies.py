@@ -14,12 +14,24 @@ from server.tokens import new_pseudonym_key
 class Study(Base):
     """A study on this server. What is declared lies in its versions; new runs use `active_version`.
 
-    status: draft (only previews), pilot, live, closed. paused: no new runs for the moment.
-    quota: complete runs after which the study closes itself. revision: counts edits, so that of two people
-    editing at once the second is told. recruiter: see `server.participants.recruiter`.
-    archived_at: since when it is out of the list of studies; it can be read, and not changed.
-    pseudonym_key: what the names of its participants are made with; it never leaves the database.
-    workspace_id: the laboratory it belongs to; a study of none is open to nobody but the command line.
+    Attributes
+    ----------
+    status : str
+        Draft (only previews), pilot, live, closed.
+    paused : bool
+        No new runs for the moment.
+    quota : int or None
+        Complete runs after which the study closes itself.
+    revision : int
+        Counts edits, so that of two people editing at once the second is told.
+    recruiter : dict of str to Any or None
+        See `server.participants.recruiter`.
+    archived_at : datetime or None
+        Since when it is out of the list of studies; it can be read, and not changed.
+    pseudonym_key : str
+        What the names of its participants are made with; it never leaves the database.
+    workspace_id : int or None
+        The laboratory it belongs to; a study of none is open to nobody but the command line.
     """
 
     __tablename__ = "studies"
@@ -50,8 +62,12 @@ class Study(Base):
 class StudyVersion(Base):
     """One frozen declaration of a study with the manifest of its clips; never changed once a run uses it.
 
-    format: of the stored definition. series: versions of a study that measure the same have the same number;
-    only their answers may be pooled.
+    Attributes
+    ----------
+    format : int
+        Of the stored definition.
+    series : int
+        Versions of a study that measure the same have the same number; only their answers may be pooled.
     """
 
     __tablename__ = "study_versions"
@@ -95,8 +111,12 @@ class Clip(Base):
 class VersionClip(Base):
     """A clip's place in a study version: its cell, levels and exemplar.
 
-    blinks_s: onsets of the blinks of a performance in s; None for other clips.
     The clips of motion checks have no cell (`CHECK_CELL`); their level is `check`, their exemplar its number.
+
+    Attributes
+    ----------
+    blinks_s : list of float or None
+        Onsets of the blinks of a performance in s; None for other clips.
     """
 
     __tablename__ = "version_clips"
@@ -120,9 +140,17 @@ class VersionClip(Base):
 class Link(Base):
     """A way in. The token itself is derived from the secret key and `public_id`; only its hash is stored.
 
-    kind: general (any number of people), personal (one person, resumes on any device), preview (nothing is
-    counted or exported). label: who or what it is for. synthetic: its runs are simulated, not people.
-    group_name: the group its participants come into, where links decide; else empty.
+    Attributes
+    ----------
+    kind : str
+        General (any number of people), personal (one person, resumes on any device), preview (nothing is
+        counted or exported).
+    label : str
+        Who or what it is for.
+    synthetic : bool
+        Its runs are simulated, not people.
+    group_name : str
+        The group its participants come into, where links decide; else empty.
     """
 
     __tablename__ = "links"

@@ -1,5 +1,7 @@
 """What was counted of each run, kept in the transaction of each rating."""
 
+from datetime import datetime
+
 from sqlalchemy import ForeignKey, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
@@ -9,8 +11,20 @@ from server.models.base import Base
 class RunTally(Base):
     """The counts of one run; `server.tallies.tally` reads and writes the two texts.
 
-    heat: a letter a trial. not_good: plays that were flagged or failed.
-    counts: of plays, times and cells, as JSON. answers: packed, by scale, as JSON.
+    Attributes
+    ----------
+    heat : str
+        A letter a trial.
+    not_good : int
+        Plays that were flagged or failed.
+    counts : str
+        Of plays, times and cells, as JSON.
+    answers : str
+        Packed, by scale, as JSON.
+    clip_ms, newest_clip_ms : float
+        Of the answers' evidence, in ms: `server.evidence.clip_time.ClipTime`.
+    first_issued_at, newest_issued_at, last_received_at : datetime or None
+        Of the same.
     """
 
     __tablename__ = "run_tallies"
@@ -22,3 +36,8 @@ class RunTally(Base):
     not_good: Mapped[int]
     counts: Mapped[str] = mapped_column(Text)
     answers: Mapped[str] = mapped_column(Text)
+    clip_ms: Mapped[float] = mapped_column(default=0.0)
+    newest_clip_ms: Mapped[float] = mapped_column(default=0.0)
+    first_issued_at: Mapped[datetime | None]
+    newest_issued_at: Mapped[datetime | None]
+    last_received_at: Mapped[datetime | None]

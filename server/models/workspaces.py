@@ -20,7 +20,10 @@ DEFAULT_WORKSPACE = "default"
 class Workspace(Base):
     """A laboratory: its people and its studies.
 
-    second_factor_required: its studies open only to who signed in with a second factor.
+    Attributes
+    ----------
+    second_factor_required : bool
+        Its studies open only to who signed in with a second factor.
     """
 
     __tablename__ = "workspaces"

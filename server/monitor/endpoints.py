@@ -14,7 +14,7 @@ from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
 from server.monitor.schemas import MonitorSnapshot
 from server.participants.schemas import Origin
-from server.studies.lookup import active_definition, find_study, may_see_persons
+from server.studies.lookup import active_definition, study_with_rights
 from server.workspaces.rights import SecondFactorNeeded
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
@@ -25,12 +25,11 @@ RETRY_MS = 1000
 """After so long a browser whose stream ended connects again."""
 
 
-def _snapshot(services: Services, name: str, who: Identity, origin: Origin | None) -> MonitorSnapshot:
+def _snapshot(services: Services, name: str, identity: Identity, origin: Origin | None) -> MonitorSnapshot:
     with services.database.read() as session:
-        study = find_study(session, name, who, "view")
-        persons = who.sees_persons and may_see_persons(session, study, who)
+        study, rights = study_with_rights(session, name, identity, "view")
         shown = service.snapshot(session, study, active_definition(session, study), origin)
-    if persons:
+    if identity.sees_persons and "export" in rights:
         return shown
     nameless = [run.model_copy(update={"participant": run.run}) for run in shown.runs]
     return shown.model_copy(update={"runs": nameless})
@@ -38,10 +37,10 @@ def _snapshot(services: Services, name: str, who: Identity, origin: Origin | Non
 
 @router.get("/monitor")
 def get_monitor(
-    services: ServicesDep, who: Viewer, study: str, origin: Origin | None = None
+    services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> MonitorSnapshot:
     """The monitor at this moment, of one origin; that of people now taking part where none is given."""
-    return _snapshot(services, study, who, origin)
+    return _snapshot(services, study, identity, origin)
 
 
 def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
@@ -62,14 +61,14 @@ async def _waited(services: Services) -> bool:
 
 @router.get("/monitor/stream", response_class=StreamingResponse)
 def stream_monitor(
-    request: Request, services: ServicesDep, who: Viewer, study: str, origin: Origin | None = None
+    request: Request, services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> StreamingResponse:
     """Server-sent events: the whole monitor first, then every two seconds what has changed.
 
     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
     when the session ends or the server does; the browser then connects again by itself.
     """
-    first = _snapshot(services, study, who, origin)
+    first = _snapshot(services, study, identity, origin)
 
     async def events() -> AsyncIterator[str]:
         before: MonitorSnapshot | None = None

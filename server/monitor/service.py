@@ -24,7 +24,7 @@ MAX_LISTED = 500
 
 
 def snapshot(
-    session: Session, study: Study, experiment: Experiment, wanted: Origin | None = None
+    session: Session, study: Study, experiment: Experiment, chosen: Origin | None = None
 ) -> MonitorSnapshot:
     """The monitor of `study` at this moment.
 
@@ -33,7 +33,7 @@ def snapshot(
     """
     lease = timedelta(minutes=experiment.session.lease_minutes)
     moment = now()
-    origin: Origin = wanted or ("pilot" if study.status == "pilot" else "participant")
+    origin: Origin = chosen or ("pilot" if study.status == "pilot" else "participant")
     every = repository.run_counts(session, study)
     counted = [kind for kind in every if kind.origin == origin]
     by_status = Counter[str]()

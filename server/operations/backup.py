@@ -2,6 +2,7 @@
 
 The file is a tar: `backup.json` (what is in it), `tables/NAME.ndjson.gz` (the rows, of neither database's own
 form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips/SHA256.mp4`, `secret_key`.
+The keys of recruiters' ids are in a file of their own, see `server.operations.keys_apart`.
 """
 
 import gzip
@@ -23,6 +24,9 @@ from experiments.errors import InputError
 from experiments.files import whole_private_file
 from server.clock import iso, now
 from server.context import Services
+from server.operations import erasures, keys_apart
+from server.operations.keys_apart import KeyFile
+from server.operations.locking import locked
 from server.operations.repository import clip_hashes
 from server.operations.rows import Content, Digest
 from server.operations.rows_repository import read_rows, snapshot, tables_of
@@ -44,37 +48,76 @@ class Description(BaseModel):
     format: int = Field(default=1, description="Raised when the form of the file changes.")
     program_version: str
     revision: str = Field(description="Revision of the database the rows were read from.")
-    created_at: str
+    created_at: str = Field(description="The moment of the rows, and of the key file of this backup.")
     tables: dict[str, TableDescription]
+    keys_apart: bool = Field(default=False, description="Keys of ids and pseudonyms are in the key file.")
     clips: list[str] = Field(description="SHA-256 of each clip in the file; empty where left out.")
 
 
-def back_up(services: Services, path: Path, *, with_clips: bool = True) -> Description:
-    """Write a backup of one moment while the server goes on; mode 600, under its name only once complete."""
-    with _written(path) as stream, tarfile.open(fileobj=stream, mode="w|") as tar:
+def back_up(
+    services: Services, path: Path, *, with_clips: bool = True, keys: Path | None = None
+) -> Description:
+    """Write a backup of one moment while the server goes on; mode 600, under its name only once complete.
+
+    The key file (`keys`, beside the backup where None) and a copy of the ledger of erasures beside that are
+    written before the backup has its name: no backup stands there without its keys.
+    """
+    key_path = keys or keys_apart.beside(path)
+    keys_apart.check_replaceable(key_path, services.settings.key)
+    with _written(path) as stream:
+        described, kept = write_backup(services, stream, with_clips=with_clips)
+        _write_keys(services, key_path, kept)
+    return described
+
+
+def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
+    """Key file and ledger, by one backup of the installation at a time."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with locked(services.settings.data_folder / "backup-keys.lock"):
+        keys_apart.check_replaceable(path, services.settings.key)
+        keys_apart.write_keys(path, kept)
+        _write_ledger(services, path.parent / erasures.NAME)
+
+
+def _write_ledger(services: Services, path: Path) -> None:
+    """A copy of the ledger of erasures beside the key file; what it names already stays."""
+    there = path.read_bytes() if path.is_file() else b""
+    with whole_private_file(path) as stream:
+        stream.write(erasures.merged(there, erasures.content(services.settings)))
+
+
+def write_backup(
+    services: Services, stream: IO[bytes], *, with_clips: bool = True
+) -> tuple[Description, KeyFile]:
+    """Write a backup of one moment into a stream; return what is in it, and the keys that are not."""
+    with tarfile.open(fileobj=stream, mode="w|") as tar:
         with snapshot(services.database) as connection, tempfile.TemporaryDirectory() as folder:
             described = _describe(connection, services, Path(folder), with_clips)
+            kept = keys_apart.read_keys(connection, services.settings.key, described.created_at)
             _add_bytes(tar, DESCRIPTION, described.model_dump_json(indent=2).encode())
             for name in described.tables:
                 tar.add(Path(folder) / name, TABLES + name + ".ndjson.gz", filter=_plain)
         _add_bytes(tar, KEY, services.settings.key)
         for sha256 in described.clips:
             _add_clip(tar, services, sha256)
-    return described
+    return described, kept
 
 
 def _describe(connection: Connection, services: Services, folder: Path, with_clips: bool) -> Description:
     """Dump every table into `folder` and describe what was dumped."""
-    revision = MigrationContext.configure(connection).get_current_revision()
+    revision = MigrationContext.configure(connection).get_current_revision()  # the snapshot begins
+    moment = iso(now())
     if revision is None:
         raise InputError("the database has no tables yet; there is nothing to back up")
-    tables = {table.name: _dump(connection, table, folder / table.name) for table in tables_of(connection)}
+    dumped = [table for table in tables_of(connection) if table.name != keys_apart.APART]
+    tables = {table.name: _dump(connection, table, folder / table.name) for table in dumped}
     clips = clip_hashes(connection)
     return Description(
         program_version=version("palpebra"),
         revision=revision,
-        created_at=iso(now()),
+        created_at=moment,
         tables={name: TableDescription(rows=c.rows, sha256=c.sha256) for name, c in tables.items()},
+        keys_apart=True,
         clips=[clip for clip in clips if with_clips and services.clips.size(clip) is not None],
     )
 
@@ -82,7 +125,8 @@ def _describe(connection: Connection, services: Services, folder: Path, with_cli
 def _dump(connection: Connection, table: Table, path: Path) -> Content:
     digest = Digest()
     with gzip.open(path, "wt", encoding="utf-8", compresslevel=6) as stream:
-        for row in read_rows(connection, table):
+        for stored in read_rows(connection, table):
+            row = keys_apart.without_key(stored) if table.name == keys_apart.STUDIES else stored
             digest.add(row)
             stream.write(json.dumps(row, ensure_ascii=False) + "\n")
     return digest.content()

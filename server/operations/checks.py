@@ -5,16 +5,20 @@ import shutil
 import sqlite3
 import stat
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from typing import Literal
 from urllib.parse import urlsplit
 
+from experiments.errors import InputError
 from server.context import Services
+from server.identities.repository import readable
 from server.migrate import current_revision, newest_revision
 from server.operations import repository
 from server.operations.modes import open_to_others
+from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, watched_backups
 from server.tallies.recount import Recount
 
 Verdict = Literal["ok", "warning", "failed"]
@@ -28,15 +32,17 @@ class Finding:
 
     subject: str
     verdict: Verdict
-    found: str
+    state: str
     advice: str = ""
 
 
 def python(_services: Services) -> Iterator[Finding]:
     """The interpreter is recent enough."""
-    found = ".".join(map(str, sys.version_info[:3]))
+    version = ".".join(map(str, sys.version_info[:3]))
     fine = sys.version_info >= OLDEST_PYTHON
-    yield Finding("python", "ok" if fine else "failed", found, "" if fine else "install Python 3.11 or newer")
+    yield Finding(
+        "python", "ok" if fine else "failed", version, "" if fine else "install Python 3.11 or newer"
+    )
 
 
 def data_folder(services: Services) -> Iterator[Finding]:
@@ -60,12 +66,12 @@ def data_folder(services: Services) -> Iterator[Finding]:
 def file_modes(services: Services) -> Iterator[Finding]:
     """Nothing in the data folder can be read by other users."""
     folder = services.settings.data_folder
-    found = list(islice(open_to_others(folder), 1000))
-    if not found:
+    open_files = list(islice(open_to_others(folder), 1000))
+    if not open_files:
         yield Finding("file modes", "ok", "for this user alone")
         return
-    more = "or more " if len(found) == 1000 else ""
-    said = f"{len(found)} {more}open to other users, such as {found[0]}"
+    more = "or more " if len(open_files) == 1000 else ""
+    said = f"{len(open_files)} {more}open to other users, such as {open_files[0]}"
     yield Finding("file modes", "failed", said, f"run: chmod -R go= {folder}")
 
 
@@ -89,10 +95,10 @@ def secret_key(services: Services) -> Iterator[Finding]:
 def database(services: Services) -> Iterator[Finding]:
     """The database opens, has the newest tables, and keeps what it acknowledges."""
     opened = services.database
-    found, expected = current_revision(opened), newest_revision()
+    revision, expected = current_revision(opened), newest_revision()
     where = opened.url.render_as_string(hide_password=True)
-    fine = found == expected
-    said = f"{where}, revision {found or 'none'}"
+    fine = revision == expected
+    said = f"{where}, revision {revision or 'none'}"
     yield Finding(
         "database", "ok" if fine else "failed", said, "" if fine else "run: server database upgrade"
     )
@@ -140,6 +146,18 @@ def counts(services: Services) -> Iterator[Finding]:
         )
     else:
         yield Finding("counts", "ok", f"of {compared.runs} runs, as their ratings")
+
+
+def identities(services: Services) -> Iterator[Finding]:
+    """Recruiters' ids can be read with the installation's key."""
+    with services.database.read() as session:
+        counted = Counter(readable(session))
+    if counted[False]:
+        said = f"{counted[False]} of {counted.total()} recruiters' ids cannot be read"
+        advice = "the secret key was changed; run: server database rewrap OLD_KEY_FILE"
+        yield Finding("recruiters' ids", "failed", said, advice)
+    else:
+        yield Finding("recruiters' ids", "ok", f"{counted.total()}, each under a key of its own")
 
 
 def clips(services: Services) -> Iterator[Finding]:
@@ -194,6 +212,46 @@ def people(services: Services) -> Iterator[Finding]:
     yield Finding("studies", "ok" if studies else "warning", str(studies), advice)
 
 
+def backups(services: Services) -> Iterator[Finding]:
+    """Backups are made, and one was brought back."""
+    try:
+        watched = watched_backups(services.settings)
+    except InputError as error:
+        yield Finding("backups", "failed", str(error), "see why their store cannot be reached")
+        return
+    if watched is None:
+        yield Finding("backups", "ok", "not watched: PALPEBRA_BACKUP_FOLDER is not set")
+        return
+    if watched.age_s is None:
+        yield Finding("backups", "warning", "there is none", "run: server backup, each day")
+        return
+    said = f"the newest is {watched.age_s / 3600:.0f} h old"
+    fine = watched.age_s <= OLD_AFTER_S
+    yield Finding(
+        "backups", "ok" if fine else "warning", said, "" if fine else "see why no newer one is made"
+    )
+    yield _drilled(watched)
+
+
+def _drilled(watched: WatchedBackups) -> Finding:
+    drill = watched.drill
+    if drill is None and watched.drilled_elsewhere:
+        return Finding(
+            "restore drill",
+            "warning",
+            "not here",
+            "run where the private key is: server drill --identity FILE",
+        )
+    if drill is None:
+        return Finding("restore drill", "warning", "none was made", "run: server drill")
+    if not drill.passed:
+        advice = "make a backup anew and run: server drill"
+        return Finding("restore drill", "failed", f"{drill.backup}: {drill.said}", advice)
+    return Finding(
+        "restore drill", "ok", f"{drill.backup} came back whole on {drill.at:%Y-%m-%d}, {drill.rows} rows"
+    )
+
+
 CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     python,
     data_folder,
@@ -201,9 +259,11 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     secret_key,
     database,
     counts,
+    identities,
     clips,
     pages,
     public_address,
     people,
+    backups,
 )
 """In the order in which one would put things right."""

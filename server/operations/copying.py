@@ -53,14 +53,14 @@ def _copy(source: Database, target: Database, told: Callable[[str, Content], Non
         into = {table.name: table for table in tables_of(writing)}
         for table in tables_of(reading):
             written = write_rows(writing, into[table.name], read_rows(reading, table))
-            found = content_of(writing, into[table.name])
-            if found != written:
+            content = content_of(writing, into[table.name])
+            if content != written:
                 raise InputError(
-                    f"table {table.name}: {written.rows} rows were written, {found.rows} were read back or "
+                    f"table {table.name}: {written.rows} rows were written, {content.rows} were read back or "
                     "their values differ; nothing was kept, please report this"
                 )
-            copied[table.name] = found
-            told(table.name, found)
+            copied[table.name] = content
+            told(table.name, content)
     return copied
 
 
@@ -80,12 +80,12 @@ def _opened(url: str) -> Database:
 
 def _check_revision(source: Database) -> None:
     try:
-        found, expected = current_revision(source), newest_revision()
+        revision, expected = current_revision(source), newest_revision()
     except OperationalError as error:
         reason = str(error.orig).strip().splitlines()[0]
         raise InputError(f"cannot open {address(source.url.render_as_string())}: {reason}") from error
-    if found != expected:
+    if revision != expected:
         raise InputError(
-            f"the source has revision {found}, expected {expected}; "
+            f"the source has revision {revision}, expected {expected}; "
             "run `server database upgrade` with DATABASE_URL set to it first"
         )

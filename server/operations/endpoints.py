@@ -1,14 +1,17 @@
-"""`/metrics` for Prometheus: with a token, or from this machine alone."""
+"""`/metrics` for Prometheus: with a token, or from this machine alone; how the backups are, for owners."""
 
 import hmac
 
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
+from server.accounts.identity import Owner
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, ApiError
 from server.operations.metrics import exposition
+from server.operations.schemas import BackupsOut, backups_out
 
+admin_router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_RESPONSES)
 router = APIRouter(tags=["health"], responses=ERROR_RESPONSES, include_in_schema=False)
 THIS_MACHINE = frozenset({"127.0.0.1", "::1", "localhost"})
 
@@ -28,7 +31,13 @@ def metrics(request: Request, services: ServicesDep) -> Response:
             "Metrics need `Authorization: Bearer` with PALPEBRA_METRICS_TOKEN; "
             "without that setting they are given to this machine alone."
         )
-    return Response(exposition(services.database), media_type=CONTENT_TYPE_LATEST)
+    return Response(exposition(services.database, services.settings), media_type=CONTENT_TYPE_LATEST)
+
+
+@admin_router.get("/backups")
+def get_backups(services: ServicesDep, _identity: Owner) -> BackupsOut:
+    """How old the newest backup is, and how the last restore drill went."""
+    return backups_out(services.settings)
 
 
 def _allowed(request: Request, token: str) -> bool:

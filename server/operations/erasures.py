@@ -4,38 +4,102 @@ It names runs by their public ids, which say nothing of a person.
 """
 
 import json
+import logging
 import os
 from pathlib import Path
+from typing import IO
 
+from experiments.files import whole_private_file
 from server.clock import iso, now
 from server.settings import Settings
+
+LOG = logging.getLogger(__name__)
+NAME = "erasures.ndjson"
 
 
 def ledger(settings: Settings) -> Path:
     """The file; it may be missing where nobody was erased yet."""
-    return settings.data_folder / "erasures.ndjson"
+    return settings.data_folder / NAME
 
 
 def note(settings: Settings, runs: list[str]) -> None:
     """Write down that these runs (public ids) are erased; on disk when this returns."""
-    lines = "".join(json.dumps({"run": run, "erased_at": iso(now())}) + "\n" for run in runs)
+    _append(settings, "run", runs)
+
+
+def note_identifiers(settings: Settings, runs: list[str]) -> None:
+    """Write down that it is erased who these runs' persons are; their answers stay."""
+    _append(settings, "identifiers_of", runs)
+
+
+def _append(settings: Settings, key: str, runs: list[str]) -> None:
+    lines = "".join(json.dumps({key: run, "erased_at": iso(now())}) + "\n" for run in runs)
     path = ledger(settings)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600), "w") as stream:
-        stream.write(lines)
+    with os.fdopen(os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o600), "r+b") as stream:
+        stream.write(_end_of_torn_line(stream, path) + lines.encode())
         stream.flush()
         os.fsync(stream.fileno())
 
 
+def _end_of_torn_line(stream: IO[bytes], path: Path) -> bytes:
+    """What a line that a crash cut off lacks, so that it does not swallow the next one."""
+    if stream.seek(0, os.SEEK_END) == 0:
+        return b""
+    stream.seek(-1, os.SEEK_END)
+    if stream.read(1) == b"\n":
+        return b""
+    LOG.warning("%s: its last line was cut off; whether its run was erased the database tells", path)
+    return b"\n"
+
+
+def content(settings: Settings) -> bytes:
+    """The ledger as it is; empty where nobody was erased."""
+    path = ledger(settings)
+    return path.read_bytes() if path.is_file() else b""
+
+
+def merged(one: bytes, other: bytes) -> bytes:
+    """The lines of both ledgers, each once; a line that a crash cut off is ended."""
+    lines = dict.fromkeys(line for line in (one + b"\n" + other).splitlines() if line.strip())
+    return b"".join(line + b"\n" for line in lines)
+
+
+def take_over(settings: Settings, further: bytes) -> None:
+    """Add what another copy of the ledger names.
+
+    Parameters
+    ----------
+    further : bytes
+        The copy, as a backup has it beside it.
+    """
+    both = merged(content(settings), further)
+    if both == content(settings):
+        return
+    path = ledger(settings)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_private_file(path) as stream:
+        stream.write(both)
+
+
 def noted(settings: Settings) -> list[str]:
     """The runs that were erased; a line that a crash cut off is passed over."""
+    return _named(settings, "run")
+
+
+def noted_identifiers(settings: Settings) -> list[str]:
+    """The runs of which it was erased who took part."""
+    return _named(settings, "identifiers_of")
+
+
+def _named(settings: Settings, key: str) -> list[str]:
     path = ledger(settings)
     if not path.is_file():
         return []
-    found: dict[str, None] = {}
+    runs: dict[str, None] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         try:
-            found[json.loads(line)["run"]] = None
+            runs[json.loads(line)[key]] = None
         except (ValueError, KeyError, TypeError):
             continue
-    return list(found)
+    return list(runs)

@@ -13,8 +13,12 @@ from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
 
+from experiments.errors import InputError
+from server.clock import now
 from server.db import Database
 from server.operations.repository import run_counts
+from server.operations.watched_backups import watched_backups
+from server.settings import Settings
 
 MULTIPROCESS_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"
 BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
@@ -44,8 +48,9 @@ UNDER_WAY = Gauge(
 class StoredCounts(Collector):
     """Counts taken from the database at the moment they are asked for: the same from every worker."""
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, database: Database, settings: Settings) -> None:
         self.database = database
+        self.settings = settings
 
     def collect(self) -> Iterable[GaugeMetricFamily]:
         """Runs by study and status; the version of the program."""
@@ -59,14 +64,35 @@ class StoredCounts(Collector):
         build = GaugeMetricFamily("palpebra_build_info", "The program that runs.", labels=("version",))
         build.add_metric((version("palpebra"),), 1)
         yield build
+        yield from _backups(self.settings)
 
 
-def exposition(database: Database) -> bytes:
+def _backups(settings: Settings) -> Iterable[GaugeMetricFamily]:
+    """Age of the newest backup and how the last drill went, where they are watched."""
+    try:
+        watched = watched_backups(settings)
+    except InputError:
+        yield GaugeMetricFamily("palpebra_backups_reachable", "0 where their store does not answer.", 0)
+        return
+    if watched is None:
+        return
+    yield GaugeMetricFamily("palpebra_backups_reachable", "0 where their store does not answer.", 1)
+    yield GaugeMetricFamily("palpebra_backups", "Backups there are.", watched.number)
+    if watched.age_s is not None:
+        yield GaugeMetricFamily("palpebra_backup_age_seconds", "Age of the newest backup.", watched.age_s)
+    if watched.drill is not None:
+        passed, ended = float(watched.drill.passed), watched.drill.at
+        yield GaugeMetricFamily("palpebra_restore_drill_passed", "1 where the last drill passed.", passed)
+        age_s = (now() - ended).total_seconds()
+        yield GaugeMetricFamily("palpebra_restore_drill_age_seconds", "Time since the last drill.", age_s)
+
+
+def exposition(database: Database, settings: Settings) -> bytes:
     """Everything in Prometheus' text format."""
     counted = REGISTRY
     if folder := os.environ.get(MULTIPROCESS_VARIABLE):
         counted = CollectorRegistry()
         MultiProcessCollector(counted, path=folder)  # type: ignore[no-untyped-call]
     stored = CollectorRegistry()
-    stored.register(StoredCounts(database))
+    stored.register(StoredCounts(database, settings))
     return generate_latest(counted) + generate_latest(stored)

@@ -15,9 +15,9 @@ def open_to_others(folder: Path) -> Iterator[Path]:
     """The folder and everything in it that others than its owner have a right to; links are not followed."""
     if folder.is_dir() and _is_open(folder):
         yield folder
-    for place, folders, files in os.walk(folder):
+    for parent, folders, files in os.walk(folder):
         for name in (*folders, *files):
-            path = Path(place, name)
+            path = Path(parent, name)
             if not path.is_symlink() and _is_open(path):
                 yield path
 

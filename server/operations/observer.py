@@ -45,8 +45,8 @@ class Observer:
         route = route_template(scope)
         ANSWERS.labels(method, route, status).inc()
         SECONDS.labels(route).observe(seconds)
-        wanted = {"all": True, "none": False}.get(self.which, status >= 500 or seconds > self.slow_s)
-        if wanted:
+        logged = {"all": True, "none": False}.get(self.which, status >= 500 or seconds > self.slow_s)
+        if logged:
             fields = {"method": method, "route": route, "status": status, "ms": round(1000 * seconds, 1)}
             log.log(logging.ERROR if status >= 500 else logging.INFO, "request", extra={"fields": fields})
 

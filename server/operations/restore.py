@@ -1,23 +1,29 @@
 """`server restore`: a backup into an empty database, clip store and data folder."""
 
+import errno
 import gzip
 import json
 import os
 import tarfile
+import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, cast
 
 from alembic import command
 from pydantic import ValidationError
-from sqlalchemy import Table
+from sqlalchemy import Connection, Table
+from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 
 from experiments.errors import InputError
 from server.context import Services
 from server.migrate import alembic_config, known_revision
+from server.operations import erasures
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
 from server.operations.erasures import ledger
-from server.operations.rows import Row
+from server.operations.keys_apart import NAME, KeyFile, beside, check_fits, key_file, put_back
+from server.operations.rows import Content, Row
 from server.operations.rows_repository import refuse_unless_empty, tables_of, write_rows
 from server.runs.erasure import replay
 from server.settings import Settings
@@ -25,34 +31,58 @@ from server.settings import Settings
 FORMAT = 1
 
 
-def restore(services: Services, path: Path, told: Callable[[str], None] = lambda _line: None) -> Description:
+def restore(
+    services: Services,
+    path: Path,
+    told: Callable[[str], None] = lambda _line: None,
+    *,
+    keys: Path | None = None,
+    stale_keys: bool = False,
+) -> Description:
     """Bring a backup back; afterwards the database has the newest revision.
 
     The rows go in under the revision they were written by and are migrated from there, all in one
     transaction; counts and hashes are compared with those of the backup. Each clip's hash is checked.
 
+    Parameters
+    ----------
+    keys : Path, optional
+        The key file, beside the backup where None; without one recruiters' ids are left out.
+    stale_keys : bool
+        Take one that is older than the backup, though ids of later visits are left out then.
+
     Raises
     ------
     InputError
         The file is no backup, is damaged or of a newer program; the database is not empty; the data folder
-        has another secret key.
+        has another secret key; the key file is another installation's or older than the backup.
     """
     try:
         with tarfile.open(path) as tar:
             described = _description(tar, path)
             key = _content(tar, KEY)
             _check_key(services.settings, key)
-            _restore_rows(services, tar, described, told)
+            apart = _key_file(described, key, keys or beside(path), named=keys is not None, stale=stale_keys)
+            _restore_rows(services, tar, described, _Keys(key, apart), told)
             for sha256 in described.clips:
                 _restore_clip(services, tar, sha256)
     except (tarfile.TarError, EOFError, gzip.BadGzipFile) as error:
         raise InputError(f"{path} is damaged or no backup of `server backup`: {error}") from error
     except OSError as error:
+        if error.errno == errno.ENOSPC:
+            raise InputError(f"no room left for what {path} holds; make room and restore again") from error
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     _keep_key(services.settings, key)
+    _take_over_ledger(services.settings, (keys or beside(path)).parent / erasures.NAME)
     _erase_again(services, told)
     told(f"{len(described.clips)} clips, secret key")
     return described
+
+
+def _take_over_ledger(settings: Settings, path: Path) -> None:
+    """Who was erased after the backup is in the copy of the ledger beside it, if it was written since."""
+    if path.is_file() and path != ledger(settings):
+        erasures.take_over(settings, path.read_bytes())
 
 
 def _erase_again(services: Services, told: Callable[[str], None]) -> None:
@@ -81,8 +111,31 @@ def _description(tar: tarfile.TarFile, path: Path) -> Description:
     return described
 
 
+@dataclass(frozen=True)
+class _Keys:
+    """The secret key, and the keys that backups do not hold; None where their file is missing."""
+
+    secret: bytes
+    apart: KeyFile | None
+
+
+def _key_file(
+    described: Description, secret: bytes, path: Path, *, named: bool, stale: bool
+) -> KeyFile | None:
+    """The key file of a backup; None where it has none and nobody named one."""
+    if not described.keys_apart or not (named or path.exists()):
+        return None
+    keys = key_file(path)
+    check_fits(keys, secret, described.created_at, str(path), stale=stale)
+    return keys
+
+
 def _restore_rows(
-    services: Services, tar: tarfile.TarFile, described: Description, told: Callable[[str], None]
+    services: Services,
+    tar: tarfile.TarFile,
+    described: Description,
+    keys: _Keys,
+    told: Callable[[str], None],
 ) -> None:
     with services.database.write_connection() as connection:
         refuse_unless_empty(connection, "the database")
@@ -90,14 +143,40 @@ def _restore_rows(
         known = {table.name: table for table in tables_of(connection)}
         for name in _in_order(known, described):
             expected = described.tables[name]
-            written = write_rows(connection, known[name], _rows(tar, name))
+            written = _written(connection, known[name], tar)
             if (written.rows, written.sha256) != (expected.rows, expected.sha256):
                 raise InputError(
                     f"table {name}: expected {expected.rows} rows, the file holds {written.rows} or other "
                     "values; the backup is damaged, nothing was restored"
                 )
             told(f"{name}: {written.rows} rows")
-        command.upgrade(alembic_config(connection), "head")
+        if described.keys_apart:
+            _put_keys_back(connection, keys, told)
+        command.upgrade(alembic_config(connection, lambda: keys.secret), "head")
+
+
+def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], None]) -> None:
+    readable, lost = put_back(connection, keys.secret, keys.apart)
+    if keys.apart is None:
+        told(
+            f"no key file ({NAME}): {lost} recruiters' ids cannot be read and were left out, and who comes "
+            "back by such an id counts as somebody new; if you have the file, restore again with --keys FILE"
+        )
+    elif readable or lost:
+        told(f"{readable} recruiters' ids; of {lost} there is no key any more")
+
+
+def _written(connection: Connection, table: Table, tar: tarfile.TarFile) -> Content:
+    """Put a table's rows in; what a changed byte made of them is refused as damage, whatever it is."""
+    try:
+        return write_rows(connection, table, _rows(tar, table.name))
+    except (OperationalError, InterfaceError) as error:
+        raise InputError(f"the database cannot take the backup: {error.orig}") from error
+    except (ValueError, KeyError, TypeError, zlib.error, EOFError, gzip.BadGzipFile, StatementError) as error:
+        said = str(getattr(error, "orig", None) or error).splitlines()[0]
+        raise InputError(
+            f"table {table.name}: the backup is damaged, nothing was restored: {said}"
+        ) from error
 
 
 def _in_order(known: dict[str, Table], described: Description) -> list[str]:
@@ -122,12 +201,12 @@ def _restore_clip(services: Services, tar: tarfile.TarFile, sha256: str) -> None
 
 def _member(tar: tarfile.TarFile, name: str) -> BinaryIO:
     try:
-        found = tar.extractfile(name)
+        member = tar.extractfile(name)
     except KeyError:
-        found = None
-    if found is None:
+        member = None
+    if member is None:
         raise InputError(f"the backup lacks {name}; it is damaged or no backup of `server backup`")
-    return cast(BinaryIO, found)
+    return cast(BinaryIO, member)
 
 
 def _content(tar: tarfile.TarFile, name: str) -> bytes:

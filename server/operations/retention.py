@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
 
-_NAME = re.compile(r"palpebra-(\d{4}-\d{2}-\d{2})(T\d{6})?\.tar")
+_NAME = re.compile(r"palpebra-(\d{4}-\d{2}-\d{2})(T\d{6})?(-[0-9a-f]{16})?\.tar(\.age)?")
 
 
 def day_of(path: Path) -> date | None:
@@ -29,5 +29,5 @@ def superfluous(paths: Iterable[Path], days: int) -> list[Path]:
         if (day := day_of(path)) is not None:
             by_day[day].append(path)
     newest = sorted(by_day, reverse=True)
-    earlier = {day: by_day[day] if place >= days else by_day[day][:-1] for place, day in enumerate(newest)}
+    earlier = {day: by_day[day] if age >= days else by_day[day][:-1] for age, day in enumerate(newest)}
     return [path for day in reversed(newest[1:]) for path in earlier[day]]

@@ -43,8 +43,8 @@ def read_rows(connection: Connection, table: Table) -> Iterator[Row]:
     """Every row in order of the primary key, in constant memory; what no file could hold is made visible."""
     query = select(table).order_by(*table.primary_key.columns).execution_options(yield_per=BATCH)
     times = {column.name for column in table.columns if isinstance(column.type, DateTime)}
-    for found in connection.execute(query).mappings():
-        yield {name: time_text(value) if name in times else visible(value) for name, value in found.items()}
+    for row in connection.execute(query).mappings():
+        yield {name: time_text(value) if name in times else visible(value) for name, value in row.items()}
 
 
 def write_rows(connection: Connection, table: Table, rows: Iterable[Row]) -> Content:

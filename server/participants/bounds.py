@@ -5,12 +5,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from server.errors import ApiError
+from server.evidence.repository import ANSWER, VIEW
 
 DEVICE_KEYS, DEVICE_BYTES = 200, 32 * 1024
 EVENT_BYTES, EVENTS_A_RUN = 4 * 1024, 20_000
 """A heartbeat every few seconds makes some hundred events an hour."""
 CALIBRATIONS_A_RUN = 100
-SERVER_EVENTS = frozenset({"screened_out", "warned", "answer_refused", "answer_expired"})
+SERVER_EVENTS = frozenset({"screened_out", "warned", *ANSWER, *VIEW})
 """Types of events that say what the server did: codes and evidence rest on them, so no page may send them."""
 MAX_DEPTH = 8
 
@@ -64,12 +65,12 @@ def check_calibrations(stored: int) -> None:
         raise RunDataTooLarge(f"This visit has {stored} calibrations; no more are taken.")
 
 
-def _check_size(value: Mapping[str, Any], most: int, what: str) -> None:
+def _check_size(value: Mapping[str, Any], limit: int, what: str) -> None:
     if _depth(value) > MAX_DEPTH:
         raise RunDataTooLarge(f"Expected {what} at most {MAX_DEPTH} levels deep.")
     size = len(json.dumps(value))
-    if size > most:
-        raise RunDataTooLarge(f"Expected {what} within {most >> 10} KiB, got {size >> 10} KiB.")
+    if size > limit:
+        raise RunDataTooLarge(f"Expected {what} within {limit >> 10} KiB, got {size >> 10} KiB.")
 
 
 def _depth(value: Any) -> int:

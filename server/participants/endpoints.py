@@ -9,8 +9,10 @@ from sqlalchemy.orm import Session
 
 from server.context import DatabaseDep, ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.evidence.waiting import judge_waiting
 from server.participants import completion, form_answers, links, runs
 from server.participants.next_trials import follow
+from server.participants.older_pages import finished_for_page
 from server.participants.schemas import (
     CalibrationResult,
     Completion,
@@ -65,7 +67,7 @@ async def start_run(
     services.run_starts.hit(hash_token(link_token))
 
     def begin(connection: Connection) -> RunStarted:
-        with Session(connection, expire_on_commit=False) as session:
+        with Session(connection, expire_on_commit=False, info=services.database.carried) as session:
             started = links.start_run(services, session, link_token, start)
             session.flush()
         return started
@@ -92,8 +94,8 @@ def get_run(services: ServicesDep, request: Request, token: RunToken) -> RunStat
         state = runs.run_state(services, session, token, moment)
     if any(trial.series for trial in state.trials) and follow(services, token) is not None:
         with services.database.read() as session:
-            return runs.run_state(services, session, token, moment)
-    return state
+            state = runs.run_state(services, session, token, moment)
+    return finished_for_page(services, request, token, state)
 
 
 @router.put("/run/consent")
@@ -122,8 +124,10 @@ def put_device(
 @router.put("/run/forms/{name}")
 def put_form(services: ServicesDep, request: Request, token: RunToken, name: str, form: FormAnswers) -> Saved:
     """Store the answers of a declared form; the one that decides the group gives the run with its trials."""
+    moment = services.time_of(request)
     with services.database.write() as session:
-        return form_answers.save_form(services, session, token, name, form.answers, services.time_of(request))
+        answer = form_answers.save_form(services, session, token, name, form.answers, moment)
+    return finished_for_page(services, request, token, answer)
 
 
 @router.put("/run/stage")
@@ -151,19 +155,21 @@ def post_events(services: ServicesDep, request: Request, token: RunToken, events
 @router.post("/run/complete")
 def complete_run(services: ServicesDep, token: RunToken) -> Completion:
     """Close the run and get the code; refused while trials or required questions are unanswered."""
+    judge_waiting(services.database, services.intake, token)
     with services.database.write() as session:
         return completion.complete_run(services, session, token)
 
 
 @router.post("/run/screen-out")
-def screen_out(services: ServicesDep, token: RunToken, found: ScreenOut) -> Saved:
+def screen_out(services: ServicesDep, token: RunToken, reason: ScreenOut) -> Saved:
     """End the run because browser or screen will not do; refused where the study does not screen devices."""
     with services.database.write() as session:
-        return runs.screen_out_device(services, session, token, found)
+        return runs.screen_out_device(services, session, token, reason)
 
 
 @router.post("/run/withdraw")
-def withdraw_run(database: DatabaseDep, token: RunToken) -> Saved:
+def withdraw_run(services: ServicesDep, token: RunToken) -> Saved:
     """Stop taking part."""
-    with database.write() as session:
+    judge_waiting(services.database, services.intake, token)
+    with services.database.write() as session:
         return runs.withdraw(session, token)

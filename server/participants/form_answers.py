@@ -14,7 +14,7 @@ from server.models import NO_SLOT, FormAnswer, StudyRun
 from server.participants import grouping, repository, screening
 from server.participants.forms import checked_answers
 from server.participants.lookup import find_run, open_run
-from server.participants.placing import place
+from server.participants.placing import assign_slot
 from server.participants.refusals import FormUnknown, GroupDecided
 from server.participants.runs import need_consent, saved, state_of
 from server.participants.schemas import Saved
@@ -39,7 +39,7 @@ def save_form(
     _store(session, run, name, checked)
     screening.by_form(session, run, loaded.experiment, name, checked)
     if asked is not None and decides and run.status == "active" and run.slot == NO_SLOT:
-        _place(session, run, loaded, group_of_answer(loaded.experiment, checked[asked.field]))
+        _assign_slot_of(session, run, loaded, group_of_answer(loaded.experiment, checked[asked.field]))
     if not decides or run.status != "active":
         return saved(run)
     session.flush()
@@ -61,11 +61,11 @@ def _store(session: Session, run: StudyRun, name: str, checked: dict[str, Any]) 
         stored.answers, stored.saved_at = checked, now()
 
 
-def _place(session: Session, run: StudyRun, loaded: LoadedVersion, group: str) -> None:
+def _assign_slot_of(session: Session, run: StudyRun, loaded: LoadedVersion, group: str) -> None:
     """The run's place in its group; where none is left the run is screened out."""
     turns = grouping.open_turns(session, loaded.experiment, run.version_id, run.origin, group)
     if turns:
-        place(session, run, loaded, turns)
+        assign_slot(session, run, loaded, turns)
     else:
         screening.by_full_group(session, run, group)
 

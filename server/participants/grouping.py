@@ -42,7 +42,8 @@ def open_turns(
 
     Parameters
     ----------
-    name: of the group that link or answer decided; empty where groups take turns.
+    name : str, optional
+        Of the group that link or answer decided; empty where groups take turns.
     """
     every = names(experiment)
     turns = [turn for turn, known in enumerate(every) if name in ("", known)]

@@ -34,7 +34,7 @@ def resume_code(key: bytes, public_id: str) -> str:
     digest = hmac.digest(key, f"{CODE_PURPOSE}:{public_id}".encode(), hashlib.sha256)
     secret = int.from_bytes(digest[:8], "big") >> (64 - _SECRET_SIGNS * _BITS)
     signs = _written(int(public_id[:_HEX_DIGITS], 16), _GROUP) + _written(secret, _SECRET_SIGNS)
-    return "-".join(signs[place : place + _GROUP] for place in range(0, CODE_SIGNS, _GROUP))
+    return "-".join(signs[start : start + _GROUP] for start in range(0, CODE_SIGNS, _GROUP))
 
 
 def run_prefix(typed: str) -> str | None:
@@ -54,7 +54,7 @@ def fits(key: bytes, public_id: str, typed: str) -> bool:
 
 
 def _written(number: int, signs: int) -> str:
-    return "".join(_SIGNS[number >> _BITS * place & 31] for place in reversed(range(signs)))
+    return "".join(_SIGNS[number >> _BITS * start & 31] for start in reversed(range(signs)))
 
 
 def _signs(typed: str) -> str:

@@ -14,11 +14,13 @@ from experiments.trials.counts import expected_minutes
 from server.clock import now
 from server.context import Services
 from server.evidence.intake import ENFORCED_ORIGINS
-from server.evidence.repository import has_older_runs
-from server.models import NO_SLOT, Link, RecruiterIdentity, Study, StudyRun
+from server.evidence.repository import awaits_views_without_tickets, has_older_runs
+from server.identities import repository as identities
+from server.identities.sealing import KnownAs
+from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participants import grouping, repository, returning
 from server.participants.bounds import checked_device
-from server.participants.placing import place
+from server.participants.placing import assign_slot
 from server.participants.recruiter import NO_RECRUITER, Recruiter
 from server.participants.refusals import (
     LanguageUnknown,
@@ -30,12 +32,16 @@ from server.participants.refusals import (
 )
 from server.participants.schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
 from server.participants.screening import screens_devices
+from server.participants.signatures import without_signature
 from server.tokens import derived_token, hash_token, new_public_id, new_token
 from server.versions import LoadedVersion
 
 RUN_PURPOSE = "run"
 OLD_PAGES_ACCEPTED = timedelta(hours=48)
-"""How long after the last run of before there was evidence a page of that time may begin another."""
+"""How long after the last run of before there was evidence a page of that time may begin another.
+
+Also: how long after the first run whose views bring tickets a page without them may.
+"""
 SEED_BITS = 53  # so that a seed survives JSON in every program
 _REFUSALS = {
     "expired": (LinkExpired, "This link has expired; please ask the person who invited you for a new one."),
@@ -43,6 +49,11 @@ _REFUSALS = {
     "paused": (StudyPaused, "This study is paused; please come back later."),
     "full": (StudyFull, "Every place of this study is taken; please come back later."),
 }
+
+
+def new_seed() -> int:
+    """A random seed of a run: what is shown to it, in what order, with which checks, follows from it."""
+    return secrets.randbits(SEED_BITS)
 
 
 def find_link(session: Session, token: str) -> Link:
@@ -203,6 +214,7 @@ def _new_run(
     public_id = new_public_id()
     token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
     identifier = recruiter_of(link).participant(start.query) or ""
+    evidence = _evidence(services, session, origin, start)
     run = StudyRun(
         public_id=public_id,
         study_id=study.id,
@@ -214,20 +226,21 @@ def _new_run(
         phase=phase,
         origin=origin,
         language=start.language,
-        seed=secrets.randbits(SEED_BITS),
+        seed=new_seed(),
         slot=NO_SLOT,
         trials_total=0,
         completion_code=new_token()[:10],
         device=checked_device(start.device),
-        evidence=_evidence(services, session, origin, start),
+        evidence=evidence,
+        view_tickets=_view_tickets(session, evidence, start),
     )
     repository.add_all(session, [run])
     if start.query:
-        known_as = RecruiterIdentity(study_run_id=run.id, identifier=identifier, parameters=start.query)
-        repository.add_all(session, [known_as])
+        parameters = without_signature(recruiter_of(link), start.query)
+        identities.keep(session, run, study.pseudonym_key, KnownAs(identifier, parameters))
     if deciding(loaded.experiment) is None:
         group = _group(loaded.experiment, link)
-        place(
+        assign_slot(
             session, run, loaded, grouping.open_turns(session, loaded.experiment, version_id, origin, group)
         )
     return run, token
@@ -242,3 +255,10 @@ def _evidence(
     if origin not in ENFORCED_ORIGINS and not services.intake.rehearses:
         return "none"
     return "older" if has_older_runs(session, now() - OLD_PAGES_ACCEPTED) else "asked"
+
+
+def _view_tickets(session: Session, evidence: str, start: RunStart) -> bool:
+    """Whether views are to bring tickets: all do but those of a page that was open before views had any."""
+    if start.view_tickets or evidence != "asked":
+        return start.view_tickets
+    return not awaits_views_without_tickets(session, now() - OLD_PAGES_ACCEPTED)

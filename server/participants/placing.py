@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments.assignment.checks import with_checks
-from experiments.assignment.groups import name_of, names, place_of
+from experiments.assignment.groups import name_of, names, seat_of
 from experiments.assignment.trial import Trial
 from experiments.definition import Experiment
 from experiments.trials import KINDS
@@ -18,7 +18,7 @@ from server.trials.series import service as series
 from server.versions import LoadedVersion
 
 
-def place(session: Session, run: StudyRun, loaded: LoadedVersion, turns: Sequence[int]) -> None:
+def assign_slot(session: Session, run: StudyRun, loaded: LoadedVersion, turns: Sequence[int]) -> None:
     """Give a stored run the first free slot of the groups with these turns, and its trials.
 
     The study must be held (`repository.lock_study`): two runs that look at once would get one slot.
@@ -30,7 +30,7 @@ def place(session: Session, run: StudyRun, loaded: LoadedVersion, turns: Sequenc
         run.slot = repository.free_slot(session, run.version_id, run.origin, lease)
     else:
         run.slot = repository.free_slot_of(session, run.version_id, run.origin, lease, every, turns)
-    run.group_name = name_of(place_of(experiment, run.slot).levels)
+    run.group_name = name_of(seat_of(experiment, run.slot).levels)
     trials = _trials(session, run, experiment, lease)
     trials = with_checks(experiment, trials, run.seed, len(loaded.checks))
     run.trials_total = len(trials)

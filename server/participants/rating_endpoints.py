@@ -3,15 +3,17 @@
 from typing import Any
 from uuid import UUID
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy import Connection
 
 from experiments.trials import KINDS
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.finished import finished
 from server.participants.endpoints import RunToken
 from server.participants.next_trials import next_trials
+from server.participants.older_pages import finished_for_page
 from server.trials import service
 from server.trials.schemas import RatingIn, RatingSaved, Receipt
 
@@ -33,8 +35,10 @@ async def put_rating(
     left_out: dict[str, Any] = {} if receipt.warning else {"receipt": {"warning"}}
     if rating.answer.kind in KINDS and KINDS[rating.answer.kind].adapts:
         receipt, following = await run_in_threadpool(next_trials, services, token, receipt)
-        content = RatingSaved(receipt=receipt, next=following).model_dump_json(exclude=left_out)
+        saved = RatingSaved(receipt=receipt, next=following)
     else:
-        content = RatingSaved(receipt=receipt).model_dump_json(exclude=left_out | {"next": True})
-    # A finished response, so that FastAPI does not validate and encode the receipt once more.
-    return Response(content, 201 if is_new else 200, media_type="application/json")  # type: ignore[return-value]
+        saved, left_out["next"] = RatingSaved(receipt=receipt), True
+    status = 201 if is_new else 200
+    if saved.next is None:
+        return finished(saved, status, left_out)
+    return await run_in_threadpool(finished_for_page, services, request, token, saved, status, left_out)

@@ -8,6 +8,8 @@ Prolific's own page, elsewhere none.
 redirect_screened_out: where to go when screened out; on Prolific redirect_url, where there is a code for it.
 code_complete, code_failed_check: completion codes; one is made for each run where absent.
 code_screened_out: of who is screened out; without it none is shown, so that nobody is paid by mistake.
+signature_parameter: which address parameter has the signature of the participant's id (server.participants.
+signatures); without it addresses are not signed. secret_name: another name makes another secret.
 """
 
 from collections.abc import Mapping
@@ -41,10 +43,17 @@ class Recruiter(BaseModel):
     code_complete: Code = ""
     code_failed_check: Code = ""
     code_screened_out: Code = ""
+    signature_parameter: Code = ""
+    secret_name: Code = ""
+
+    @property
+    def id_name(self) -> str:
+        """The address parameter that names the participant."""
+        return self.id_parameter or ID_PARAMETERS[self.kind]
 
     def participant(self, parameters: Mapping[str, str]) -> str | None:
         """The participant's id among the address parameters; None where it is not there."""
-        return parameters.get(self.id_parameter or ID_PARAMETERS[self.kind]) or None
+        return parameters.get(self.id_name) or None
 
     def code(self, outcome: Literal["complete", "failed_check"], own: str) -> str:
         """The declared code of this outcome, or the run's own."""

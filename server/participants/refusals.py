@@ -69,6 +69,18 @@ class ResumeCodeWrong(Conflict):
     code = "resume_code_wrong"
 
 
+class SignatureMissing(Conflict):
+    """Addresses of this study are signed, and this one is not."""
+
+    code = "signature_missing"
+
+
+class SignatureWrong(Conflict):
+    """The signature of the address is not that of its participant and study."""
+
+    code = "signature_wrong"
+
+
 class TakenPartAlready(Conflict):
     """A visit under this recruiter's id is over."""
 

@@ -3,12 +3,14 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
-from typing import Any, cast
+from typing import Any, Literal, NamedTuple, cast
 
 from sqlalchemy import ARRAY, Select, Table, bindparam, delete, func, insert, literal, select, union_all
 from sqlalchemy.orm import Session
 
 from server.clock import now
+from server.identities.repository import known_as
+from server.identities.sealing import UnreadableError
 from server.models import (
     NO_SLOT,
     AssignedTrial,
@@ -16,7 +18,6 @@ from server.models import (
     FormAnswer,
     Link,
     Rating,
-    RecruiterIdentity,
     RunEvent,
     Study,
     StudyRun,
@@ -28,6 +29,38 @@ from server.tokens import hash_token
 # A table instead of the class: with its hundred rows a run the ORM would take most of the time of a start.
 _trials = cast(Table, AssignedTrial.__table__)
 _clips = cast(Table, TrialClip.__table__)
+_ratings = cast(Table, Rating.__table__)
+_calibrations = cast(Table, Calibration.__table__)
+_forms = cast(Table, FormAnswer.__table__)
+
+# Read whenever a page begins, and built once: putting such a query together takes longer than its answer.
+_LINK = select(Link).where(Link.token_hash == bindparam("token_hash"), Link.revoked_at.is_(None))
+_RUN = select(StudyRun).where(StudyRun.token_hash == bindparam("token_hash"))
+_LOCKED_RUN = _RUN.with_for_update()
+_TRIALS = (
+    select(
+        _trials.c.trial_index,
+        _trials.c.kind,
+        _trials.c.block,
+        _trials.c.expected_response,
+        _clips.c.role,
+        _clips.c.version_clip_id,
+    )
+    .select_from(_trials.outerjoin(_clips))
+    .where(_trials.c.study_run_id == bindparam("run"))
+    .order_by(_trials.c.trial_index, _clips.c.position)
+)
+_PLAYS = select(_ratings.c.trial_index, _ratings.c.play, _ratings.c.verdict).where(
+    _ratings.c.study_run_id == bindparam("run")
+)
+_CALIBRATION = (
+    select(_calibrations)
+    .where(_calibrations.c.study_run_id == bindparam("run"))
+    .order_by(_calibrations.c.id.desc())
+    .limit(1)
+)
+_ANSWERED_FORMS = select(_forms.c.form).where(_forms.c.study_run_id == bindparam("run")).order_by(_forms.c.id)
+_LINK_KIND = select(Link.kind).where(Link.id == bindparam("link"))
 
 
 def _unnested(table: Table) -> Any:
@@ -41,13 +74,12 @@ _ADD = {table: (insert(table), _unnested(table)) for table in (_trials, _clips)}
 
 def link_by_token(session: Session, token: str) -> Link | None:
     """The link with this token, withdrawn ones left out."""
-    return session.scalar(select(Link).where(Link.token_hash == hash_token(token), Link.revoked_at.is_(None)))
+    return session.scalar(_LINK, {"token_hash": hash_token(token)})
 
 
 def run_by_token(session: Session, token: str, *, lock: bool = False) -> StudyRun | None:
     """The run with this token; `lock` keeps other requests of the same run waiting (PostgreSQL)."""
-    query = select(StudyRun).where(StudyRun.token_hash == hash_token(token))
-    return session.scalar(query.with_for_update() if lock else query)
+    return session.scalar(_LOCKED_RUN if lock else _RUN, {"token_hash": hash_token(token)})
 
 
 def lock_study(session: Session, study_id: int) -> Study:
@@ -95,8 +127,11 @@ def runs_beginning(session: Session, link: Link, prefix: str) -> Sequence[StudyR
 
 def parameters(session: Session, run: StudyRun) -> dict[str, str]:
     """The parameters of the address that led to a run."""
-    found = session.get(RecruiterIdentity, run.id)
-    return found.parameters if found else {}
+    try:
+        known = known_as(session, run)
+    except UnreadableError:  # what this person needs them for is not worth an error page
+        return {}
+    return dict(known.parameters) if known else {}
 
 
 def places_taken(session: Session, column: Any, ident: int, origin: str, lease: timedelta) -> int:
@@ -199,41 +234,51 @@ def add_trials(session: Session, trials: list[dict[str, Any]], clips: list[dict[
             connection.execute(one_by_one, rows)
 
 
-def trials(session: Session, run: StudyRun) -> Sequence[Any]:
-    """The run's trials in order: trial_index, kind, block, expected_response."""
-    columns = (
-        AssignedTrial.trial_index,
-        AssignedTrial.kind,
-        AssignedTrial.block,
-        AssignedTrial.expected_response,
-    )
-    query = select(*columns).where(AssignedTrial.study_run_id == run.id)
-    return session.execute(query.order_by(AssignedTrial.trial_index)).all()
+class StoredTrial(NamedTuple):
+    """A trial of a run as it was assigned.
+
+    Attributes
+    ----------
+    trial_index, block : int
+        Its number in the run, and its block's.
+    kind : str
+        What it is for.
+    expected_response : int or None
+        Of an attention check.
+    clips : dict of str to int
+        Their ids by role, in the order of their positions.
+    """
+
+    trial_index: int
+    kind: Literal["practice", "main", "attention", "check"]
+    block: int
+    expected_response: int | None
+    clips: dict[str, int]
 
 
-def trial_clips(session: Session, run: StudyRun) -> dict[int, dict[str, int]]:
-    """Of each trial that has clips, their ids by role, in the order of their places."""
-    columns = (TrialClip.trial_index, TrialClip.role, TrialClip.version_clip_id)
-    query = select(*columns).where(TrialClip.study_run_id == run.id)
-    clips: dict[int, dict[str, int]] = {}
-    for trial_index, role, clip in session.execute(query.order_by(TrialClip.trial_index, TrialClip.position)):
-        clips.setdefault(trial_index, {})[role] = clip
-    return clips
+def trials(session: Session, run: StudyRun) -> list[StoredTrial]:
+    """The run's trials in order."""
+    rows = session.connection().execute(_TRIALS, {"run": run.id})
+    stored: list[StoredTrial] = []
+    for trial_index, kind, block, expected, role, clip in rows:
+        if not stored or stored[-1].trial_index != trial_index:
+            stored.append(StoredTrial(trial_index, kind, block, expected, {}))
+        if role is not None:
+            stored[-1].clips[role] = clip
+    return stored
 
 
 def plays(session: Session, run: StudyRun) -> dict[int, list[tuple[int, str]]]:
     """Play number and verdict of every stored play, by trial."""
-    query = select(Rating.trial_index, Rating.play, Rating.verdict).where(Rating.study_run_id == run.id)
-    found: dict[int, list[tuple[int, str]]] = {}
-    for trial_index, play, verdict in session.execute(query):
-        found.setdefault(trial_index, []).append((play, verdict))
-    return found
+    by_trial: dict[int, list[tuple[int, str]]] = {}
+    for trial_index, play, verdict in session.connection().execute(_PLAYS, {"run": run.id}):
+        by_trial.setdefault(trial_index, []).append((play, verdict))
+    return by_trial
 
 
-def latest_calibration(session: Session, run: StudyRun) -> Calibration | None:
-    """The calibration that counts."""
-    query = select(Calibration).where(Calibration.study_run_id == run.id)
-    return session.scalar(query.order_by(Calibration.id.desc()).limit(1))
+def latest_calibration(session: Session, run: StudyRun) -> Any:
+    """The columns of the calibration that counts; None where there is none."""
+    return session.connection().execute(_CALIBRATION, {"run": run.id}).one_or_none()
 
 
 def calibrations(session: Session, run: StudyRun) -> int:
@@ -257,8 +302,12 @@ def events(session: Session, run: StudyRun) -> int:
 
 def answered_forms(session: Session, run: StudyRun) -> list[str]:
     """Names of the forms that were answered."""
-    query = select(FormAnswer.form).where(FormAnswer.study_run_id == run.id).order_by(FormAnswer.id)
-    return list(session.scalars(query))
+    return list(session.connection().scalars(_ANSWERED_FORMS, {"run": run.id}))
+
+
+def link_kind(session: Session, run: StudyRun) -> str:
+    """The kind of the link that a run began by; the rest of the link stays unread."""
+    return str(session.connection().scalar(_LINK_KIND, {"link": run.link_id}))
 
 
 def form_answer(session: Session, run: StudyRun, form: str) -> FormAnswer | None:

@@ -1,8 +1,8 @@
 """Who comes back to a visit, by what, and whether it may be taken up again.
 
-A visit is taken up by the secret its browser keeps (the client id), by a personal link, or by the resume code
-that the page has shown. A recruiter's id says whose visit it is and opens nothing: it stands in addresses,
-lists and e-mails, and some recruiters count it up.
+A visit is taken up by the secret its browser keeps (the client id), by a personal link, by the resume code
+that the page has shown, or by an address that was signed with the study's secret. A recruiter's id says whose
+visit it is and opens nothing: it stands in addresses, lists and e-mails, and some recruiters count it up.
 """
 
 from datetime import datetime, timedelta
@@ -24,6 +24,7 @@ from server.participants.refusals import (
     TakenPartAlready,
 )
 from server.participants.schemas import RunStart
+from server.participants.signatures import is_of, is_signed
 
 
 def name_of(link: Link, study: Study, identifier: str) -> str | None:
@@ -42,13 +43,28 @@ def known_run(
         return _run_of_code(services, session, link, start.resume_code)
     if run is None and link.kind == "personal":
         run = repository.latest_run(session, link)
-    if run is None and recruiter.kind != "generic":
-        identifier = recruiter.participant(start.query)
-        name = name_of(link, link.study, identifier) if identifier else None
-        other = repository.latest_run(session, link, name) if name else None
-        if other is not None:
-            _refuse_by_id_alone(services.versions.get(session, other.version_id).experiment, other, start)
-    return run
+    return _run_of_id(services, session, link, recruiter, start) if run is None else run
+
+
+def _run_of_id(
+    services: Services, session: Session, link: Link, recruiter: Recruiter, start: RunStart
+) -> StudyRun | None:
+    """The run of the recruiter's id where the address is signed that it began by; otherwise none."""
+    if link.kind == "personal":
+        return None
+    signed = is_signed(services.settings.key, link.study.pseudonym_key, recruiter, start.query)
+    if recruiter.kind == "generic" and not signed:
+        return None
+    identifier = recruiter.participant(start.query)
+    name = name_of(link, link.study, identifier) if identifier else None
+    other = repository.latest_run(session, link, name) if name else None
+    if other is None:
+        return None
+    # Who began without a signature may be anybody who knew the id.
+    if signed and is_of(recruiter, start.query, repository.parameters(session, other)):
+        return other
+    _refuse_by_id_alone(services.versions.get(session, other.version_id).experiment, other, start)
+    return None
 
 
 def _run_of_code(services: Services, session: Session, link: Link, typed: str) -> StudyRun:
@@ -101,10 +117,10 @@ def resumable_until(experiment: Experiment, run: StudyRun) -> datetime | None:
     return _oldest(experiment, run) if kept else None
 
 
-def shown_code(key: bytes, experiment: Experiment, run: StudyRun) -> str | None:
+def shown_code(key: bytes, experiment: Experiment, link_kind: str, run_id: str) -> str | None:
     """The resume code to show; None where the link itself resumes, or nothing does."""
-    by_code = run.link.kind == "general" and experiment.session.resume == "resume"
-    return resume_code(key, run.public_id) if by_code else None
+    by_code = link_kind == "general" and experiment.session.resume == "resume"
+    return resume_code(key, run_id) if by_code else None
 
 
 def _oldest(experiment: Experiment, run: StudyRun) -> datetime:

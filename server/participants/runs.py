@@ -6,7 +6,6 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.trials import KINDS
 from server.clock import now
@@ -41,6 +40,7 @@ from server.repository import insert_once
 from server.tokens import new_public_id
 from server.trials.refusals import ConsentMissing
 from server.trials.warnings import waiting
+from server.versions import LoadedVersion
 
 BEFORE_CONSENT = ("consent",)
 
@@ -89,18 +89,23 @@ def state_of(services: Services, session: Session, run: StudyRun, moment: dateti
         elapsed_ms_before=run.elapsed_ms,
         completion_code=completion_code(session, run, loaded) if run.status == "complete" else None,
         resumable_until=resumable_until(experiment, run),
-        resume_code=shown_code(services.settings.key, experiment, run),
+        resume_code=shown_code(
+            services.settings.key, experiment, repository.link_kind(session, run), run.public_id
+        ),
         server_time=moment,
-        tickets=_tickets(services, run, experiment, moment),
+        tickets=_tickets(services, run, loaded, moment),
         warning=waiting(session.connection(), run.id, experiment) if run.status == "active" else None,
     )
 
 
-def _tickets(services: Services, run: StudyRun, experiment: Experiment, moment: datetime) -> Tickets | None:
+def _tickets(services: Services, run: StudyRun, loaded: LoadedVersion, moment: datetime) -> Tickets | None:
     if run.evidence != "asked" or run.status != "active":
         return None
     batch = issue(services.intake.key, run.public_id, moment)
-    plays = [1 + experiment.playback.max_repeats] * run.trials_total
+    services.intake.clips.prepare(
+        run.version_id, [(clip.sha256, clip.bytes) for clip in loaded.clips.values()]
+    )
+    plays = [1 + loaded.experiment.playback.max_repeats] * run.trials_total
     return Tickets(batch=batch.text, by_trial=tickets(services.intake.key, batch, plays))
 
 
@@ -139,12 +144,12 @@ def save_device(session: Session, token: str, device: dict[str, Any]) -> Saved:
     return saved(run)
 
 
-def screen_out_device(services: Services, session: Session, token: str, found: ScreenOut) -> Saved:
+def screen_out_device(services: Services, session: Session, token: str, body: ScreenOut) -> Saved:
     """End the run because its browser or screen will not do, where the study screens devices."""
     run = open_run(session, token)
     if not screening.screens_devices(services.versions.get(session, run.version_id).experiment):
         raise ScreeningUndeclared("This study declares no screening by device; the run goes on.")
-    screening.by_device(session, run, found.reason, found.data)
+    screening.by_device(session, run, body.reason, body.data)
     return saved(run)
 
 

@@ -83,6 +83,7 @@ class RunStart(BaseModel):
     language: LanguageTag
     client_id: UUID
     evidence: bool = Field(default=False, description="The page brings evidence with each answer.")
+    view_tickets: bool = Field(default=False, description="It brings a ticket with each view, too.")
     query: dict[Key, Text] = Field(
         default_factory=dict, max_length=20, description="Parameters of the address, such as PROLIFIC_PID."
     )

@@ -2,12 +2,11 @@
 
 from fastapi import APIRouter, Request
 from sqlalchemy import Connection
-from sqlalchemy.orm import Session
 
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
+from server.finished import finished
 from server.participants.endpoints import RunToken
-from server.participants.lookup import find_run
 from server.views import service
 from server.views.schemas import ViewsIn, ViewsSaved
 
@@ -21,9 +20,6 @@ async def post_views(services: ServicesDep, request: Request, token: RunToken, b
     received_at = services.time_of(request)
 
     def save(connection: Connection) -> ViewsSaved:
-        with Session(connection, expire_on_commit=False) as session:
-            saved = service.save_views(session, find_run(session, token, lock=True), body, received_at)
-            session.flush()
-        return saved
+        return service.save_views(services.versions, services.intake, connection, token, body, received_at)
 
-    return await services.group_commit.run(token, save)
+    return finished(await services.group_commit.run(token, save))

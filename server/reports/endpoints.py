@@ -15,25 +15,25 @@ REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; s
 
 
 @router.get("")
-def list_reports(services: ServicesDep, who: Viewer, study: str) -> list[ReportOut]:
+def list_reports(services: ServicesDep, identity: Viewer, study: str) -> list[ReportOut]:
     """The latest reports, the newest first."""
     with services.database.read() as session:
-        return service.reports(services, session, study, who)
+        return service.reports(services, session, study, identity)
 
 
 @router.post("", status_code=202)
-def build_report(services: ServicesDep, who: Writer, study: str, body: NewReport) -> ReportOut:
+def build_report(services: ServicesDep, identity: Writer, study: str, body: NewReport) -> ReportOut:
     """Begin a report: exclusions, the paper's table, every test, figures."""
-    return service.start(services, study, body, who)
+    return service.start(services, study, body, identity)
 
 
 @router.get("/{report}/{file}", response_class=FileResponse)
 def get_report_file(
-    services: ServicesDep, who: ReportReader, study: str, report: str, file: str, download: bool = False
+    services: ServicesDep, identity: ReportReader, study: str, report: str, file: str, download: bool = False
 ) -> FileResponse:
     """One file of a finished report: needs the right `export`, for it holds rows of single persons."""
     with services.database.read() as session:
-        path = service.report_file(services, session, study, who, report, file)
+        path = service.report_file(services, session, study, identity, report, file)
     kind = "attachment" if download or path.suffix != ".html" else "inline"
     headers = {"content-security-policy": REPORT_POLICY}
     return FileResponse(path, filename=f"{study}-{path.name}", content_disposition_type=kind, headers=headers)

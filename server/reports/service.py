@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 import threading
-from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,71 +14,57 @@ from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
 from server.clock import now
 from server.context import Services
-from server.errors import Conflict, NotFound
+from server.errors import NotFound
 from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.methods.service import methods_of, read_results, write
 from server.models import Job
 from server.reports import repository
-from server.reports.process import LONGEST_S, run_analysis
+from server.reports.jobs import begun, note, shown
+from server.reports.process import run_analysis
 from server.reports.schemas import NewReport, ReportOut
 from server.seals.service import seal_of
 from server.studies.lookup import find_study
 from server.studies.series import version_of_series
-from server.tokens import new_public_id
 
 SEAL = "sealed-plan.json"
 _one_at_a_time = threading.Lock()
 
 
-def start(services: Services, name: str, wanted: NewReport, who: Identity) -> ReportOut:
+def start(services: Services, name: str, order: NewReport, identity: Identity) -> ReportOut:
     """Queue a report and begin it in the background; Conflict where one of this study is under way."""
     with services.database.write() as session:
-        study = find_study(session, name, who, "run")
-        for job in repository.latest_reports(session, study):
-            if job.status in ("queued", "running") and not _abandoned(job):
-                raise Conflict("A report of this study is being built already; wait for it.")
-        job = Job(
-            public_id=new_public_id(),
-            kind=repository.KIND,
-            study_id=study.id,
-            message="waiting",
-            parameters=wanted.model_dump(),
-            created_by=who.account_id,
+        study = find_study(session, name, identity, "run")
+        job = begun(
+            session,
+            study,
+            "report",
+            order.model_dump(),
+            identity,
+            "A report of this study is being built already; wait for it.",
         )
-        session.add(job)
-        record(session, who, "report asked for", "study", name, **wanted.model_dump())
+        record(session, identity, "report asked for", "study", name, **order.model_dump())
         session.flush()
-        shown = report_out(services, job)
-    threading.Thread(target=_build, args=(services, name, shown.id, wanted), daemon=True).start()
-    return shown
+        report = report_out(services, job)
+    threading.Thread(target=_build, args=(services, name, report.id, order), daemon=True).start()
+    return report
 
 
-def _abandoned(job: Job) -> bool:
-    # The server that ran it was stopped: no report takes this long.
-    return now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
-
-
-def reports(services: Services, session: Session, name: str, who: Identity) -> list[ReportOut]:
+def reports(services: Services, session: Session, name: str, identity: Identity) -> list[ReportOut]:
     """The latest reports of a study."""
-    study = find_study(session, name, who, "view")
-    return [report_out(services, job) for job in repository.latest_reports(session, study)]
+    study = find_study(session, name, identity, "view")
+    return [report_out(services, job) for job in repository.latest_jobs(session, study, "report")]
 
 
 def report_out(services: Services, job: Job) -> ReportOut:
     """A report as the page shows it."""
     folder = report_folder(services, job.public_id)
     done = job.status == "done" and folder.is_dir()
-    stale = job.status in ("queued", "running") and _abandoned(job)
     return ReportOut.model_validate(
         {
-            "id": job.public_id,
-            "status": "failed" if stale else job.status,
-            "progress": job.progress,
-            "message": "the server was stopped while it was built" if stale else job.message,
+            **shown(job, "the server was stopped while it was built"),
             "origin": job.parameters.get("origin") or _origin_of_older(job.parameters),
             "series": job.parameters.get("series"),
-            "created_at": job.created_at,
             "finished_at": job.finished_at,
             "files": sorted(path.name for path in folder.iterdir() if path.is_file()) if done else [],
         }
@@ -97,81 +82,73 @@ def report_folder(services: Services, public_id: str) -> Path:
 
 
 def report_file(
-    services: Services, session: Session, name: str, who: Identity, public_id: str, file: str
+    services: Services, session: Session, name: str, identity: Identity, public_id: str, file: str
 ) -> Path:
     """One file of a finished report; NotFound where it is not one of its files.
 
     Its tables have rows of single persons (means of each, exclusions), so it takes the right of downloads.
     """
-    study = find_study(session, name, who, "export")
-    job = repository.find_report(session, study, public_id)
+    study = find_study(session, name, identity, "export")
+    job = repository.find_job(session, study, "report", public_id)
     if job is None or file not in report_out(services, job).files:
         raise NotFound("There is no such report, or it has no such file.")
     return report_folder(services, public_id) / file
 
 
-def _build(services: Services, name: str, public_id: str, wanted: NewReport) -> None:
+def _build(services: Services, name: str, public_id: str, order: NewReport) -> None:
     """The background thread: every end, good or bad, is written to the job."""
     folder = report_folder(services, public_id)
     inputs = folder.with_name(f".{public_id}.input")
     try:
         with _one_at_a_time:
-            _note(services, public_id, status="running", progress=0.05, message="exporting", started_at=now())
-            series = _export(services, name, inputs, wanted)
-            _note(services, public_id, progress=0.2, message="analysing")
-            message = _analyse(inputs, folder, wanted, series)
+            note(services, public_id, status="running", progress=0.05, message="exporting", started_at=now())
+            series = _export(services, name, inputs, order)
+            note(services, public_id, progress=0.2, message="analysing")
+            message = _analyse(inputs, folder, order, series)
             if not message:
-                _add_methods(services, name, folder, wanted, series)
+                _add_methods(services, name, folder, order, series)
         status = "failed" if message else "done"
-        _note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
+        note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
     except (OSError, subprocess.SubprocessError, NotFound) as error:
-        _note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
+        note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
     finally:
         shutil.rmtree(inputs, ignore_errors=True)
 
 
-def _export(services: Services, name: str, inputs: Path, wanted: NewReport) -> int:
+def _export(services: Services, name: str, inputs: Path, order: NewReport) -> int:
     """Write the ratings, the runs and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
     with services.database.read() as session:
         study = find_study(session, name, OPERATOR, "view")
-        version = version_of_series(session, study, wanted.series)
+        version = version_of_series(session, study, order.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
         with (inputs / "answers.csv").open("wb") as stream:
-            stream.writelines(csv_pieces(rating_table(session, study, wanted.origin)))
+            stream.writelines(csv_pieces(rating_table(session, study, order.origin)))
         with (inputs / "runs.csv").open("wb") as stream:
-            stream.writelines(runs_csv(session, study, wanted.origin))
+            stream.writelines(runs_csv(session, study, order.origin))
         if (seal := seal_of(session, study)) and version.number == study.active_version:
             (inputs / SEAL).write_text(seal.text(), encoding="utf-8")
             (inputs / MANIFEST_NAME).write_text(json_text(version.manifest), encoding="utf-8")
         return version.series
 
 
-def _analyse(inputs: Path, folder: Path, wanted: NewReport, series: int) -> str:
+def _analyse(inputs: Path, folder: Path, order: NewReport, series: int) -> str:
     """Run the analysis; return its own error line where it failed, else an empty text."""
     return run_analysis(
         inputs / "definition.toml",
         inputs / "answers.csv",
         folder,
-        origin=wanted.origin,
+        origin=order.origin,
         series=series,
-        sensitivity=wanted.sensitivity,
+        sensitivity=order.sensitivity,
         runs=inputs / "runs.csv",
         seal=seal if (seal := inputs / SEAL).is_file() else None,
         manifest=manifest if (manifest := inputs / MANIFEST_NAME).is_file() else None,
     )
 
 
-def _add_methods(services: Services, name: str, folder: Path, wanted: NewReport, series: int) -> None:
+def _add_methods(services: Services, name: str, folder: Path, order: NewReport, series: int) -> None:
     with services.database.read() as session:
         study = find_study(session, name, OPERATOR, "view")
-        found = methods_of(session, study, wanted.origin, series, read_results(folder))
-    write(folder, found)
-
-
-def _note(services: Services, public_id: str, **values: Any) -> None:
-    with services.database.write() as session:
-        job = repository.job_called(session, public_id)
-        if job is not None:
-            for name, value in values.items():
-                setattr(job, name, value)
+        methods = methods_of(session, study, order.origin, series, read_results(folder))
+    write(folder, methods)

@@ -28,7 +28,7 @@ ByKind = Annotated[AnyResults, Field(discriminator="kind")]
 )
 def get_results(
     services: ServicesDep,
-    who: Viewer,
+    identity: Viewer,
     study: str,
     origin: Origin = "participant",
     series: Number | None = None,
@@ -44,11 +44,13 @@ def get_results(
 
     def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
-            return counting.counted(session, find_study(session, study, who, "view"), origin, series, scale)
+            return counting.counted(
+                session, find_study(session, study, identity, "view"), origin, series, scale
+            )
 
     with services.database.read() as session:
-        found = find_study(session, study, who, "view")
-        pool, revision = counting.pool_and_revision(session, found, origin, series, scale)
+        known = find_study(session, study, identity, "view")
+        pool, _, revision = counting.pool_and_revision(session, known, origin, series, scale)
     counted = services.results.get(pool, revision, count)
     headers = {"etag": counted.etag, "cache-control": "private, no-cache"}
     if if_none_match == counted.etag:

@@ -55,16 +55,16 @@ def cell_trace(traces: Sequence[Trace]) -> CellTrace:
     of_run: dict[int, list[Trace]] = {}
     for one in alike:
         of_run.setdefault(one.run, []).append(one)
-    people = [[fmean(one.values[place] for one in mine) for place in every] for mine in of_run.values()]
+    people = [[fmean(one.values[step] for one in mine) for step in every] for mine in of_run.values()]
     columns = list(zip(*people, strict=True))
     mean = [fmean(column) for column in columns]
-    half = [_half_width(column) for column in columns] if len(people) > 1 else None
+    half = [half_width(column) for column in columns] if len(people) > 1 else None
     return CellTrace(
         cell=first.cell,
         people=len(people),
         traces=len(alike),
         left_out=len(traces) - len(alike),
-        times_s=[round(place * first.step_s, 4) for place in every],
+        times_s=[round(step * first.step_s, 4) for step in every],
         mean=_rounded(mean),
         low=None if half is None else _rounded(m - h for m, h in zip(mean, half, strict=True)),
         high=None if half is None else _rounded(m + h for m, h in zip(mean, half, strict=True)),
@@ -72,7 +72,7 @@ def cell_trace(traces: Sequence[Trace]) -> CellTrace:
     )
 
 
-def _half_width(values: Sequence[float]) -> float:
+def half_width(values: Sequence[float]) -> float:
     """Half the 95% t interval of a mean."""
     return student_t(len(values) - 1) * stdev(values) / math.sqrt(len(values))
 

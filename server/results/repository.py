@@ -63,6 +63,18 @@ class StimulusCount(NamedTuple):
 
     series: str
     value: float
+    cell: str
+    n: int
+    positive: int
+
+
+class PersonCount(NamedTuple):
+    """Answers of one run that counted at one stimulus of a series."""
+
+    run: int
+    series: str
+    value: float
+    cell: str
     n: int
     positive: int
 
@@ -91,11 +103,23 @@ def _series_answers(of: Pool, *columns: Any) -> Select[Any]:
 
 
 def stimulus_counts(session: Session, of: Pool) -> list[StimulusCount]:
-    """Every stimulus of every series with its answers, stimuli ascending."""
+    """Every stimulus of every series with its answers, by the cell of its clip, stimuli ascending."""
     positive = func.sum(case((SeriesAnswer.correct.is_(True), 1), else_=0))
-    place = (SeriesTrial.series, SeriesAnswer.value)
-    query = _series_answers(of, *place, func.count(), positive).group_by(*place).order_by(*place)
-    return [StimulusCount(series, value, n, int(of_n)) for series, value, n, of_n in session.execute(query)]
+    keys = (SeriesTrial.series, SeriesAnswer.value, VersionClip.cell)
+    answers = _series_answers(of, *keys, func.count(), positive)
+    query = answers.join(VersionClip, VersionClip.id == SeriesAnswer.version_clip_id)
+    rows = session.execute(query.group_by(*keys).order_by(*keys))
+    return [StimulusCount(series, value, cell, n, int(of_n)) for series, value, cell, n, of_n in rows]
+
+
+def person_counts(session: Session, of: Pool) -> list[PersonCount]:
+    """As `stimulus_counts`, of each run by itself."""
+    positive = func.sum(case((SeriesAnswer.correct.is_(True), 1), else_=0))
+    keys = (SeriesAnswer.study_run_id, SeriesTrial.series, SeriesAnswer.value, VersionClip.cell)
+    answers = _series_answers(of, *keys, func.count(), positive)
+    query = answers.join(VersionClip, VersionClip.id == SeriesAnswer.version_clip_id)
+    rows = session.execute(query.group_by(*keys).order_by(*keys))
+    return [PersonCount(run, series, value, cell, n, int(of_n)) for run, series, value, cell, n, of_n in rows]
 
 
 def latest_estimates(session: Session, of: Pool) -> list[LatestEstimate]:

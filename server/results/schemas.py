@@ -133,8 +133,20 @@ class StimulusAnswers(BaseModel):
     """The answers that counted at one stimulus of a series."""
 
     value: float = Field(description="The stimulus as a number.")
+    second: float | None = Field(description="Its number along the second factor, where there is one.")
     n: int
     positive: int = Field(description="Yes, or the interval of the stimulus.")
+
+
+class MeanTilt(BaseModel):
+    """How far the threshold moves along the second factor: mean over people of their posterior means."""
+
+    people: int
+    mean: float = Field(description="Change of the threshold per unit of the second factor's numbers.")
+    sd: float | None = Field(description="Standard deviation over people.")
+    low: float | None = Field(description="95% t interval of the mean; null of one person.")
+    high: float | None
+    mean_posterior_sd: float = Field(description="Posterior SD of a person's tilt on average.")
 
 
 class SeriesResult(BaseModel):
@@ -149,6 +161,7 @@ class SeriesResult(BaseModel):
     mean_posterior_sd: float | None = Field(description="Posterior SD of an estimate on average.")
     stimuli: list[StimulusAnswers]
     thresholds: list[float] = Field(description="The people's latest thresholds, ascending.")
+    tilt: MeanTilt | None = Field(description="Where series move over two factors and have answers.")
 
 
 class ThresholdResults(StudyResults):
@@ -156,6 +169,8 @@ class ThresholdResults(StudyResults):
 
     kind: Literal["threshold"] = "threshold"
     factor: str = Field(description="The factor along which series move.")
+    second_factor: str | None = Field(description="The second factor, where series move over two.")
+    second_middle: float | None = Field(description="Its number at which thresholds are told.")
     two_interval: bool
     series_results: list[SeriesResult]
 

@@ -3,7 +3,9 @@
 from bisect import bisect_right
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from datetime import datetime
 from itertools import combinations
+from typing import TypedDict
 
 from sqlalchemy.orm import Session
 
@@ -50,37 +52,57 @@ def results(session: Session, study: Study, version: StudyVersion, of: Pool) -> 
     tally = pooled(session, of.runs(), of.scale, factors)
     clips = _clips(session, version, tally, bins, scale.maximum)
     return Results(
-        study=study.name,
-        origin=of.origin,
-        series=version.series,
-        counted_at=now(),
-        participants=len(tally.means),
+        **common(study, version, of, tally),
         ratings=sum(clip.ratings for clip in clips),
         scales=[_shown(one) for one in scales_of(definition)],
         scale=_shown(scale),
         bins=bins,
+        # Of a dealt factor a participant has some levels only, as of one between participants.
         margins=margins(
-            tally.means, factors, [factor.name for factor in definition.factors if factor.between]
+            tally.means, factors, [one.name for one in definition.factors if one.between or one.dealt]
         ),
         cells=_cells(clips),
         clips=clips,
-        response_times=time_bins(tally),
-        playback=playback_of(tally),
     )
+
+
+class Common(TypedDict):
+    """What the results of every kind of trial begin with."""
+
+    study: str
+    origin: str
+    series: int
+    counted_at: datetime
+    participants: int
+    response_times: list[TimeBin]
+    playback: Playback
+
+
+def common(study: Study, version: StudyVersion, of: Pool, tally: PooledTally) -> Common:
+    """What the tallies say of a pool, whatever its kind of trial."""
+    return {
+        "study": study.name,
+        "origin": of.origin,
+        "series": version.series,
+        "counted_at": now(),
+        "participants": len(tally.means),
+        "response_times": time_bins(tally),
+        "playback": playback_of(tally),
+    }
 
 
 def margins(means: summary.CellMeans, factors: list[str], between: Sequence[str] = ()) -> list[Margin]:
     """Every factor, every pair of factors, and the cells where there are more than two factors."""
     people = summary.alike(means)
-    wanted = [list(chosen) for size in (1, 2) for chosen in combinations(factors, size)]
+    kept = [list(chosen) for size in (1, 2) for chosen in combinations(factors, size)]
     if len(factors) > 2:
-        wanted.append(factors)
+        kept.append(factors)
     return [
         Margin(
             factors=keep,
             means=[Mean.model_validate(vars(one)) for one in summary.margin(people, factors, keep, between)],
         )
-        for keep in wanted
+        for keep in kept
     ]
 
 
@@ -88,7 +110,7 @@ def bins_of(scale: RatedScale) -> list[float]:
     """Lowest answer of each count: every answer there is, or twenty equal parts where there are more."""
     steps = round((scale.maximum - scale.minimum) / scale.step)
     count, width = (steps + 1, scale.step) if steps <= MAX_BINS else (MAX_BINS, steps * scale.step / MAX_BINS)
-    return [scale.minimum + place * width for place in range(count)]
+    return [scale.minimum + index * width for index in range(count)]
 
 
 def _shown(scale: RatedScale) -> ResultScale:
@@ -147,7 +169,7 @@ def _weighted(clips: list[ClipResult]) -> float | None:
 
 def time_bins(tally: PooledTally) -> list[TimeBin]:
     """Response times in bins of 250 ms."""
-    return [TimeBin(start_ms=RT_MS * place, answers=n) for place, n in sorted(tally.times.items())]
+    return [TimeBin(start_ms=RT_MS * index, answers=n) for index, n in sorted(tally.times.items())]
 
 
 def playback_of(tally: PooledTally) -> Playback:

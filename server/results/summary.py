@@ -32,13 +32,13 @@ class Alike(NamedTuple):
 
 def alike(cell_means: CellMeans) -> list[Alike]:
     """Participants by the cells they rated. Thousands are then reckoned with column by column."""
-    found: dict[tuple[tuple[str, ...], ...], Alike] = {}
+    groups: dict[tuple[tuple[str, ...], ...], Alike] = {}
     for means in cell_means.values():
         cells = tuple(means)
-        if cells not in found:
-            found[cells] = Alike(cells, [])
-        found[cells].rows.append(tuple(means.values()))
-    return list(found.values())
+        if cells not in groups:
+            groups[cells] = Alike(cells, [])
+        groups[cells].rows.append(tuple(means.values()))
+    return list(groups.values())
 
 
 def margin(
@@ -47,15 +47,31 @@ def margin(
     """Marginal means of the factors in `keep`, over the participants who have every one of those levels.
 
     Cells of a participant are averaged without weights. Error bars: `within_participant_errors`, each
-    group for itself where `keep` has factors of `between`, of which a participant has one level.
+    group for itself where `keep` has factors of `between`, of which a participant has one level or some.
     """
     fixed = [factors.index(name) for name in keep if name in between]
     groups: dict[tuple[str, ...], list[Alike]] = {}
     for those in people:
-        for group in dict.fromkeys(tuple(levels[place] for place in fixed) for levels in those.cells):
-            groups.setdefault(group, []).append(those)
+        for group, cells in _cells_by_group(those, fixed).items():
+            groups.setdefault(group, []).append(_of_cells(those, cells))
     places = [factors.index(name) for name in keep]
     return [mean for group in groups.values() for mean in _of_group(group, keep, places)]
+
+
+def _cells_by_group(those: Alike, fixed: Sequence[int]) -> dict[tuple[str, ...], list[int]]:
+    """Which of their cells lie in each group, by its levels of the factors at `fixed`."""
+    groups: dict[tuple[str, ...], list[int]] = defaultdict(list)
+    for number, levels in enumerate(those.cells):
+        groups[tuple(levels[index] for index in fixed)].append(number)
+    return groups
+
+
+def _of_cells(those: Alike, cells: Sequence[int]) -> Alike:
+    """The same participants with some of their cells."""
+    if len(cells) == len(those.cells):
+        return those
+    rows = [tuple(row[number] for number in cells) for row in those.rows]
+    return Alike(tuple(those.cells[number] for number in cells), rows)
 
 
 def _of_group(people: Sequence[Alike], keep: Sequence[str], places: Sequence[int]) -> list[MarginMean]:
@@ -70,10 +86,10 @@ def _of_group(people: Sequence[Alike], keep: Sequence[str], places: Sequence[int
         MarginMean(
             levels=dict(zip(keep, key, strict=True)),
             mean=math.fsum(column) / len(rows),
-            se_within=errors[place] if errors else None,
+            se_within=errors[index] if errors else None,
             participants=len(rows),
         )
-        for place, (key, column) in enumerate(zip(conditions, zip(*rows, strict=True), strict=True))
+        for index, (key, column) in enumerate(zip(conditions, zip(*rows, strict=True), strict=True))
     ]
 
 
@@ -81,7 +97,7 @@ def _collapse(those: Alike, places: Sequence[int]) -> dict[tuple[str, ...], Sequ
     """Condition -> each participant's mean over the cells of that condition."""
     members: dict[tuple[str, ...], list[int]] = defaultdict(list)
     for number, levels in enumerate(those.cells):
-        members[tuple(levels[place] for place in places)].append(number)
+        members[tuple(levels[index] for index in places)].append(number)
     columns = list(zip(*those.rows, strict=True))
     return {
         key: columns[of[0]]

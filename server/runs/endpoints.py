@@ -19,7 +19,7 @@ router = APIRouter(prefix="/api/admin/studies/{study}/runs", tags=["participants
 @router.get("")
 def list_runs(
     services: ServicesDep,
-    who: PersonalReader,
+    identity: PersonalReader,
     study: str,
     show: Show = "everybody",
     search: Annotated[str, Query(max_length=200, description="Part of participant or run.")] = "",
@@ -28,45 +28,47 @@ def list_runs(
 ) -> RunPage:
     """The runs, the latest first, a page at a time: go on with `before` = `next`."""
     with services.database.read() as session:
-        shown = service.page(session, find_study(session, study, who, "export"), show, search, before, limit)
+        shown = service.page(
+            session, find_study(session, study, identity, "export"), show, search, before, limit
+        )
     with services.database.write() as session:
-        record(session, who, "participants listed", "study", study, number=len(shown.runs))
+        record(session, identity, "participants listed", "study", study, number=len(shown.runs))
     return shown
 
 
 @router.get("/{run}")
-def get_timeline(services: ServicesDep, who: PersonalReader, study: str, run: str) -> Timeline:
+def get_timeline(services: ServicesDep, identity: PersonalReader, study: str, run: str) -> Timeline:
     """One run: each trial with its frames and rating, forms, calibrations, events."""
     with services.database.write() as session:
-        found = service.timeline(session, find_study(session, study, who, "export"), run)
-        record(session, who, "personal data read", "run", run, study=study)
-        return found
+        timeline = service.timeline(session, find_study(session, study, identity, "export"), run)
+        record(session, identity, "personal data read", "run", run, study=study)
+        return timeline
 
 
 @router.get("/{run}/identity")
-def get_identity(services: ServicesDep, who: Myself, study: str, run: str) -> RunIdentity:
+def get_identity(services: ServicesDep, identity: Myself, study: str, run: str) -> RunIdentity:
     """Who the participant is to the recruiter; for owners of the study, and each look is in the audit log."""
     with services.database.write() as session:
-        return service.identity(session, find_study(session, study, who, "own"), run, who)
+        return service.identity(session, find_study(session, study, identity, "own"), run, identity)
 
 
 @router.put("/{run}/exclusion", status_code=204)
-def exclude_run(services: ServicesDep, who: Writer, study: str, run: str, body: Exclude) -> None:
+def exclude_run(services: ServicesDep, identity: Writer, study: str, run: str, body: Exclude) -> None:
     """Exclude a run from exports' `excluded = 0` and from the analysis; its data stay."""
     with services.database.write() as session:
-        service.exclude(session, find_study(session, study, who, "run"), run, body.reason, who)
+        service.exclude(session, find_study(session, study, identity, "run"), run, body.reason, identity)
 
 
 @router.delete("/{run}/exclusion", status_code=204)
-def include_run(services: ServicesDep, who: Writer, study: str, run: str) -> None:
+def include_run(services: ServicesDep, identity: Writer, study: str, run: str) -> None:
     """Undo an exclusion."""
     with services.database.write() as session:
-        service.include(session, find_study(session, study, who, "run"), run, who)
+        service.include(session, find_study(session, study, identity, "run"), run, identity)
 
 
 @router.post("/{run}/erase")
-def erase_run(services: ServicesDep, who: Writer, study: str, run: str, body: Erase) -> Erased:
+def erase_run(services: ServicesDep, identity: Writer, study: str, run: str, body: Erase) -> Erased:
     """Delete one person's data for good (a request under data protection law)."""
     with services.database.write() as session:
-        found = find_study(session, study, who, "edit")
-        return erase(session, services.settings, found, run, body.confirm, who)
+        known = find_study(session, study, identity, "edit")
+        return erase(session, services.settings, known, run, body.confirm, identity)

@@ -6,10 +6,11 @@ from sqlalchemy.orm import Session
 
 from experiments.assignment.grouping import deciding
 from server.accounts.audit import record
-from server.accounts.identity import Identity
+from server.accounts.identity import Identity, Operator
 from server.audit.repository import entries_on_run
 from server.clock import now
 from server.errors import Conflict, Invalid
+from server.identities import repository as identities
 from server.models import NO_SLOT, Study, StudyRun
 from server.operations import erasures
 from server.repository import run_called
@@ -20,26 +21,31 @@ from server.studies.lookup import definition_of
 
 
 def erase(
-    session: Session, settings: Settings, study: Study, public_id: str, confirm: str, who: Identity
+    session: Session,
+    settings: Settings,
+    study: Study,
+    public_id: str,
+    confirm: str,
+    identity: Identity | Operator,
 ) -> Erased:
     """Delete one person's data for good, in all visits to the study that are known to be hers.
 
     Rows without content stay, so that counts stay right. The ledger is written before the database is
     committed: what it names a restore erases, though the commit may have failed.
     """
-    run = repository.find_run(session, study, public_id)
+    run = repository.find_run(session, study, public_id, lock=True)
     if confirm != public_id:
         raise Invalid(f"To erase this run, confirm with its identifier {public_id}; got '{confirm}'.")
     if run.erased_at is not None:
         raise Conflict("This run's data were erased already.")
-    every = [run, *repository.other_visits(session, run)]
+    every = repository.every_visit(session, [run], lock=True)
     reports = [
         HeldReport(report=public, finished_at=finished)
         for public, finished in repository.reports(session, study)
     ]
     for visit in every:
         ratings = forget(session, visit)
-        record(session, who, "run erased", "run", visit.public_id, study=study.name, ratings=ratings)
+        record(session, identity, "run erased", "run", visit.public_id, study=study.name, ratings=ratings)
     session.flush()
     erased = [visit.public_id for visit in every]
     erasures.note(settings, erased)
@@ -55,7 +61,21 @@ def replay(session: Session, settings: Settings) -> int:
             forget(session, run)
             record(session, None, "run erased", "run", public_id, again=True)
             erased += 1
+    for public_id in erasures.noted_identifiers(settings):
+        run = run_called(session, public_id)
+        if run is not None and run.erased_at is None and forget_identifiers(session, run):
+            record(session, None, "identifiers erased", "run", public_id, again=True)
     return erased
+
+
+def forget_identifiers(session: Session, run: StudyRun) -> bool:
+    """Delete who the person of a run is and leave the answers; False where nothing told."""
+    known = identities.drop_key(session, run)
+    if run.completion_code:
+        run.completion_code, known = "", True
+    if run.link.kind == "personal" and run.link.label not in ("", "erased"):
+        run.link.label, known = "erased", True
+    return known
 
 
 def forget(session: Session, run: StudyRun) -> int:

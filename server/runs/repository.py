@@ -7,6 +7,7 @@ from sqlalchemy import ColumnElement, Select, delete, false, func, select
 from sqlalchemy.orm import Session, joinedload
 
 from server.errors import NotFound
+from server.identities import repository as identities
 from server.models import (
     AnswerEvidence,
     AssignedTrial,
@@ -14,7 +15,6 @@ from server.models import (
     FormAnswer,
     Job,
     Rating,
-    RecruiterIdentity,
     RunEvent,
     RunTally,
     SeriesAnswer,
@@ -30,10 +30,11 @@ from server.models import (
 from server.runs.schemas import Show
 
 
-def find_run(session: Session, study: Study, public_id: str) -> StudyRun:
-    """The run of a study by its public identifier; previews are not runs of people."""
+def find_run(session: Session, study: Study, public_id: str, *, lock: bool = False) -> StudyRun:
+    """The run of a study by its public identifier, held where `lock`; previews are not runs of people."""
     query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.public_id == public_id)
-    run = session.scalar(query.where(StudyRun.origin != "preview"))
+    query = query.where(StudyRun.origin != "preview")
+    run = session.scalar(query.with_for_update(of=StudyRun) if lock else query)
     if run is None:
         raise NotFound(f"There is no run '{public_id[:40]}' in the study '{study.name}'.")
     return run
@@ -120,24 +121,30 @@ def calibrations(session: Session, run: StudyRun) -> list[Calibration]:
     return list(session.scalars(query))
 
 
-def identity(session: Session, run: StudyRun) -> RecruiterIdentity | None:
-    """Who the run's person is to the recruiter; None where the address said nothing."""
-    return session.get(RecruiterIdentity, run.id)
+def every_visit(session: Session, runs: Sequence[StudyRun], *, lock: bool = False) -> list[StudyRun]:
+    """All visits to the study that are known to be the person's of these runs, not erased, these first.
 
-
-def other_visits(session: Session, run: StudyRun) -> list[StudyRun]:
-    """Other visits to the study that are known to be the same person's, and not erased.
-
-    Known are those by the same personal link, and those under the same pseudonym of a recruiter's id.
+    Known are those by the same personal link and those under the same recruiter's id, and what is known by
+    these in turn. Previews are nobody's.
     """
+    known, news = {run.id: run for run in runs}, list(runs)
+    while news:
+        further = [other for run in news for other in _of_same_person(session, run, lock=lock)]
+        news = list({other.id: other for other in further if other.id not in known}.values())
+        known |= {other.id: other for other in news}
+    given = {run.id for run in runs}
+    others = sorted((run for run in known.values() if run.id not in given), key=lambda run: run.id)
+    return [*runs, *others]
+
+
+def _of_same_person(session: Session, run: StudyRun, *, lock: bool) -> list[StudyRun]:
     same: ColumnElement[bool] = StudyRun.link_id == run.link_id if run.link.kind == "personal" else false()
-    known = identity(session, run)
-    if known is not None and known.identifier:
-        same |= StudyRun.id.in_(
-            select(RecruiterIdentity.study_run_id).where(RecruiterIdentity.identifier == known.identifier)
-        )
-    query = select(StudyRun).where(StudyRun.study_id == run.study_id, StudyRun.id != run.id, same)
-    return list(session.scalars(query.where(StudyRun.erased_at.is_(None)).order_by(StudyRun.id)))
+    hashed = identities.same_person(session, run)
+    if hashed is not None:
+        same |= hashed
+    query = select(StudyRun).where(StudyRun.study_id == run.study_id, same, StudyRun.origin != "preview")
+    query = query.where(StudyRun.erased_at.is_(None)).order_by(StudyRun.id)
+    return list(session.scalars(query.with_for_update(of=StudyRun) if lock else query))
 
 
 def reports(session: Session, study: Study) -> list[tuple[str, datetime | None]]:
@@ -146,12 +153,20 @@ def reports(session: Session, study: Study) -> list[tuple[str, datetime | None]]
     return [(public_id, finished) for public_id, finished in session.execute(query.order_by(Job.id))]
 
 
+def of_personal_link(run: StudyRun) -> ColumnElement[bool]:
+    """Which events came by the link of one person alone, before a run began."""
+    by_link = RunEvent.study_run_id.is_(None) & (RunEvent.link_id == run.link_id)
+    return by_link if run.link.kind == "personal" else false()
+
+
 def delete_personal_rows(session: Session, run: StudyRun) -> int:
     """Delete everything a person left in a run; return how many ratings that were."""
     ratings = session.scalar(select(func.count()).select_from(Rating).where(Rating.study_run_id == run.id))
-    personal = (AnswerEvidence, View, RunEvent, FormAnswer, Calibration, RecruiterIdentity)
+    identities.forget(session, run)
+    personal = (AnswerEvidence, View, RunEvent, FormAnswer, Calibration)
     # Which clips were shown follows from the group, and in a series from the answers.
     shown = (SeriesAnswer, SeriesOffer, SeriesTrial, TrialClip)
     for table in (Rating, RunTally, *personal, *shown):
         session.execute(delete(table).where(table.study_run_id == run.id))
+    session.execute(delete(RunEvent).where(of_personal_link(run)))
     return int(ratings or 0)

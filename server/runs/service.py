@@ -8,6 +8,8 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
 from server.errors import Conflict
+from server.identities.repository import known_as
+from server.identities.sealing import KnownAs, UnreadableError
 from server.models import AssignedTrial, Link, Rating, Study, StudyRun, VersionClip
 from server.runs import repository
 from server.runs.schemas import (
@@ -67,16 +69,19 @@ def _way_in(link: Link) -> str:
     return link.kind if link.kind == "personal" else link.label or link.kind
 
 
-def identity(session: Session, study: Study, public_id: str, who: Identity) -> RunIdentity:
+def identity(session: Session, study: Study, public_id: str, reader: Identity) -> RunIdentity:
     """Who a run's participant is to the recruiter; that somebody looked is written down."""
     run = repository.find_run(session, study, public_id)
-    record(session, who, "identity read", "run", public_id, study=study.name)
-    known = repository.identity(session, run)
+    record(session, reader, "identity read", "run", public_id, study=study.name)
+    try:
+        known = known_as(session, run) or KnownAs()
+    except UnreadableError as error:
+        raise Conflict(f"{error}.") from error
     return RunIdentity(
         run=public_id,
         participant=run.participant,
-        identifier=known.identifier if known else "",
-        parameters=known.parameters if known else {},
+        identifier=known.identifier,
+        parameters=dict(known.parameters),
         link=run.link.label,
     )
 
@@ -125,20 +130,22 @@ def _trial(rating: Rating, trial: AssignedTrial, clip: VersionClip | None) -> Ti
     return TimelineTrial.model_validate(values)
 
 
-def exclude(session: Session, study: Study, public_id: str, reason: str, who: Identity) -> None:
+def exclude(session: Session, study: Study, public_id: str, reason: str, identity: Identity) -> None:
     """Mark a run as excluded; its data stay, with the reason."""
     run = repository.find_run(session, study, public_id)
     if run.erased_at is not None:
         raise Conflict("This run's data were erased; there is nothing left to exclude.")
     run.excluded, run.exclusion_reason = True, reason
-    run.excluded_at, run.excluded_by = now(), who.account_id
-    record(session, who, "run excluded", "run", public_id, study=study.name, reason=reason)
+    run.excluded_at, run.excluded_by = now(), identity.account_id
+    record(session, identity, "run excluded", "run", public_id, study=study.name, reason=reason)
 
 
-def include(session: Session, study: Study, public_id: str, who: Identity) -> None:
+def include(session: Session, study: Study, public_id: str, identity: Identity) -> None:
     """Undo an exclusion; the audit log keeps that it was there."""
     run = repository.find_run(session, study, public_id)
     if not run.excluded:
         raise Conflict("This run is not excluded.")
-    record(session, who, "exclusion undone", "run", public_id, study=study.name, reason=run.exclusion_reason)
+    record(
+        session, identity, "exclusion undone", "run", public_id, study=study.name, reason=run.exclusion_reason
+    )
     run.excluded, run.exclusion_reason, run.excluded_at, run.excluded_by = False, None, None, None

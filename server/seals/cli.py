@@ -37,11 +37,11 @@ def seal(
 
       analysis run exp3.toml --csv exp3.csv --seal exp3-seal.json
     """
-    found = _power(power)
+    planned = _power(power)
     with migrated_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "view")
-        sealed = seal_of(session, known) or seal_plan(session, known, None, found)
-    if found is not None and sealed.power != found:
+        sealed = seal_of(session, known) or seal_plan(session, known, None, planned)
+    if planned is not None and sealed.power != planned:
         raise InputError(
             f"the plan was sealed {sealed.sealed_at} with another power; a seal is never replaced"
         )
@@ -55,9 +55,9 @@ def _power(path: Path | None) -> dict[str, Any] | None:
     if path is None:
         return None
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        power = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: expected the JSON of `analysis power` ({error})") from error
-    if not isinstance(found, dict):
+    if not isinstance(power, dict):
         raise InputError(f"{path}: expected the JSON of `analysis power`, got a list or a number")
-    return found
+    return power

@@ -37,12 +37,14 @@ class SealOut(BaseModel):
 
 
 @router.get("")
-def get_seal(services: ServicesDep, who: Viewer, study: str) -> SealOut:
+def get_seal(services: ServicesDep, identity: Viewer, study: str) -> SealOut:
     """Whether there is a sealed plan."""
     with services.database.read() as session:
-        known = find_study(session, study, who, "view")
-        seal = seal_of(session, known)
-        people = people_begun(session, known)
+        known = find_study(session, study, identity, "view")
+        return _out(seal_of(session, known), people_begun(session, known))
+
+
+def _out(seal: Seal | None, people: int) -> SealOut:
     if seal is None:
         return SealOut(sealed_at=None, sha256=None, version=None, power=False, participants=people)
     return SealOut(
@@ -55,27 +57,29 @@ def get_seal(services: ServicesDep, who: Viewer, study: str) -> SealOut:
 
 
 @router.post("", status_code=201)
-def seal_study(services: ServicesDep, who: Writer, study: str, body: NewSeal) -> SealOut:
+def seal_study(services: ServicesDep, identity: Writer, study: str, body: NewSeal) -> SealOut:
     """Seal design, exclusions, analysis plan and power, once, before the first participant."""
     with services.database.write() as session:
-        seal_plan(session, find_study(session, study, who, "edit"), who, body.power)
-    return get_seal(services, who, study)
+        # Nobody has begun: else it would not be sealed.
+        return _out(
+            seal_plan(session, find_study(session, study, identity, "edit"), identity, body.power), people=0
+        )
 
 
 @router.get("/plan.{ending}", response_class=Response)
 def download_seal(
-    services: ServicesDep, who: Viewer, study: str, ending: Literal["json", "html"]
+    services: ServicesDep, identity: Viewer, study: str, ending: Literal["json", "html"]
 ) -> Response:
     """The sealed file, or a page of it that prints well."""
-    seal = _sealed(services, study, who)
+    seal = _sealed(services, study, identity)
     text, kind = (seal.text(), "application/json") if ending == "json" else (page(seal), "text/html")
     headers = {"content-disposition": f'attachment; filename="{study}-seal.{ending}"'}
     return Response(encoded(text), media_type=f"{kind}; charset=utf-8", headers=headers)
 
 
-def _sealed(services: Services, study: str, who: Identity) -> Seal:
+def _sealed(services: Services, study: str, identity: Identity) -> Seal:
     with services.database.read() as session:
-        seal = seal_of(session, find_study(session, study, who, "view"))
+        seal = seal_of(session, find_study(session, study, identity, "view"))
     if seal is None:
         raise NotFound(f"The plan of '{study}' is not sealed.")
     return seal

@@ -30,7 +30,9 @@ def people_begun(session: Session, study: Study) -> int:
     return people_of_series(session, study, active_version(session, study).series)
 
 
-def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[str, Any] | None) -> Seal:
+def seal_plan(
+    session: Session, study: Study, identity: Identity | None, power: dict[str, Any] | None
+) -> Seal:
     """Seal the active version; Conflict where it is sealed or archived, or people have taken part already."""
     # Held until the seal is stored: nobody begins meanwhile, nor does another seal.
     study = lock_study(session, study.id)
@@ -55,7 +57,7 @@ def seal_plan(session: Session, study: Study, who: Identity | None, power: dict[
         power=power,
     )
     record(
-        session, who, ACTION, "study", study.name,
+        session, identity, ACTION, "study", study.name,
         sha256=seal.sha256, series=version.series, seal=seal.model_dump(mode="json"),
     )  # fmt: skip
     return seal

@@ -6,12 +6,13 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from experiments.trials.clip_rating.page import ShownClipRating
+from server.clips.address import clip_address
 from server.clock import now
 from server.context import SIMULATED_TIME
 from server.evidence.clip_bytes import clip_digest, clip_hash
 from server.simulation.http import JsonClient, Refused
 from server.simulation.manners import Manner, person
-from server.simulation.person import SEES_MOTION, Person, Rater
+from server.simulation.person import SEES_MOTION, Person, Rater, still_due, view_s
 
 MAX_HELD = 12
 """Answers kept while the network is away."""
@@ -22,11 +23,13 @@ MAX_ROUNDS = 8
 class Actor(Person):
     """One participant who takes part in a declared manner; `refused` holds the codes of refusals."""
 
+    client: JsonClient
+
     def __init__(self, client: JsonClient, rater: Rater, manner: Manner, clips: dict[str, bytes]) -> None:
         super().__init__(client, rater)
         self.manner, self.clips = manner, clips
         self.rng = random.Random(f"{rater.effects_seed}/manner/{rater.seed}")
-        self.who = person(self.rng)
+        self.person = person(self.rng)
         self.moment: datetime = now()
         self.clock_off = timedelta()
         self.refused: list[str] = []
@@ -35,7 +38,7 @@ class Actor(Person):
         self.run_id = ""
         self.tickets: dict[str, Any] | None = None
         self.offers_other_way = False
-        self._held: list[dict[str, Any]] = []
+        self._held: list[tuple[dict[str, Any] | None, dict[str, Any]]] = []
         self._holds = 0
 
     def visit(self, link_token: str) -> str | None:
@@ -52,8 +55,10 @@ class Actor(Person):
             due = [trial for trial in state["trials"] if not trial["answered"]]
             if not due or self._is_over():
                 break
-            for trial in due:
-                self.rate(trial, state["trial"])
+            self.following = None
+            while due:
+                self.rate(due.pop(0), state["trial"])
+                due = still_due(due, self.following)
             self._deliver()
             state = self._state()
         if self._is_over() or not self._forms(state, "after"):
@@ -73,12 +78,11 @@ class Actor(Person):
 
     def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:
         """Watch and answer one trial; whether it is asked again shows when the run is read anew."""
-        manner, clip = self.manner, trial["clip_sha256"]
+        manner, clips_s = self.manner, view_s(trial, declared)
         self._mishaps()
-        rt = manner.rt_ms(self.rng, self.who)
+        rt = manner.rt_ms(self.rng, self.person)
         if manner.waits:
-            clip_s = trial["frames"] / trial["fps"] if clip else 0.0
-            self.moment += timedelta(seconds=clip_s + rt / 1000 + READY_S)
+            self.moment += timedelta(seconds=clips_s + rt / 1000 + READY_S)
         body = self.rating(trial, declared) | {"rt": round(rt, 2)}
         if body["answer"]["kind"] == "clip_rating":  # other kinds are answered as the rater model does
             self._answer_in_manner(body["answer"]["answers"], trial, declared)
@@ -87,8 +91,9 @@ class Actor(Person):
         body["answered_at_client"] = (self.moment + self.clock_off).isoformat()
         if manner.tickets:
             body["evidence"] = self._evidence(trial)
-        self._held.append(body)
-        if self._holds == 0 or len(self._held) >= MAX_HELD:
+        self._held.append((self._view(trial, body, clips_s), body))
+        chosen_by_answers = "ahead" in declared
+        if self._holds == 0 or len(self._held) >= MAX_HELD or chosen_by_answers:
             self._deliver()
         else:
             self._holds -= 1
@@ -132,8 +137,9 @@ class Actor(Person):
         ticket = self.tickets["by_trial"][trial["trial_index"]][trial["plays_done"]]
         digest = None
         if trial["clip_sha256"] and self.manner.fetches:
-            digest = clip_digest(ticket, clip_hash(self._clip(trial)))
-        interaction = self.manner.interaction(self.rng, self.who)
+            clips = (self._clip(clip["clip_sha256"]) for clip in trial["clips"])
+            digest = clip_digest(ticket, *map(clip_hash, clips))
+        interaction = self.manner.interaction(self.rng, self.person)
         return {
             "batch": self.tickets["batch"],
             "ticket": ticket,
@@ -141,10 +147,28 @@ class Actor(Person):
             "interaction": interaction,
         }
 
-    def _clip(self, trial: dict[str, Any]) -> bytes:
-        sha256 = trial["clip_sha256"]
+    def _view(self, trial: dict[str, Any], body: dict[str, Any], clips_s: float) -> dict[str, Any] | None:
+        """The view of a trial that has ended; None from who sends no tickets, and where nothing was shown."""
+        evidence = body.get("evidence")
+        if evidence is None or not trial["clip_sha256"]:
+            return None
+        began = self.moment + self.clock_off
+        if self.manner.waits:
+            began -= timedelta(seconds=clips_s + body["rt"] / 1000)
+        return {
+            "id": str(uuid.uuid4()),
+            "trial_index": trial["trial_index"],
+            "number": trial["plays_done"] + 1,
+            "play": trial["plays_done"] + 1,
+            "started_at_client": began.isoformat(),
+            "ended_at_client": body["answered_at_client"],
+            "outcome": "shown",
+            "evidence": {"batch": evidence["batch"], "ticket": evidence["ticket"]},
+        }
+
+    def _clip(self, sha256: str) -> bytes:
         if sha256 not in self.clips:
-            self.clips[sha256] = self.client.fetch(trial["clip_url"])
+            self.clips[sha256] = self.client.fetch(clip_address(sha256))
         return self.clips[sha256]
 
     def _deliver(self) -> None:
@@ -154,12 +178,15 @@ class Actor(Person):
         self._holds = 0
         self._tell_time()
         held, self._held = self._held, []
-        for body in held:
+        for view, body in held:
             if self.ended:
                 return
             try:
+                if view is not None:
+                    self.client.post("/api/run/views", {"views": [view]})
                 saved = self.client.put(f"/api/run/ratings/{uuid.uuid4()}", body)
                 self.ratings += 1
+                self.following = saved.get("next")
                 self._heed(saved["receipt"])
             except Refused as error:
                 self.refused.append(error.code)

@@ -12,21 +12,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from experiments.errors import InputError
-from experiments.trials.threshold.declaration import Threshold
-from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.cli_common import migrated_services, out
-from server.context import Services
 from server.settings import Settings
 from server.simulation.adversaries import act, manner_called, summary, write
 from server.simulation.http import JsonClient, Refused, running_server
 from server.simulation.manners import MANNERS
-from server.simulation.observer import observer_of
+from server.simulation.people import link_and_raters
 from server.simulation.person import Person, Rater
-from server.studies.links import PURPOSE, create_link
-from server.studies.lookup import active_version, find_study, must_not_be_archived
-from server.studies.repository import clips_of_design
-from server.tokens import derived_token
 
 
 def register(parent: typer.Typer) -> None:
@@ -90,7 +83,7 @@ def simulate(
     if json_file is not None:
         raise InputError("--json goes with --as, which gives the verdicts to write")
     with migrated_services(settings) as services:
-        token, raters = _prepare(services, study, observer)
+        token, raters = link_and_raters(services, study, observer)
     people = range(seed * 1_000_000, seed * 1_000_000 + participants)
     with (
         _server(settings, url) as address,
@@ -115,34 +108,12 @@ def _as(
     """Simulated people in a manner, with the verdict on each."""
     manner = manner_called(name)
     with migrated_services(settings) as services:
-        token, raters = _prepare(services, study)
+        token, raters = link_and_raters(services, study)
     everyone = [raters(number, people.start) for number in people]
     runs = act(settings, token, everyone, manner, at_once)
     if json_file is not None:
         write(json_file, study, name, runs)
     out.print(f"study {study}, {len(runs)} as {name}: {summary(runs)}")
-
-
-def _prepare(services: Services, name: str, observed: str = "") -> tuple[str, Callable[[int, int], Rater]]:
-    """A link whose runs are simulated, and the maker of raters, who know the levels of each clip."""
-    with services.database.write() as session:
-        study = find_study(session, name, OPERATOR, "view")
-        must_not_be_archived(study)
-        version = active_version(session, study)
-        rows = clips_of_design(session, version)
-        blinks: dict[str, list[float]] = {row.clip_sha256: row.blinks_s or [] for row in rows}
-        levels: dict[str, dict[str, str]] = {row.clip_sha256: row.levels for row in rows}
-        link = create_link(
-            session, services.settings.key, study, "general", label="simulation", synthetic=True
-        )
-        experiment, observer = services.versions.get(session, version.id).experiment, None
-        if isinstance(experiment.trial, Threshold):
-            observer = observer_of(experiment, levels, observed)
-        elif observed:
-            raise InputError(f"--observer: expected a study of thresholds, got {experiment.trial.kind}")
-        checks = {check["sha256"]: check["answer"] for check in version.manifest.get("checks", ())}
-        token = derived_token(services.settings.key, PURPOSE, link.public_id)
-    return token, lambda number, seed: Rater(number, seed, levels, observer, blinks, checks)
 
 
 def _one(address: str, token: str, rater: Rater) -> int:

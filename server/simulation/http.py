@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import uvicorn
@@ -17,6 +17,8 @@ from server.protocol import BoundedHttp
 
 TIMEOUT_S = 60.0
 START_TIMEOUT_S = 30.0
+ACCEPTED = "application/json;clips=hash"
+"""What the participant's page says that it reads."""
 
 
 class Refused(Exception):
@@ -28,6 +30,21 @@ class Refused(Exception):
         self.status = status
         self.code = str(error.get("code", ""))
         self.details: dict[str, Any] = error.get("details", {})
+
+
+class RunApi(Protocol):
+    """What a simulated person asks of a connection: requests of a participant, with the token of the run."""
+
+    token: str | None
+
+    def get(self, path: str, /) -> Any:
+        """The answer to GET."""
+
+    def put(self, path: str, body: Any, /) -> Any:
+        """The answer to PUT."""
+
+    def post(self, path: str, body: Any = None, /) -> Any:
+        """The answer to POST."""
 
 
 class JsonClient:
@@ -63,7 +80,7 @@ class JsonClient:
 
     def send(self, method: str, path: str, body: Any = None) -> None:
         """Send a request without waiting for the answer."""
-        headers = {"content-type": "application/json", **self.headers}
+        headers = {"accept": ACCEPTED, "content-type": "application/json", **self.headers}
         if self.token:
             headers["authorization"] = f"Bearer {self.token}"
         text = json.dumps(body) if body is not None else None

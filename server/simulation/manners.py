@@ -16,11 +16,26 @@ Interaction = dict[str, Any]
 class Manner:
     """How somebody takes part.
 
-    tickets: sends the server's tickets. fetches: fetches clips, and shows it. waits: lets the clips play.
-    rt_ms: response time of one answer. interaction: presses between two answers, None where none are told.
-    answers: by the rater model, always the same, or any; reads: does what attention checks ask.
-    checks: what it makes of motion checks, in which single pictures show nothing.
-    offline, reloads, clock_jumps: chances of each before an answer.
+    Attributes
+    ----------
+    tickets : bool
+        Sends the server's tickets.
+    fetches : bool
+        Fetches clips, and shows it.
+    waits : bool
+        Lets the clips play.
+    rt_ms : callable
+        Response time of one answer.
+    interaction : callable
+        Presses between two answers, None where none are told.
+    answers : {"model", "same", "any"}
+        By the rater model, always the same, or any.
+    reads : bool
+        Does what attention checks ask.
+    checks : {"sees", "guesses", "goes around"}
+        What it makes of motion checks, in which single pictures show nothing.
+    offline, reloads, clock_jumps : float
+        Chances of each before an answer.
     """
 
     tickets: bool
@@ -56,45 +71,45 @@ def person(rng: random.Random) -> Person:
     )
 
 
-def _human_rt(rng: random.Random, who: Person) -> float:
-    return who.rt_median_ms * rng.lognormvariate(0, who.rt_sigma)
+def _human_rt(rng: random.Random, person: Person) -> float:
+    return person.rt_median_ms * rng.lognormvariate(0, person.rt_sigma)
 
 
-def _slow_rt(rng: random.Random, who: Person) -> float:
-    return 3 * _human_rt(rng, who)
+def _slow_rt(rng: random.Random, person: Person) -> float:
+    return 3 * _human_rt(rng, person)
 
 
-def _hasty_rt(rng: random.Random, _who: Person) -> float:
+def _hasty_rt(rng: random.Random, _person: Person) -> float:
     return rng.lognormvariate(5.3, 0.3)
 
 
-def _plausible_rt(rng: random.Random, _who: Person) -> float:
+def _plausible_rt(rng: random.Random, _person: Person) -> float:
     return rng.uniform(500, 1500)
 
 
-def _polling_rt(rng: random.Random, _who: Person) -> float:
+def _polling_rt(rng: random.Random, _person: Person) -> float:
     return 250 + rng.uniform(0, 15)
 
 
-def _hand(rng: random.Random, who: Person) -> Interaction:
+def _hand(rng: random.Random, person: Person) -> Interaction:
     presses = rng.choice((2, 2, 2, 3))
-    length = max(20.0, rng.gauss(who.press_ms, who.press_sd_ms))
+    length = max(20.0, rng.gauss(person.press_ms, person.press_sd_ms))
     return {"presses": presses, "trusted": presses, "press_ms": round(length, 1), "moves": rng.randrange(60)}
 
 
-def _synthetic_click(_rng: random.Random, _who: Person) -> Interaction:
+def _synthetic_click(_rng: random.Random, _person: Person) -> Interaction:
     return {"presses": 2, "trusted": 0, "press_ms": None, "moves": 0}
 
 
-def _driver(rng: random.Random, _who: Person) -> Interaction:
+def _driver(rng: random.Random, _person: Person) -> Interaction:
     return {"presses": 2, "trusted": 2, "press_ms": round(rng.uniform(0.3, 1.5), 1), "moves": 2}
 
 
-def _screen_reader(_rng: random.Random, _who: Person) -> Interaction:
+def _screen_reader(_rng: random.Random, _person: Person) -> Interaction:
     return {"presses": 2, "trusted": 2, "press_ms": None, "moves": 0}
 
 
-def _nothing(_rng: random.Random, _who: Person) -> None:
+def _nothing(_rng: random.Random, _person: Person) -> None:
     return None
 
 

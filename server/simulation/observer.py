@@ -7,7 +7,7 @@ from statistics import NormalDist
 
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.threshold.grid import Point, model, point_at
+from experiments.trials.threshold.grid import Point, model, points_of
 
 
 @dataclass(frozen=True)
@@ -16,9 +16,15 @@ class Truth:
 
     Attributes
     ----------
-    threshold, spread: mean and SD of the normal distribution, in the stimulus's unit. sd: spread of the
-    thresholds of people around `threshold`. guess, lapse: the function's ends. tilt: with a second factor,
-    how far the threshold moves per unit of its numbers; `threshold` is that at their middle.
+    threshold, spread : float
+        Mean and SD of the normal distribution, in the stimulus's unit.
+    sd : float
+        Spread of the thresholds of people around `threshold`.
+    guess, lapse : float
+        The function's ends.
+    tilt : float
+        With a second factor, how far the threshold moves per unit of its numbers; `threshold` is that at
+        their middle.
     """
 
     threshold: float
@@ -33,7 +39,13 @@ class Truth:
         return replace(self, threshold=self.threshold + rng.gauss(0, self.sd))
 
     def probability(self, stimulus: float, *, off_middle: float = 0.0, falling: bool = False) -> float:
-        """How likely the answer is yes, or right; off_middle: the second number, from the middle of all."""
+        """How likely the answer is yes, or right.
+
+        Parameters
+        ----------
+        off_middle : float, optional
+            The second number, from the middle of all.
+        """
         z = (stimulus - self.threshold - self.tilt * off_middle) / self.spread
         return self.guess + (1 - self.guess - self.lapse) * NormalDist().cdf(-z if falling else z)
 
@@ -55,24 +67,29 @@ def truth_of(experiment: Experiment, text: str = "") -> Truth:
 
 
 def _settings(text: str) -> dict[str, float]:
-    names, found = [field.name for field in fields(Truth)], {}
+    names, settings = [field.name for field in fields(Truth)], {}
     for part in filter(None, text.split(",")):
         name, _, number = part.partition("=")
         if name.strip() not in names:
             near = did_you_mean(name.strip(), names)
             raise InputError(f"--observer: expected {', '.join(names)}, got '{name.strip()}'{near}")
         try:
-            found[name.strip()] = float(number)
+            settings[name.strip()] = float(number)
         except ValueError as error:
             raise InputError(f"--observer: expected a number for {name.strip()}, got '{number}'") from error
-    return found
+    return settings
 
 
 @dataclass(frozen=True)
 class Observer:
     """Somebody who sees stimuli by their true function.
 
-    points: the stimulus in each clip, by hash. middle: of the second factor's numbers.
+    Attributes
+    ----------
+    points : mapping of str to Point
+        The stimulus in each clip, by hash.
+    middle : float
+        Of the second factor's numbers.
     """
 
     truth: Truth
@@ -94,8 +111,14 @@ class Observer:
 
 
 def observer_of(experiment: Experiment, levels_of: Mapping[str, Mapping[str, str]], text: str) -> Observer:
-    """The observers of a study of thresholds. levels_of: levels of each clip, by hash."""
+    """The observers of a study of thresholds.
+
+    Parameters
+    ----------
+    levels_of : mapping of str to mapping of str to str
+        Levels of each clip, by hash.
+    """
     assumed = model(experiment)
-    seen = {clip: point_at(experiment, levels) for clip, levels in levels_of.items()}
-    points = {clip: point for clip, point in seen.items() if point is not None}
-    return Observer(truth_of(experiment, text), points, assumed.falling, assumed.middle)
+    return Observer(
+        truth_of(experiment, text), points_of(experiment, levels_of), assumed.falling, assumed.middle
+    )

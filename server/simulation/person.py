@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from experiments.checks import CHECK_KINDS, CheckName
 from experiments.definition.forms import FormField
-from server.simulation.http import JsonClient
+from server.simulation.http import RunApi
 from server.simulation.observer import Observer
 from server.trials.kinds import served
 
@@ -29,11 +29,19 @@ class Rater:
 
     Parameters
     ----------
-    seed: of this person. effects_seed: of the effects, shared by all people of a simulation.
-    levels_of: levels of each clip by its hash; a real participant never learns them, so the effects are
-    put in from outside. observer: their psychometric function, in a study of thresholds.
-    blinks_of: onsets of the blinks of each performance by the clip's hash, in s.
-    checks: right answer to each motion check by its clip's hash, likewise put in from outside.
+    seed : int
+        Of this person.
+    effects_seed : int
+        Of the effects, shared by all people of a simulation.
+    levels_of : mapping of str to mapping of str to str
+        Levels of each clip by its hash; a real participant never learns them, so the effects are put in from
+        outside.
+    observer : Observer, optional
+        Their psychometric function, in a study of thresholds.
+    blinks_of : mapping of str to sequence of float, optional
+        Onsets of the blinks of each performance by the clip's hash, in s.
+    checks : mapping of str to int, optional
+        Right answer to each motion check by its clip's hash, likewise put in from outside.
     """
 
     def __init__(
@@ -86,7 +94,7 @@ class Rater:
 class Person:
     """One simulated participant on one connection."""
 
-    def __init__(self, client: JsonClient, rater: Rater, language: str | None = None) -> None:
+    def __init__(self, client: RunApi, rater: Rater, language: str | None = None) -> None:
         self.client, self.rater, self.language = client, rater, language
         self.elapsed_ms = 0.0
         self.ratings = 0
@@ -111,7 +119,7 @@ class Person:
                 return None
             if self.rate(trial, state["trial"]):
                 self._offer_again(trial, due)
-            due = _following(due, self.following)
+            due = still_due(due, self.following)
             progress()
         if not self._forms(state, "after"):
             return None
@@ -128,6 +136,7 @@ class Person:
             "client_id": str(client_id),
             "device": {"simulated": True},
             "evidence": self.brings_evidence,
+            "view_tickets": self.brings_evidence,
         }
         self.client.token = self.client.post(f"/api/links/{link_token}/runs", start)["run_token"]
 
@@ -208,11 +217,11 @@ class Person:
     @staticmethod
     def _offer_again(trial: dict[str, Any], due: list[dict[str, Any]]) -> None:
         """Put the trial at the end of its block."""
-        place = sum(1 for other in due if other["block"] == trial["block"])
-        due.insert(place, {**trial, "plays_done": trial["plays_done"] + 1})
+        position = sum(1 for other in due if other["block"] == trial["block"])
+        due.insert(position, {**trial, "plays_done": trial["plays_done"] + 1})
 
 
-def _following(due: list[dict[str, Any]], following: dict[str, Any] | None) -> list[dict[str, Any]]:
+def still_due(due: list[dict[str, Any]], following: dict[str, Any] | None) -> list[dict[str, Any]]:
     """The trials due as the server has chosen them anew, without those of ended series."""
     if following is None:
         return due
@@ -230,6 +239,18 @@ def _frames(trial: dict[str, Any]) -> int:
     before = sum(int(clip["frames"]) for clip in trial["clips"] if clip["role"] == "reference")
     in_turn = any(clip["role"] == "first" for clip in trial["clips"])
     return before + (sum(frames) if in_turn else max(frames))
+
+
+def view_s(trial: dict[str, Any], declared: dict[str, Any]) -> float:
+    """How long the clips of one play last, in s: as often as they are shown, the gaps between them too."""
+    roles = {clip["role"] for clip in trial["clips"]}
+    if not roles:
+        return 0.0
+    gap_ms = declared["reference"]["gap_ms"] if "reference" in roles else 0
+    if "first" in roles:
+        gap_ms += declared.get("presentation", declared)["gap_ms"]
+    views = 1 if trial["kind"] == "check" else declared.get("views", 1)
+    return float(views * _frames(trial) / trial["fps"] + gap_ms / 1000)
 
 
 def _each_clip(trial: dict[str, Any], lost: set[int]) -> dict[str, Any] | None:

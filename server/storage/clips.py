@@ -26,6 +26,9 @@ class ClipStore(Protocol):
     def add(self, source: BinaryIO, sha256: str) -> bool:
         """Store a clip; True where it was not there yet. InputError where the bytes have another hash."""
 
+    def adopt(self, path: Path, sha256: str) -> None:
+        """Store a whole file that has this hash and is never changed; it may be shared with its folder."""
+
     def size(self, sha256: str) -> int | None:
         """Length in bytes; None where there is no such clip."""
 
@@ -63,15 +66,29 @@ class FolderStore:
         final.parent.mkdir(parents=True, exist_ok=True)
         temporary = final.with_name(f".{sha256[:16]}.{secrets.token_hex(4)}")
         try:
-            found = _copy(source, temporary)
-            if found != sha256:
+            digest = _copy(source, temporary)
+            if digest != sha256:
                 raise InputError(
-                    f"clip: expected sha256 {sha256[:12]}..., got {found[:12]}...; the file was changed"
+                    f"clip: expected sha256 {sha256[:12]}..., got {digest[:12]}...; the file was changed"
                 )
             temporary.replace(final)
         finally:
             temporary.unlink(missing_ok=True)
         return True
+
+    def adopt(self, path: Path, sha256: str) -> None:
+        """Link to the file, which takes no room and no time; copy it where it lies on another disk."""
+        final = self.path(sha256)
+        if final.is_file():
+            return
+        final.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.link(path, final)
+        except FileExistsError:
+            return
+        except OSError:
+            with path.open("rb") as stream:
+                self.add(stream, sha256)
 
     def size(self, sha256: str) -> int | None:
         """Length in bytes; None where there is no such clip."""

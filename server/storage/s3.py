@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
@@ -31,7 +32,10 @@ class S3Store:
 
     Parameters
     ----------
-    client: of boto3 for S3. presigned: whether browsers fetch clips from the store by signed addresses.
+    client : Any
+        Of boto3 for S3.
+    presigned : bool, optional
+        Whether browsers fetch clips from the store by signed addresses.
     """
 
     def __init__(self, client: Any, bucket: str, prefix: str = "", *, presigned: bool = False) -> None:
@@ -45,30 +49,35 @@ class S3Store:
         """Check the hash of a local copy, then upload: an object appears whole or not at all."""
         if self.size(sha256) is not None:
             return False
-        digest = hashlib.sha256()
+        hashed = hashlib.sha256()
         with tempfile.SpooledTemporaryFile(max_size=SPOOL_BYTES) as spool:
             while piece := source.read(CHUNK_BYTES):
-                digest.update(piece)
+                hashed.update(piece)
                 spool.write(piece)
-            if (found := digest.hexdigest()) != sha256:
+            if (digest := hashed.hexdigest()) != sha256:
                 raise InputError(
-                    f"clip: expected sha256 {sha256[:12]}..., got {found[:12]}...; the file was changed"
+                    f"clip: expected sha256 {sha256[:12]}..., got {digest[:12]}...; the file was changed"
                 )
             spool.seek(0)
             said = {"ContentType": "video/mp4", "CacheControl": IMMUTABLE}
             self.client.upload_fileobj(spool, self.bucket, self._name(sha256), ExtraArgs=said)
         return True
 
+    def adopt(self, path: Path, sha256: str) -> None:
+        """Upload the file."""
+        with path.open("rb") as stream:
+            self.add(stream, sha256)
+
     def size(self, sha256: str) -> int | None:
         """Length in bytes; None where there is no such clip. It never changes, so it is asked for once."""
         if sha256 not in self._sizes:
             try:
-                found = self._answer(self.client.head_object, Key=self._name(sha256))
+                answer = self._answer(self.client.head_object, Key=self._name(sha256))
             except self.client.exceptions.ClientError as error:
                 if error.response["ResponseMetadata"]["HTTPStatusCode"] == 404:
                     return None
                 raise
-            self._sizes[sha256] = int(found["ContentLength"])
+            self._sizes[sha256] = int(answer["ContentLength"])
         return self._sizes[sha256]
 
     def read(self, sha256: str, start: int, end: int) -> Iterator[bytes]:
@@ -76,9 +85,9 @@ class S3Store:
         if start >= end:
             return
         part = f"bytes={start}-{end - 1}"
-        found = self._answer(self.client.get_object, Key=self._name(sha256), Range=part)
+        answer = self._answer(self.client.get_object, Key=self._name(sha256), Range=part)
         with self._asking():
-            yield from found["Body"].iter_chunks(CHUNK_BYTES)
+            yield from answer["Body"].iter_chunks(CHUNK_BYTES)
 
     def remove(self, sha256: str) -> None:
         """Delete a clip; nothing happens where it is not there."""
@@ -137,24 +146,29 @@ class S3Store:
 
 
 def open_s3(settings: Settings) -> S3Store:
-    """The store of these settings; credentials are found by boto3's own rules (AWS_ACCESS_KEY_ID...)."""
+    """The store of these settings."""
+    # A store that hangs must not hold the threads that all other requests need.
+    client = s3_client(settings, connect_s=CONNECT_S, read_s=READ_S, attempts=1)
+    return S3Store(client, settings.s3_bucket, settings.s3_prefix, presigned=settings.s3_presigned)
+
+
+def s3_client(settings: Settings, *, connect_s: float, read_s: float, attempts: int) -> Any:
+    """A client of the object store; credentials are found by boto3's own rules (AWS_ACCESS_KEY_ID...)."""
     try:
         import boto3
         from botocore.config import Config
     except ImportError as error:
-        raise InputError("PALPEBRA_S3_BUCKET needs the extra 's3': pip install -e '.[s3]'") from error
+        raise InputError("an object store needs the extra 's3': pip install -e '.[s3]'") from error
     style = "path" if settings.s3_endpoint else "virtual"
-    client = boto3.client(
+    return boto3.client(
         "s3",
         endpoint_url=settings.s3_endpoint or None,
         region_name=settings.s3_region,
         config=Config(
             s3={"addressing_style": style},
             signature_version="s3v4",
-            retries={"total_max_attempts": 1, "mode": "standard"},
-            # A store that hangs must not hold the threads that all other requests need.
-            connect_timeout=CONNECT_S,
-            read_timeout=READ_S,
+            retries={"total_max_attempts": attempts, "mode": "standard"},
+            connect_timeout=connect_s,
+            read_timeout=read_s,
         ),
     )
-    return S3Store(client, settings.s3_bucket, settings.s3_prefix, presigned=settings.s3_presigned)

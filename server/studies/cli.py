@@ -17,7 +17,7 @@ from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
 from server.clock import now
 from server.context import Services
-from server.models import Study, StudyVersion
+from server.models import Link, Study, StudyVersion
 from server.studies import repository
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
 from server.studies.links import (
@@ -32,6 +32,7 @@ from server.studies.links import (
 from server.studies.links_repository import links_of
 from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.planned import planned_experiment
+from server.studies.signing import signing
 
 study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
 link_app = typer.Typer(help="Links for participants.", no_args_is_help=True)
@@ -132,9 +133,9 @@ def set_status(
     if status not in STATUSES:
         raise InputError(f"no status '{status}'{did_you_mean(status, STATUSES)}")
     with migrated_services() as services, services.database.write() as session:
-        found = find_study(session, study, OPERATOR, "view")
-        _set_status(session, found, status)
-        out.print(f"study {found.name}: {found.status}")
+        known = find_study(session, study, OPERATOR, "view")
+        _set_status(session, known, status)
+        out.print(f"study {known.name}: {known.status}")
 
 
 @study_app.command("list")
@@ -183,9 +184,9 @@ def create(
         settings = services.settings
         rows = prepared_links(settings.key, options, numbered_labels(label, count) if count > 1 else [label])
         with services.database.write() as session:
-            found = find_study(session, study, OPERATOR, "view")
-            make_links(session, found, KINDS[kind], group, rows)
-            record(session, None, "links created", "study", found.name, kind=kind, count=count)
+            known = find_study(session, study, OPERATOR, "view")
+            make_links(session, known, KINDS[kind], group, rows)
+            record(session, None, "links created", "study", known.name, kind=kind, count=count)
     for row in rows:
         url = link_url(settings.public_url, settings.key, row["public_id"])
         out.print(f"{row['label']},{url}" if count > 1 else url)
@@ -201,3 +202,38 @@ def list_links(study: Annotated[str, typer.Argument(help="Name of the study.")])
         key, public_url = services.settings.key, services.settings.public_url
         for link in links_of(session, find_study(session, study, OPERATOR, "view")):
             out.print(f"{link.kind},{link.label},{link_url(public_url, key, link.public_id)}")
+
+
+def _labelled(links: list[Link], label: str) -> Link:
+    """The link with this label; InputError where there is none, or more than one."""
+    named = [link for link in links if link.label == label]
+    if len(named) != 1:
+        near = did_you_mean(label, [link.label for link in links if link.label])
+        raise InputError(f"expected the label of one link, '{label}' is that of {len(named) or 'none'}{near}")
+    return named[0]
+
+
+@link_app.command("secret")
+def show_secret(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    name: Annotated[
+        str | None, typer.Option(help="Name of the secret; that of the recruiter by default.")
+    ] = None,
+    link: Annotated[
+        str | None, typer.Option(help="Label of a link with a recruiter of its own; the study's by default.")
+    ] = None,
+) -> None:
+    """Print the secret that signs recruiters' addresses, and how to sign one; the audit log notes it.
+
+    Example: server link secret exp3 --link "summer school"
+    """
+    with migrated_services() as services, services.database.write() as session:
+        known = find_study(session, study, OPERATOR, "own")
+        of_link = None if link is None else _labelled(links_of(session, known), link)
+        told = signing(session, services.settings.key, known, name, None, of_link)
+    out.print(f"secret: {told.secret}", soft_wrap=True, highlight=False)
+    out.print(f"address: LINK?{told.query}", soft_wrap=True, highlight=False)
+    out.print(f"in Python:\n{told.python}", soft_wrap=True, highlight=False, markup=False)
+    out.print(f"by OpenSSL:\n{told.shell}", soft_wrap=True, highlight=False, markup=False)
+    if not told.declared:
+        out.print("The recruiter declares no signature_parameter: addresses are not checked.")

@@ -9,9 +9,9 @@ from sqlalchemy.orm import Session
 from experiments.schema.difference import Change, changes_what_is_measured, difference
 from server.accounts.identity import Identity
 from server.models import StudyVersion
-from server.studies.life_repository import clips_of, version_numbered
+from server.studies import repository
 from server.studies.life_schemas import ClipDifference, ComparedVersion, Comparison, KeyDifference, Piece
-from server.studies.lookup import definition_of, find_study
+from server.studies.lookup import definition_of, find_study, version_numbered
 from server.studies.word_difference import word_difference
 
 MAX_CLIPS_LISTED = 200
@@ -20,14 +20,12 @@ Clips = dict[tuple[str, int], tuple[str, str]]
 """(cell, exemplar) -> (SHA-256, file name)."""
 
 
-def compare(session: Session, old: tuple[str, int], new: tuple[str, int], who: Identity) -> Comparison:
+def compare(session: Session, old: tuple[str, int], new: tuple[str, int], identity: Identity) -> Comparison:
     """What differs between two versions, each given by its study's name and its number."""
-    before, after = (
-        version_numbered(session, find_study(session, name, who, "view"), number)
-        for name, number in (old, new)
-    )
+    studies = {name: find_study(session, name, identity, "view") for name in dict.fromkeys((old[0], new[0]))}
+    before, after = (version_numbered(session, studies[name], number) for name, number in (old, new))
     changes = difference(definition_of(before), definition_of(after))
-    old_clips, new_clips = clips_of(session, before), clips_of(session, after)
+    old_clips, new_clips = (repository.clips_by_exemplar(session, version) for version in (before, after))
     clips = list(_clips(old_clips, new_clips))
     return Comparison(
         old=_side(before),
@@ -36,9 +34,7 @@ def compare(session: Session, old: tuple[str, int], new: tuple[str, int], who: I
         keys=[_key(change) for change in changes],
         clips=clips[:MAX_CLIPS_LISTED],
         clips_differing=len(clips),
-        clips_same=len(
-            [place for place, clip in new_clips.items() if old_clips.get(place, ("",))[0] == clip[0]]
-        ),
+        clips_same=len(old_clips.keys() | new_clips.keys()) - len(clips),
     )
 
 
@@ -75,14 +71,14 @@ def _given(value: Any) -> Any:
 
 
 def _clips(old: Clips, new: Clips) -> Iterator[ClipDifference]:
-    for place in dict.fromkeys((*old, *new)):
-        before, after = old.get(place), new.get(place)
+    for position in dict.fromkeys((*old, *new)):
+        before, after = old.get(position), new.get(position)
         if before is not None and after is not None and before[0] == after[0]:
             continue
         yield ClipDifference(
             kind="new" if before is None else "gone" if after is None else "replaced",
-            cell=place[0],
-            exemplar=place[1],
+            cell=position[0],
+            exemplar=position[1],
             old_file=before[1] if before else None,
             new_file=after[1] if after else None,
         )

@@ -1,16 +1,13 @@
 """Studies on the dashboard."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, UploadFile
-from fastapi.params import File
+from fastapi import APIRouter
 from fastapi.responses import PlainTextResponse
 
 from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.numbers import Number
-from server.studies import service, uploads
+from server.studies import service
 from server.studies.schemas import (
     ChangeSettings,
     ChangeStatus,
@@ -25,7 +22,6 @@ from server.studies.schemas import (
     ShippedExperiment,
     StudyDetail,
     StudySummary,
-    UploadOut,
 )
 from server.workspaces.access import Uploader
 
@@ -33,105 +29,90 @@ router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPON
 
 
 @router.get("/experiments")
-def list_experiments(services: ServicesDep, _who: Viewer) -> list[ShippedExperiment]:
+def list_experiments(services: ServicesDep, _identity: Viewer) -> list[ShippedExperiment]:
     """The experiments that come with the program."""
     return service.shipped(services)
 
 
 @router.post("/definitions/check")
-def check_definition(_who: Viewer, body: DefinitionText) -> Checked:
+def check_definition(_identity: Viewer, body: DefinitionText) -> Checked:
     """Check a definition: every problem with its line and the nearest right name, or what it expands to."""
     return service.check(body.toml)
 
 
 @router.post("/definitions/edit")
-def edit_definition(_who: Viewer, body: EditDefinition) -> EditedDefinition:
+def edit_definition(_identity: Viewer, body: EditDefinition) -> EditedDefinition:
     """Write changed data into a definition: its comments, order and form stay. Nothing is stored."""
     return service.edit(body)
 
 
-@router.post("/uploads", status_code=201)
-def upload_clips(
-    services: ServicesDep, who: Uploader, files: Annotated[list[UploadFile], File()]
-) -> UploadOut:
-    """Upload clips: films, a CSV table, or a zip of them. They wait a day to become a study."""
-    identifier, place = uploads.new_upload(services.settings.upload_folder, who.account_id)
-    try:
-        for file in files:
-            uploads.receive(place, file.filename or "", file.file, services.settings.max_upload_bytes)
-        return uploads.describe(identifier, place)
-    except BaseException:
-        uploads.discard(place)
-        raise
-
-
 @router.get("/studies")
-def list_studies(services: ServicesDep, who: Viewer) -> list[StudySummary]:
+def list_studies(services: ServicesDep, identity: Viewer) -> list[StudySummary]:
     """The studies that are open to the account, the latest first."""
     with services.database.read() as session:
-        return service.summaries(session, who)
+        return service.summaries(session, identity)
 
 
 @router.post("/studies", status_code=201)
-def create_study(services: ServicesDep, who: Uploader, body: NewStudy) -> StudyDetail:
+def create_study(services: ServicesDep, identity: Uploader, body: NewStudy) -> StudyDetail:
     """Create a draft from a shipped experiment, a definition, or uploaded clips."""
-    name = service.create(services, body, who)
-    return get_study(services, who, name)
+    name = service.create(services, body, identity)
+    return get_study(services, identity, name)
 
 
 @router.get("/studies/{study}")
-def get_study(services: ServicesDep, who: Viewer, study: str) -> StudyDetail:
+def get_study(services: ServicesDep, identity: Viewer, study: str) -> StudyDetail:
     """One study with its declaration."""
     with services.database.read() as session:
-        return service.detail(session, study, who)
+        return service.detail(session, study, identity)
 
 
 @router.delete("/studies/{study}", status_code=204)
-def delete_study(services: ServicesDep, who: Writer, study: str) -> None:
+def delete_study(services: ServicesDep, identity: Writer, study: str) -> None:
     """Delete a draft that nobody has taken part in."""
     with services.database.write() as session:
-        service.delete(session, study, who)
+        service.delete(session, study, identity)
 
 
 @router.post("/studies/{study}/versions", status_code=201)
-def add_version(services: ServicesDep, who: Writer, study: str, body: NewVersion) -> StudyDetail:
+def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVersion) -> StudyDetail:
     """Store a changed definition as a new version; runs keep the version they began with."""
-    service.add_definition(services, study, body, who)
-    return get_study(services, who, study)
+    service.add_definition(services, study, body, identity)
+    return get_study(services, identity, study)
 
 
 @router.post("/studies/{study}/versions/check")
-def judge_version(services: ServicesDep, who: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
+def judge_version(services: ServicesDep, identity: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
     """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
     with services.database.read() as session:
-        return service.judge_edit(session, study, body.toml, who)
+        return service.judge_edit(session, study, body.toml, identity)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)
-def get_version(services: ServicesDep, who: Viewer, study: str, number: Number) -> str:
+def get_version(services: ServicesDep, identity: Viewer, study: str, number: Number) -> str:
     """The TOML of one version."""
     with services.database.read() as session:
-        return service.version_text(session, study, number, who)
+        return service.version_text(session, study, number, identity)
 
 
 @router.put("/studies/{study}/status")
-def change_status(services: ServicesDep, who: Writer, study: str, body: ChangeStatus) -> StudyDetail:
+def change_status(services: ServicesDep, identity: Writer, study: str, body: ChangeStatus) -> StudyDetail:
     """draft -> pilot -> live -> closed."""
     with services.database.write() as session:
-        service.change_status(session, study, body.revision, body.status, who)
-    return get_study(services, who, study)
+        service.change_status(session, study, body.revision, body.status, identity)
+    return get_study(services, identity, study)
 
 
 @router.put("/studies/{study}/settings")
-def change_settings(services: ServicesDep, who: Writer, study: str, body: ChangeSettings) -> StudyDetail:
+def change_settings(services: ServicesDep, identity: Writer, study: str, body: ChangeSettings) -> StudyDetail:
     """Pause, quota and recruiter."""
     with services.database.write() as session:
-        service.change_settings(session, study, body, who)
-    return get_study(services, who, study)
+        service.change_settings(session, study, body, identity)
+    return get_study(services, identity, study)
 
 
 @router.get("/studies/{study}/clips")
-def list_clips(services: ServicesDep, who: Viewer, study: str) -> list[ClipOut]:
+def list_clips(services: ServicesDep, identity: Viewer, study: str) -> list[ClipOut]:
     """Every clip of the active version with the closure curve it shows."""
     with services.database.read() as session:
-        return service.clips(session, study, who)
+        return service.clips(session, study, identity)

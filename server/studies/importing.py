@@ -1,6 +1,7 @@
 """Take a declared experiment and a folder of clips into the server: all of it, or nothing."""
 
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -8,14 +9,15 @@ from experiments import design
 from experiments.checks import CHECK_CELL
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.manifest import CheckClip, Manifest, check_files
+from experiments.manifest import CheckClip, Manifest, check_files, check_originals
 from experiments.manifest import Clip as DesignClip
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.upgrades import FORMAT
+from experiments.source_video import SourceVideo
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.errors import Conflict
-from server.models import Clip, Study, StudyVersion, VersionClip, Workspace
+from server.models import Study, StudyVersion, Workspace
 from server.storage.clips import ClipStore
 from server.studies import repository
 from server.studies.series import series_for
@@ -24,22 +26,22 @@ from server.workspaces.repository import default_workspace
 
 def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
     """InputError unless the manifest holds each clip of the design exactly once."""
-    wanted = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
-    found = [(clip.cell, clip.exemplar) for clip in manifest.clips]
-    if missing := sorted(wanted - set(found)):
+    declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
+    built = [(clip.cell, clip.exemplar) for clip in manifest.clips]
+    if missing := sorted(declared - set(built)):
         cell, exemplar = missing[0]
         raise InputError(
-            f"expected {len(wanted)} clips, {len(missing)} are missing from the manifest, "
+            f"expected {len(declared)} clips, {len(missing)} are missing from the manifest, "
             f"the first is {cell}, exemplar {exemplar}; build the clips with this definition"
         )
-    if extra := sorted(set(found) - wanted):
+    if extra := sorted(set(built) - declared):
         cell, exemplar = extra[0]
         raise InputError(
             f"the manifest holds {len(extra)} clips that the definition does not declare, "
             f"the first is {cell}, exemplar {exemplar}"
         )
-    if len(found) != len(wanted):
-        raise InputError(f"expected each of {len(wanted)} clips once, the manifest lists {len(found)}")
+    if len(built) != len(declared):
+        raise InputError(f"expected each of {len(declared)} clips once, the manifest lists {len(built)}")
     _check_checks(experiment, manifest)
 
 
@@ -58,8 +60,15 @@ def _check_checks(experiment: Experiment, manifest: Manifest) -> None:
 
 
 def store_clips(store: ClipStore, manifest: Manifest, folder: Path) -> int:
-    """Check every file's hash, then copy what is new into the clip store; return how many were new."""
+    """Check every file's hash, then copy what is new into the clip store; return how many were new.
+
+    Originals of converted clips are kept too, and are not counted.
+    """
     check_files(manifest, folder)
+    check_originals(manifest, folder)
+    for source in manifest.sources:
+        with (folder / source.kept_as).open("rb") as stream:
+            store.add(stream, source.sha256)
     added = 0
     for clip in manifest.files:
         with (folder / clip.file).open("rb") as stream:
@@ -71,7 +80,7 @@ def create_study(
     session: Session,
     name: str,
     experiment: Experiment,
-    who: Identity | None,
+    identity: Identity | None,
     workspace: Workspace | None = None,
 ) -> Study:
     """A new draft, in the default workspace where none is given; Conflict where the name is taken."""
@@ -81,12 +90,12 @@ def create_study(
         name=name,
         title=experiment.title,
         active_version=0,
-        created_by=who.account_id if who else None,
+        created_by=identity.account_id if identity else None,
         workspace_id=(workspace or default_workspace(session)).id,
     )
     session.add(study)
     session.flush()
-    record(session, who, "study created", "study", name)
+    record(session, identity, "study created", "study", name)
     return study
 
 
@@ -96,7 +105,7 @@ def add_version(
     text: str,
     experiment: Experiment,
     manifest: Manifest,
-    who: Identity | None,
+    identity: Identity | None,
     note: str = "",
 ) -> StudyVersion:
     """Add a version of `study` and make it the one new runs use. The clips must be in the store already."""
@@ -113,43 +122,47 @@ def add_version(
         format=FORMAT,
         series=series_for(study, experiment, manifest),
         note=note,
-        created_by=who.account_id if who else None,
+        created_by=identity.account_id if identity else None,
     )
     study.versions.append(version)
     study.active_version, study.title = version.number, experiment.title
     study.revision = (study.revision or 0) + 1
-    _add_clips(session, version, manifest)
     session.flush()
-    record(session, who, "version added", "study", study.name, version=version.number, note=note)
+    _add_clips(session, version, manifest)
+    record(session, identity, "version added", "study", study.name, version=version.number, note=note)
     return version
 
 
 def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> None:
-    for clip in manifest.files:
-        if not repository.is_known_clip(session, clip.sha256):
-            session.add(
-                Clip(
-                    sha256=clip.sha256,
-                    bytes=clip.bytes,
-                    fps=clip.fps,
-                    frames=clip.frames,
-                    width_px=clip.width_px,
-                    height_px=clip.height_px,
-                )
-            )
-            session.flush()
-        version.clips.append(_placed(clip))
+    """Store the rows of a version's clips by one statement a table: objects of 5,000 clips take seconds."""
+    stored = {video.sha256: video for video in (*manifest.files, *manifest.sources)}
+    known = repository.known_clips(session, stored)
+    repository.insert_clips(
+        session, (_stored(video) for video in stored.values() if video.sha256 not in known)
+    )
+    repository.insert_version_clips(session, version, map(_placed, manifest.files))
 
 
-def _placed(clip: DesignClip | CheckClip) -> VersionClip:
+def _stored(video: DesignClip | CheckClip | SourceVideo) -> dict[str, Any]:
+    return {
+        "sha256": video.sha256,
+        "bytes": video.bytes,
+        "fps": video.fps,
+        "frames": video.frames,
+        "width_px": video.width_px,
+        "height_px": video.height_px,
+    }
+
+
+def _placed(clip: DesignClip | CheckClip) -> dict[str, Any]:
     shared = {"clip_sha256": clip.sha256, "file": clip.file, "width_mm": clip.width_mm}
     if isinstance(clip, CheckClip):
-        return VersionClip(cell=CHECK_CELL, levels={"check": clip.check}, exemplar=clip.number, **shared)
-    return VersionClip(
-        cell=clip.cell,
-        levels=clip.levels,
-        exemplar=clip.exemplar,
-        profile_id=clip.profile,
-        blinks_s=list(clip.blinks_s) or None,
-        **shared,
-    )
+        check = {"cell": CHECK_CELL, "levels": {"check": clip.check}, "exemplar": clip.number}
+        return shared | check | {"profile_id": "", "blinks_s": None}
+    return shared | {
+        "cell": clip.cell,
+        "levels": clip.levels,
+        "exemplar": clip.exemplar,
+        "profile_id": clip.profile,
+        "blinks_s": list(clip.blinks_s) or None,
+    }

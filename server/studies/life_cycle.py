@@ -8,37 +8,40 @@ from server.accounts.identity import Identity
 from server.clock import now
 from server.errors import Conflict
 from server.studies.importing import add_version, create_study
-from server.studies.life_repository import version_numbered
 from server.studies.life_schemas import ArchiveStudy, CloneStudy
-from server.studies.lookup import definition_of, find_study
+from server.studies.lookup import definition_of, find_study, version_numbered
 from server.studies.service import for_edit
 from server.workspaces.service import place_of_copy
 
 
-def clone(session: Session, name: str, wanted: CloneStudy, who: Identity) -> None:
+def clone(session: Session, name: str, order: CloneStudy, identity: Identity) -> None:
     """A new draft with declaration and clips of one version; nothing of its people comes along.
 
     Links, quota and recruiter stay behind too: completion codes belong to one study.
     """
-    source = find_study(session, name, who, "edit")
-    version = version_numbered(session, source, wanted.version or source.active_version)
-    home = place_of_copy(session, source, who, wanted.workspace)
-    copy = create_study(session, wanted.name, definition_of(version), who, home)
+    source = find_study(session, name, identity, "edit")
+    version = version_numbered(session, source, order.version or source.active_version)
+    home = place_of_copy(session, source, identity, order.workspace)
+    copy = create_study(session, order.name, definition_of(version), identity, home)
     note = f"copied from {source.name}, version {version.number}"
     manifest = Manifest.model_validate(version.manifest)
-    add_version(session, copy, version.definition_toml, definition_of(version), manifest, who, note)
+    add_version(session, copy, version.definition_toml, definition_of(version), manifest, identity, note)
     copy.revision = 1
 
 
-def archive(session: Session, name: str, wanted: ArchiveStudy, who: Identity) -> None:
+def archive(session: Session, name: str, order: ArchiveStudy, identity: Identity) -> None:
     """Into the archive or out of it; Conflict while people can take part."""
-    study = for_edit(session, name, wanted.revision, who, "run", archived=True)
-    if wanted.archived == (study.archived_at is not None):
+    study = for_edit(session, name, order.revision, identity, "run", archived=True)
+    if order.archived == (study.archived_at is not None):
         return
-    if wanted.archived and study.status in ("pilot", "live"):
+    if order.archived and study.status in ("pilot", "live"):
         raise Conflict(f"A study that is {study.status} cannot go into the archive; close it first.")
-    study.archived_at = now() if wanted.archived else None
+    study.archived_at = now() if order.archived else None
     study.revision += 1
     record(
-        session, who, "study archived" if wanted.archived else "study taken out of the archive", "study", name
+        session,
+        identity,
+        "study archived" if order.archived else "study taken out of the archive",
+        "study",
+        name,
     )

@@ -16,27 +16,27 @@ router = APIRouter(prefix="/api/admin/studies/{study}", tags=["studies"], respon
 
 
 @router.post("/copies", status_code=201)
-def clone_study(services: ServicesDep, who: Writer, study: str, body: CloneStudy) -> StudyDetail:
+def clone_study(services: ServicesDep, identity: Writer, study: str, body: CloneStudy) -> StudyDetail:
     """Copy a version's declaration and clips into a new draft; links, quota and recruiter are not copied."""
     with services.database.write() as session:
-        life_cycle.clone(session, study, body, who)
+        life_cycle.clone(session, study, body, identity)
     with services.database.read() as session:
-        return service.detail(session, body.name, who)
+        return service.detail(session, body.name, identity)
 
 
 @router.put("/archive")
-def archive_study(services: ServicesDep, who: Writer, study: str, body: ArchiveStudy) -> StudyDetail:
+def archive_study(services: ServicesDep, identity: Writer, study: str, body: ArchiveStudy) -> StudyDetail:
     """Put a draft or closed study into the archive, where it can be read but not changed, or take it out."""
     with services.database.write() as session:
-        life_cycle.archive(session, study, body, who)
+        life_cycle.archive(session, study, body, identity)
     with services.database.read() as session:
-        return service.detail(session, study, who)
+        return service.detail(session, study, identity)
 
 
 @router.get("/comparison")
 def compare_versions(
     services: ServicesDep,
-    who: Viewer,
+    identity: Viewer,
     study: str,
     old: Number,
     new: Number,
@@ -44,4 +44,4 @@ def compare_versions(
 ) -> Comparison:
     """What differs between two versions: keys of the declaration, word by word, and clips."""
     with services.database.read() as session:
-        return comparing.compare(session, (other or study, old), (study, new), who)
+        return comparing.compare(session, (other or study, old), (study, new), identity)

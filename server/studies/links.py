@@ -126,11 +126,17 @@ def make_links(
     repository.add_links(session, study, rows)
 
 
-def withdraw(session: Session, study: Study, public_id: str) -> Link:
-    """Withdraw a link; runs that began with it go on. NotFound where there is none, or no more."""
+def link_in_use(session: Session, study: Study, public_id: str) -> Link:
+    """The link of a study with this public id. NotFound where there is none, or no more."""
     link = repository.find_link(session, study, public_id)
     if link is None or link.revoked_at is not None:
         raise NotFound("There is no such link.")
+    return link
+
+
+def withdraw(session: Session, study: Study, public_id: str) -> Link:
+    """Withdraw a link; runs that began with it go on. NotFound where there is none, or no more."""
+    link = link_in_use(session, study, public_id)
     link.revoked_at = now()
     return link
 

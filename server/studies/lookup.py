@@ -10,11 +10,19 @@ from server.errors import Conflict, NotFound
 from server.models import RIGHTS, Right, Study, StudyVersion
 from server.studies import repository
 from server.workspaces import repository as workspaces
-from server.workspaces.rights import SecondFactorNeeded
+from server.workspaces.rights import SecondFactorNeeded, ordered
 
 
-def find_study(session: Session, name: str, who: Identity | Operator, right: Right) -> Study:
-    """The study called `name`, for one who has this right on it: the one way from a name to a study.
+def find_study(session: Session, name: str, identity: Identity | Operator, right: Right) -> Study:
+    """The study called `name`, for one who has this right on it; see `study_with_rights`."""
+    study, _ = study_with_rights(session, name, identity, right)
+    return study
+
+
+def study_with_rights(
+    session: Session, name: str, identity: Identity | Operator, right: Right
+) -> tuple[Study, frozenset[Right]]:
+    """A study and all her rights on it, for one who has this right: the one way from a name to a study.
 
     Raises
     ------
@@ -25,22 +33,25 @@ def find_study(session: Session, name: str, who: Identity | Operator, right: Rig
     SecondFactorNeeded
         Its workspace asks for a second factor, and she signed in without one.
     """
-    study = workspaces.study_seen_by(session, name, who)
+    study = workspaces.study_seen_by(session, name, identity)
     if study is None:
-        names = workspaces.study_names_seen_by(session, who)
+        names = workspaces.study_names_seen_by(session, identity)
         raise NotFound(f"There is no study '{name[:60]}'{did_you_mean(name, names)}")
-    if isinstance(who, Identity):
-        _check(session, study, who, right)
-    return study
+    if isinstance(identity, Operator):
+        return study, frozenset(RIGHTS)
+    rights = workspaces.rights_on(session, [study], identity)[study.id]
+    _check(session, study, identity, right, rights)
+    return study, rights
 
 
-def _check(session: Session, study: Study, who: Identity, right: Right) -> None:
-    rights = workspaces.rights_on(session, [study], who)[study.id]
+def _check(
+    session: Session, study: Study, identity: Identity, right: Right, rights: frozenset[Right]
+) -> None:
     if right not in rights:
-        held = " and ".join(one for one in RIGHTS if one in rights)
+        held = " and ".join(ordered(rights))
         raise NotAllowed(f"This needs the right '{right}' on the study '{study.name}'; you have {held}.")
     workspace = workspaces.workspace_of(session, study)
-    if workspace is not None and workspace.second_factor_required and not who.second_factor:
+    if workspace is not None and workspace.second_factor_required and not identity.second_factor:
         raise SecondFactorNeeded(
             f"The workspace '{workspace.title}' asks for a second factor; set one up under My account, "
             "or sign in again with it."
@@ -60,17 +71,17 @@ def must_not_be_archived(study: Study) -> None:
         )
 
 
-def may_see_persons(session: Session, study: Study, who: Identity) -> bool:
-    """True where the answers and names of single persons are hers to see."""
-    return "export" in workspaces.rights_on(session, [study], who)[study.id]
+def version_numbered(session: Session, study: Study, number: int) -> StudyVersion:
+    """The version of a study with this number; NotFound where there is none."""
+    version = repository.version_numbered(session, study, number)
+    if version is None:
+        raise NotFound(f"Study '{study.name}' has no version {number}.")
+    return version
 
 
 def active_version(session: Session, study: Study) -> StudyVersion:
     """The version new runs of a study use."""
-    version = repository.version_numbered(session, study, study.active_version)
-    if version is None:
-        raise NotFound(f"Study '{study.name}' has no version {study.active_version}.")
-    return version
+    return version_numbered(session, study, study.active_version)
 
 
 def active_definition(session: Session, study: Study) -> Experiment:

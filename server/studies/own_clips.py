@@ -8,12 +8,21 @@ import tomlkit
 from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.manifest import Clip, Manifest, file_sha256
+from experiments.manifest import Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
-from server.studies.probe import NotAFilm, probe
+from server.errors import Conflict
+from server.storage.clips import ClipStore
 from server.studies.schemas import OwnClips
 from server.studies.templates import trial_of
+from server.transcoding.records import records_of
+from video_conversion.prepared import Prepared, clip_name
+
+
+class StillPreparing(Conflict):
+    """Clips of an upload are still being looked into or converted."""
+
+    code = "still_preparing"
 
 
 def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
@@ -48,6 +57,8 @@ _WATCHING = {
     "rating": f"{_START} a clip. You see it **once**. Then answer: ",
     "sliders": f"{_START} a clip. You see it **once**. Then move the sliders. The first asks: ",
     "acr": f"{_START} a clip. You see it **once**. Then choose from *Bad* to *Excellent*: ",
+    "dcr": f"{_START}. You see the reference and then, after a pause, a second clip, **once** each. Then "
+    "choose from *Very annoying* to *Imperceptible*: ",
     "pairs": f"{_START} two clips beside one another. You see them **once**. Then answer: ",
     "just_noticeable": f"{_START} two clips, one after the other. You see them **once**. Then answer: ",
 }
@@ -93,27 +104,28 @@ def only_declared(manifest: Manifest, experiment: Experiment) -> Manifest:
 
 
 def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifest:
-    """The manifest of uploaded clips; InputError for the first file that is not a film."""
-    order = experiment.factor_names
+    """The manifest of uploaded clips, as they were prepared.
+
+    Raises
+    ------
+    InputError
+        A file cannot be a clip, or levels of a factor are missing.
+    StillPreparing
+        Not every file has been looked into.
+    """
+    order, records = experiment.factor_names, records_of(folder)
+    if waiting := [name for name in placed if name not in records]:
+        raise StillPreparing(
+            f"{len(waiting)} of {len(placed)} clips are still being looked into or converted; try again in a "
+            "moment."
+        )
     clips = []
     for name, (levels, exemplar) in sorted(placed.items()):
         if missing := [factor for factor in order if factor not in levels]:
             raise InputError(f"the clips have no levels of '{missing[0]}', a factor of the definition")
-        try:
-            film = probe(folder / name)
-        except NotAFilm as error:
-            raise InputError(f"'{name}' cannot be used: {error}") from error
-        clips.append(
-            Clip(
-                levels={factor: levels[factor] for factor in order},
-                cell="/".join(levels[factor] for factor in order),
-                exemplar=exemplar,
-                file=name,
-                sha256=file_sha256(folder / name),
-                bytes=(folder / name).stat().st_size,
-                **vars(film),
-            )
-        )
+        if (problem := records[name].problem) is not None:
+            raise InputError(f"'{name}' cannot be used: {problem}")
+        clips.append(_clip(records[name], {factor: levels[factor] for factor in order}, exemplar))
     return Manifest(
         experiment=experiment.name,
         definition_sha256=definition_sha256(experiment),
@@ -121,3 +133,29 @@ def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifes
         seed=experiment.exemplars.seed,
         clips=tuple(clips),
     )
+
+
+def _clip(record: Prepared, levels: dict[str, str], exemplar: int) -> Clip:
+    return Clip(
+        levels=levels,
+        cell="/".join(levels.values()),
+        exemplar=exemplar,
+        file=clip_name(record.name),
+        sha256=record.sha256,
+        bytes=record.bytes,
+        fps=record.fps,
+        frames=record.frames,
+        width_px=record.width_px,
+        height_px=record.height_px,
+        source=record.source,
+    )
+
+
+def store_prepared(store: ClipStore, manifest: Manifest, folder: Path) -> None:
+    """Take an upload's clips, and the originals of those that were converted, into the clip store."""
+    files = {clip_name(record.name): record for record in records_of(folder).values()}
+    for clip in manifest.clips:
+        record = files[clip.file]
+        store.adopt(folder / record.clip, record.sha256)
+        if record.source is not None:
+            store.adopt(folder / record.name, record.source.sha256)

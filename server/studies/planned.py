@@ -12,7 +12,8 @@ def planned_experiment(text: str, source: str = "definition") -> Experiment:
 
     Raises
     ------
-    DefinitionError: with every problem and its line; or with the one that the plan names, such as clips that
+    DefinitionError
+        With every problem and its line; or with the one that the plan names, such as clips that
         are never compared with the others.
     """
     experiment = parse_experiment(text, source)

@@ -1,14 +1,17 @@
 """Studies, their versions and clips, and how many runs each has."""
 
 from collections import Counter
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, case, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, case, func, insert, select
+from sqlalchemy.orm import Session, joinedload
 
 from experiments.checks import CHECK_CELL
 from server.models import Clip, Study, StudyRun, StudyVersion, VersionClip
 
+MAX_ASKED = 500
+"""Values that one question to the database holds."""
 _OF_PEOPLE = StudyRun.origin != "preview"
 StatusCounts = Counter[tuple[int, str]]
 """(number of a study, status of a run) -> runs."""
@@ -108,11 +111,10 @@ def runs_by_status(session: Session) -> StatusCounts:
     return _by_status(session, _OF_PEOPLE)
 
 
-def shown_runs_by_status(session: Session) -> StatusCounts:
-    """The runs of all studies: of a study that is a pilot its pilot's, of others those of participants."""
-    return _by_status(
-        session, StudyRun.origin == case((Study.status == "pilot", "pilot"), else_="participant")
-    )
+def shown_runs_by_status(session: Session, study: Study | None = None) -> StatusCounts:
+    """The runs of all studies, or of one: of a pilot those of the pilot, else those of participants."""
+    shown = StudyRun.origin == case((Study.status == "pilot", "pilot"), else_="participant")
+    return _by_status(session, shown if study is None else shown & (StudyRun.study_id == study.id))
 
 
 def _by_status(session: Session, counted: ColumnElement[bool]) -> StatusCounts:
@@ -133,9 +135,34 @@ def delete_study(session: Session, study: Study) -> None:
 def clips_of_design(session: Session, version: StudyVersion) -> list[VersionClip]:
     """The clips of a version but those of checks, by their numbers."""
     query = select(VersionClip).where(VersionClip.version_id == version.id, VersionClip.cell != CHECK_CELL)
-    return list(session.scalars(query.order_by(VersionClip.id)))
+    with_bytes = query.options(joinedload(VersionClip.clip)).order_by(VersionClip.id)
+    return list(session.scalars(with_bytes))
 
 
-def is_known_clip(session: Session, sha256: str) -> bool:
-    """Whether some version has this clip already."""
-    return session.get(Clip, sha256) is not None
+def clips_by_exemplar(session: Session, version: StudyVersion) -> dict[tuple[str, int], tuple[str, str]]:
+    """(cell, exemplar) -> (SHA-256, file name) of a version's clips; those of checks are under `check`."""
+    query = select(VersionClip.cell, VersionClip.exemplar, VersionClip.clip_sha256, VersionClip.file)
+    rows = session.execute(query.where(VersionClip.version_id == version.id).order_by(VersionClip.id))
+    return {(cell or "check", exemplar): (sha256, file) for cell, exemplar, sha256, file in rows}
+
+
+def known_clips(session: Session, hashes: Iterable[str]) -> set[str]:
+    """Those of these SHA-256 that the server has a clip of."""
+    asked, known = list(hashes), set[str]()
+    for start in range(0, len(asked), MAX_ASKED):
+        query = select(Clip.sha256).where(Clip.sha256.in_(asked[start : start + MAX_ASKED]))
+        known.update(session.scalars(query))
+    return known
+
+
+def insert_clips(session: Session, rows: Iterable[Mapping[str, Any]]) -> None:
+    """Store clips that the server has not had."""
+    if values := list(rows):
+        session.execute(insert(Clip), values)
+
+
+def insert_version_clips(session: Session, version: StudyVersion, rows: Iterable[Mapping[str, Any]]) -> None:
+    """Give a stored version its clips; they are read from the database when they are asked for."""
+    values = [{"version_id": version.id, **row} for row in rows]
+    session.execute(insert(VersionClip), values)
+    session.expire(version, ["clips"])

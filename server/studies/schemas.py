@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from experiments.definition import Experiment
+from experiments.source_video import FrameRate, SourceVideo
 from server.models import Right
 from server.participants.recruiter import Recruiter
 
@@ -119,7 +120,7 @@ class LevelsPattern(_In):
     pattern: Annotated[str, StringConstraints(min_length=3, max_length=300)]
 
 
-Template = Literal["rating", "sliders", "acr", "pairs", "just_noticeable"]
+Template = Literal["rating", "sliders", "acr", "dcr", "pairs", "just_noticeable"]
 
 
 class OwnClips(_In):
@@ -173,6 +174,22 @@ class ChangeSettings(_In):
     paused: bool
     quota: Annotated[int, Field(ge=1, le=1_000_000)] | None
     recruiter: Recruiter | None
+
+
+class Signing(BaseModel):
+    """The study's secret for signed addresses, and how the recruiter's side signs with it."""
+
+    declared: bool = Field(description="The recruiter declares that addresses are signed.")
+    parameter: str = Field(description="Address parameter of the signature.")
+    secret_name: str = Field(description="Another name makes another secret.")
+    secret: str = Field(description="64 hexadecimal digits; who has it can sign for anybody.")
+    identifier: str = Field(description="A participant's id, as an example.")
+    signature: str = Field(description="HMAC-SHA-256 of that id, with the secret as key.")
+    query: str = Field(
+        description="What is added to the link after `?` for that participant, percent-encoded."
+    )
+    python: str = Field(description="The same signature in Python.")
+    shell: str = Field(description="The same signature by OpenSSL.")
 
 
 class NewLinks(_In):
@@ -283,6 +300,9 @@ class ClipOut(BaseModel):
     height_px: int
     bytes: int
     closure: list[float]
+    source: SourceVideo | None = Field(
+        description="What it was converted from, without its frame map; null where it is shown as it came."
+    )
 
 
 class UploadedFile(BaseModel):
@@ -290,12 +310,33 @@ class UploadedFile(BaseModel):
 
     name: str
     bytes: int
-    sha256: str
+    state: Literal["waiting", "ready", "refused"] = Field(
+        description="Waiting: it is still looked into, or converted."
+    )
+    sha256: str | None = Field(default=None, description="Of the clip.")
     fps: float | None = None
     frames: int | None = None
     width_px: int | None = None
     height_px: int | None = None
-    problem: str | None = None
+    problem: str | None = Field(default=None, description="Why it cannot be used, and what to do.")
+    same_as: str | None = Field(default=None, description="An earlier file with the same bytes.")
+    source: SourceVideo | None = Field(
+        default=None, description="What the clip was converted from; null where the file is shown as it came."
+    )
+
+
+class UploadProgress(BaseModel):
+    """How far an upload has been looked into and converted."""
+
+    files: int
+    waiting: int
+    refused: int
+
+
+class AskFrameRate(_In):
+    """The frame rate that clips are to have: one for all, or each its own."""
+
+    fps: FrameRate | None
 
 
 class UploadOut(BaseModel):
@@ -303,6 +344,8 @@ class UploadOut(BaseModel):
 
     id: str
     files: list[UploadedFile]
+    waiting: int = Field(description="Files that are still looked into, or converted.")
+    fps: float | None = Field(description="Frames per second asked for; null: each clip its own.")
     has_manifest: bool
     tables: list[str] = Field(description="Names of CSV files in the upload.")
     suggested_pattern: str | None

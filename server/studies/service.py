@@ -2,6 +2,7 @@
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -12,18 +13,25 @@ from experiments.errors import InputError, did_you_mean
 from experiments.load import DEMOS, SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.own_clips import Placed, check_factorial, levels_from_names, levels_from_table
-from experiments.schema.stored import load_stored
 from experiments.trials import KINDS
 from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
 from server.accounts.audit import record
 from server.accounts.identity import Identity
+from server.clips.address import clip_address
 from server.clock import now
 from server.context import Services
-from server.errors import Conflict, Invalid, NotFound
+from server.errors import Conflict, Invalid
 from server.models import Right, Study, StudyVersion, VersionClip
 from server.studies import own_clips, repository
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
-from server.studies.lookup import active_version, find_study, must_not_be_archived
+from server.studies.lookup import (
+    active_version,
+    definition_of,
+    find_study,
+    must_not_be_archived,
+    study_with_rights,
+    version_numbered,
+)
 from server.studies.planned import planned_experiment
 from server.studies.schemas import (
     BlockOut,
@@ -48,9 +56,10 @@ from server.studies.schemas import (
 )
 from server.studies.series import judged, series_of
 from server.studies.toml_edit import with_data
-from server.studies.uploads import FILMS, upload_folder
+from server.studies.uploads import upload_folder
+from server.transcoding.records import videos_of
 from server.workspaces.repository import studies_opened_to
-from server.workspaces.service import Standing, standing_of, workspace_for
+from server.workspaces.service import Standing, standing_of, standing_on, workspace_for
 
 ALLOWED = {
     "draft": ("pilot", "live"),
@@ -106,9 +115,9 @@ def check(text: str) -> Checked:
     return Checked(problems=[], design=design_out(experiment))
 
 
-def edit(wanted: EditDefinition) -> EditedDefinition:
+def edit(edited: EditDefinition) -> EditedDefinition:
     """A definition's text with other data in it: what did not change keeps its form and its comments."""
-    text = wanted.toml if wanted.data is None else with_data(wanted.toml, wanted.data)
+    text = edited.toml if edited.data is None else with_data(edited.toml, edited.data)
     try:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError):
@@ -117,74 +126,84 @@ def edit(wanted: EditDefinition) -> EditedDefinition:
     return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)
 
 
-def judge_edit(session: Session, name: str, text: str, who: Identity) -> JudgedEdit:
+def judge_edit(session: Session, name: str, text: str, identity: Identity) -> JudgedEdit:
     """What saving this definition would do to stored answers; DefinitionError where it cannot be used."""
-    return judged(session, find_study(session, name, who, "view"), planned_experiment(text))
+    return judged(session, find_study(session, name, identity, "view"), planned_experiment(text))
 
 
 def shipped(services: Services) -> list[ShippedExperiment]:
     """The experiments that come with the program; demonstrations where their clips are built."""
-    found = []
+    experiments = []
     for name in (*SHIPPED, *DEMOS):
         text = locate(name).read_text(encoding="utf-8")
         ready = (services.settings.stimuli_folder / name / MANIFEST_NAME).is_file()
         if not ready and name in DEMOS:
             continue
         title = parse_experiment(text).title
-        found.append(ShippedExperiment(name=name, title=title, toml=text, clips_ready=ready))
-    return found
+        experiments.append(ShippedExperiment(name=name, title=title, toml=text, clips_ready=ready))
+    return experiments
 
 
-def create(services: Services, wanted: NewStudy, who: Identity) -> str:
+def create(services: Services, order: NewStudy, identity: Identity) -> str:
     """Create a draft study; everything is checked and every clip stored before the database changes."""
     with services.database.read() as session:
-        workspace_for(session, who, wanted.workspace)  # refused before anything is stored
-    text, experiment, manifest, folder = _materials(services, wanted, who)
+        workspace_for(session, identity, order.workspace)  # refused before anything is stored
+    text, experiment, manifest, folder = _materials(services, order, identity)
     check_against_design(experiment, manifest)
-    store_clips(services.clips, manifest, folder)
+    _store(services, manifest, folder)
     with services.database.write() as session:
         study = create_study(
-            session, wanted.name, experiment, who, workspace_for(session, who, wanted.workspace)
+            session, order.name, experiment, identity, workspace_for(session, identity, order.workspace)
         )
-        add_version(session, study, text, experiment, manifest, who, note="created")
+        add_version(session, study, text, experiment, manifest, identity, note="created")
         study.revision = 1
-    return wanted.name
+    return order.name
 
 
-def _materials(services: Services, wanted: NewStudy, who: Identity) -> tuple[str, Experiment, Manifest, Path]:
-    if wanted.shipped is not None:
-        if wanted.shipped not in (known := (*SHIPPED, *DEMOS)):
-            near = did_you_mean(wanted.shipped, known)
-            raise Invalid(f"There is no shipped experiment '{wanted.shipped}'{near}")
-        text = wanted.toml or locate(wanted.shipped).read_text(encoding="utf-8")
-        folder = services.settings.stimuli_folder / wanted.shipped
-        return text, planned_experiment(text), read_manifest(folder), folder
-    if wanted.upload is None:
-        raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
-    folder = upload_folder(services.settings.upload_folder, wanted.upload, who.account_id)
+def _store(services: Services, manifest: Manifest, folder: Path) -> None:
+    """Take the clips of a built set, or of an upload of own clips, into the clip store."""
     if (folder / MANIFEST_NAME).is_file():
-        if wanted.toml is None:
+        store_clips(services.clips, manifest, folder)
+    else:
+        own_clips.store_prepared(services.clips, manifest, folder)
+
+
+def _materials(
+    services: Services, order: NewStudy, identity: Identity
+) -> tuple[str, Experiment, Manifest, Path]:
+    if order.shipped is not None:
+        if order.shipped not in (known := (*SHIPPED, *DEMOS)):
+            near = did_you_mean(order.shipped, known)
+            raise Invalid(f"There is no shipped experiment '{order.shipped}'{near}")
+        text = order.toml or locate(order.shipped).read_text(encoding="utf-8")
+        folder = services.settings.stimuli_folder / order.shipped
+        return text, planned_experiment(text), read_manifest(folder), folder
+    if order.upload is None:
+        raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
+    folder = upload_folder(services.settings.upload_folder, order.upload, identity.account_id)
+    if (folder / MANIFEST_NAME).is_file():
+        if order.toml is None:
             raise Invalid(
                 "The upload has a manifest; give the definition (TOML) its clips were built from too."
             )
-        return wanted.toml, planned_experiment(wanted.toml), read_manifest(folder), folder
-    return _own(wanted, folder)
+        return order.toml, planned_experiment(order.toml), read_manifest(folder), folder
+    return _own(order, folder)
 
 
-def _own(wanted: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path]:
-    placed = _placed(wanted.levels, folder)
+def _own(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path]:
+    placed = _placed(order.levels, folder)
     check_factorial(placed)
-    if wanted.toml is None and wanted.own_clips is None:
+    if order.toml is None and order.own_clips is None:
         raise Invalid("Give the study a title and a question, or a definition.")
-    text = wanted.toml
-    if text is None and wanted.own_clips is not None:
-        text = own_clips.definition_text(wanted.name, placed, wanted.own_clips)
+    text = order.toml
+    if text is None and order.own_clips is not None:
+        text = own_clips.definition_text(order.name, placed, order.own_clips)
     experiment = planned_experiment(text or "")
     return text or "", experiment, own_clips.manifest_of(experiment, placed, folder), folder
 
 
 def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
-    files = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in FILMS)
+    files = [path.name for path in videos_of(folder)]
     if levels is None:
         raise Invalid("Say which levels each clip has: by a CSV table or a file-name pattern.")
     if isinstance(levels, LevelsTable):
@@ -193,10 +212,10 @@ def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
 
 
 def for_edit(
-    session: Session, name: str, revision: int, who: Identity, right: Right, *, archived: bool = False
+    session: Session, name: str, revision: int, identity: Identity, right: Right, *, archived: bool = False
 ) -> Study:
     """The study to change; Conflict where somebody changed it since, or where it is in the archive."""
-    study = find_study(session, name, who, right)
+    study = find_study(session, name, identity, right)
     if study.revision != revision:
         raise EditedMeanwhile(
             f"Somebody else changed this study meanwhile (revision {study.revision}, yours was {revision}); "
@@ -208,40 +227,40 @@ def for_edit(
     return study
 
 
-def add_definition(services: Services, name: str, wanted: NewVersion, who: Identity) -> None:
+def add_definition(services: Services, name: str, order: NewVersion, identity: Identity) -> None:
     """Store a changed definition as a new version, with the clips there are and those of an upload."""
     with services.database.read() as session:
-        find_study(session, name, who, "edit")  # refused before a clip is stored
-    experiment = planned_experiment(wanted.toml)
-    added = _added_clips(services, wanted, experiment, who)
+        find_study(session, name, identity, "edit")  # refused before a clip is stored
+    experiment = planned_experiment(order.toml)
+    added = _added_clips(services, order, experiment, identity)
     with services.database.write() as session:
-        study = for_edit(session, name, wanted.revision, who, "edit")
+        study = for_edit(session, name, order.revision, identity, "edit")
         manifest = Manifest.model_validate(active_version(session, study).manifest)
         if added is not None:
             own_clips.check_declared(added, experiment)
             manifest = own_clips.merged_manifest(manifest, added)
         manifest = own_clips.only_declared(manifest, experiment)
-        add_version(session, study, wanted.toml, experiment, manifest, who, wanted.note)
+        add_version(session, study, order.toml, experiment, manifest, identity, order.note)
 
 
 def _added_clips(
-    services: Services, wanted: NewVersion, experiment: Experiment, who: Identity
+    services: Services, order: NewVersion, experiment: Experiment, identity: Identity
 ) -> Manifest | None:
     """The manifest of uploaded clips, their bytes in the store; None where none were uploaded."""
-    if wanted.upload is None:
+    if order.upload is None:
         return None
-    folder = upload_folder(services.settings.upload_folder, wanted.upload, who.account_id)
+    folder = upload_folder(services.settings.upload_folder, order.upload, identity.account_id)
     if (folder / MANIFEST_NAME).is_file():
         manifest = read_manifest(folder)
     else:
-        manifest = own_clips.manifest_of(experiment, _placed(wanted.levels, folder), folder)
-    store_clips(services.clips, manifest, folder)
+        manifest = own_clips.manifest_of(experiment, _placed(order.levels, folder), folder)
+    _store(services, manifest, folder)
     return manifest
 
 
-def change_status(session: Session, name: str, revision: int, status: str, who: Identity) -> None:
+def change_status(session: Session, name: str, revision: int, status: str, identity: Identity) -> None:
     """draft -> pilot -> live -> closed, and the ways back that lose nothing."""
-    study = for_edit(session, name, revision, who, "run")
+    study = for_edit(session, name, revision, identity, "run")
     if status == study.status:
         return
     if status not in ALLOWED[study.status]:
@@ -251,37 +270,37 @@ def change_status(session: Session, name: str, revision: int, status: str, who: 
     if study.status == "draft":
         study.opened_at = now()
     study.closed_at = now() if status == "closed" else None
-    record(session, who, "status changed", "study", study.name, before=study.status, after=status)
+    record(session, identity, "status changed", "study", study.name, before=study.status, after=status)
     study.status = status
     study.revision += 1
 
 
-def change_settings(session: Session, name: str, wanted: ChangeSettings, who: Identity) -> None:
+def change_settings(session: Session, name: str, order: ChangeSettings, identity: Identity) -> None:
     """Pause or go on, set the quota, name the recruiter."""
-    study = for_edit(session, name, wanted.revision, who, "run")
-    study.paused, study.quota = wanted.paused, wanted.quota
-    study.recruiter = wanted.recruiter.model_dump() if wanted.recruiter else None
+    study = for_edit(session, name, order.revision, identity, "run")
+    study.paused, study.quota = order.paused, order.quota
+    study.recruiter = order.recruiter.model_dump() if order.recruiter else None
     study.revision += 1
     record(
-        session, who, "settings changed", "study", name, paused=wanted.paused, quota=wanted.quota,
-        recruiter=wanted.recruiter.kind if wanted.recruiter else None,
+        session, identity, "settings changed", "study", name, paused=order.paused, quota=order.quota,
+        recruiter=order.recruiter.kind if order.recruiter else None,
     )  # fmt: skip
 
 
-def delete(session: Session, name: str, who: Identity) -> None:
+def delete(session: Session, name: str, identity: Identity) -> None:
     """Delete a draft that nobody has taken part in."""
-    study = find_study(session, name, who, "edit")
+    study = find_study(session, name, identity, "edit")
     must_not_be_archived(study)
     if study.status != "draft" or repository.run_count(session, study):
         raise Conflict("Only a draft without runs can be deleted; close this study instead.")
     repository.delete_study(session, study)
-    record(session, who, "study deleted", "study", name)
+    record(session, identity, "study deleted", "study", name)
 
 
-def summaries(session: Session, who: Identity) -> list[StudySummary]:
+def summaries(session: Session, identity: Identity) -> list[StudySummary]:
     """The studies that are open to her, the latest first."""
-    studies = studies_opened_to(session, who)
-    counts, standing = repository.shown_runs_by_status(session), standing_of(session, studies, who)
+    studies = studies_opened_to(session, identity)
+    counts, standing = repository.shown_runs_by_status(session), standing_of(session, studies, identity)
     return [summary(study, counts, standing[study.id]) for study in studies]
 
 
@@ -306,14 +325,14 @@ def summary(study: Study, counts: repository.StatusCounts, standing: Standing) -
     )
 
 
-def detail(session: Session, name: str, who: Identity) -> StudyDetail:
+def detail(session: Session, name: str, identity: Identity) -> StudyDetail:
     """A study with its declaration and versions."""
-    study = find_study(session, name, who, "view")
+    study, rights = study_with_rights(session, name, identity, "view")
     version = active_version(session, study)
-    experiment = load_stored(version.definition)
+    experiment = definition_of(version)
     return StudyDetail(
         summary=summary(
-            study, repository.shown_runs_by_status(session), standing_of(session, [study], who)[study.id]
+            study, repository.shown_runs_by_status(session, study), standing_on(session, study, rights)
         ),
         design=design_out(experiment),
         definition=experiment,
@@ -329,28 +348,24 @@ def _version_out(version: StudyVersion, runs: int) -> VersionOut:
     return VersionOut.model_validate(version).model_copy(update={"runs": runs})
 
 
-def version_text(session: Session, name: str, number: int, who: Identity) -> str:
+def version_text(session: Session, name: str, number: int, identity: Identity) -> str:
     """The TOML of one version."""
-    study = find_study(session, name, who, "view")
-    for version in study.versions:
-        if version.number == number:
-            return version.definition_toml
-    raise NotFound(f"Study '{name}' has no version {number}.")
+    return version_numbered(session, find_study(session, name, identity, "view"), number).definition_toml
 
 
-def clips(session: Session, name: str, who: Identity) -> list[ClipOut]:
+def clips(session: Session, name: str, identity: Identity) -> list[ClipOut]:
     """Every clip of the active version with the closure curve it shows."""
-    version = active_version(session, find_study(session, name, who, "view"))
-    curves = {clip["sha256"]: clip.get("closure", []) for clip in version.manifest["clips"]}
+    version = active_version(session, find_study(session, name, identity, "view"))
+    told = {clip["sha256"]: clip for clip in version.manifest["clips"]}
     rows = repository.clips_of_design(session, version)
-    return [_clip_out(row, curves[row.clip_sha256]) for row in rows]
+    return [_clip_out(row, told[row.clip_sha256]) for row in rows]
 
 
-def _clip_out(row: VersionClip, closure: list[float]) -> ClipOut:
+def _clip_out(row: VersionClip, told: dict[str, Any]) -> ClipOut:
     clip = row.clip
     return ClipOut(
         clip_sha256=row.clip_sha256,
-        url=f"/clips/{row.clip_sha256}.mp4",
+        url=clip_address(row.clip_sha256),
         file=row.file,
         cell=row.cell,
         levels=row.levels,
@@ -361,5 +376,6 @@ def _clip_out(row: VersionClip, closure: list[float]) -> ClipOut:
         width_px=clip.width_px,
         height_px=clip.height_px,
         bytes=clip.bytes,
-        closure=closure,
+        closure=told.get("closure", []),
+        source=(source := told.get("source")) and source | {"frame_map": ()},
     )

@@ -1,5 +1,6 @@
 """What participants do with one's own clips: trials to begin from, for an experimenter to edit further."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from experiments.errors import InputError
@@ -9,6 +10,12 @@ Levels = dict[str, list[str]]
 """Factor -> the names of its levels."""
 QUALITY = ("Bad", "Poor", "Fair", "Good", "Excellent")
 """The five categories of absolute category rating, worst first (ITU-T P.910, 7.1)."""
+IMPAIRMENT = (
+    "Very annoying", "Annoying", "Slightly annoying", "Perceptible, but not annoying", "Imperceptible",
+)  # fmt: skip
+"""The five categories of degradation category rating, worst first (ITU-T P.910, 7.2)."""
+REFERENCE = "reference"
+"""The level of a factor that names the reference by itself."""
 MIN_STIMULI = 3
 
 
@@ -20,7 +27,9 @@ def trial_of(asked: OwnClips, levels: Levels) -> dict[str, Any]:
         case "sliders":
             return {"kind": "clip_rating", "arrangement": "one_screen", "scales": _sliders(asked)}
         case "acr":
-            return {"kind": "clip_rating", "scale": _quality(asked)}
+            return {"kind": "clip_rating", "scale": _categories(asked, QUALITY)}
+        case "dcr":
+            return _degradation(asked, levels)
         case "pairs":
             return _pairs(asked)
         case "just_noticeable":
@@ -42,13 +51,21 @@ def _sliders(asked: OwnClips) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _quality(asked: OwnClips) -> dict[str, Any]:
+def _categories(asked: OwnClips, labels: Sequence[str]) -> dict[str, Any]:
     return {
         "question": {"en": asked.question},
         "minimum": 1,
-        "maximum": len(QUALITY),
-        "labels": [{"en": label} for label in QUALITY],
+        "maximum": len(labels),
+        "labels": [{"en": label} for label in labels],
     }
+
+
+def _degradation(asked: OwnClips, levels: Levels) -> dict[str, Any]:
+    """Each clip after its reference: the level of this name, else the first of the first factor."""
+    named = ((factor, level) for factor, of in levels.items() for level in of if level.lower() == REFERENCE)
+    factor, level = next(named, next((name, of[0]) for name, of in levels.items()))
+    reference = {"factor": factor, "level": level, "label": {"en": "Reference"}, "rate_itself": True}
+    return {"kind": "clip_rating", "scale": _categories(asked, IMPAIRMENT), "reference": reference}
 
 
 def _pairs(asked: OwnClips) -> dict[str, Any]:

@@ -30,13 +30,13 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     InputError
         Where `text` is not TOML, `data` holds what TOML cannot say, or there is too much of either.
     """
-    wanted = _without_none(data)
+    edited = _without_none(data)
     try:
-        _refuse_too_many(tomllib.loads(text), wanted)
+        _refuse_too_many(tomllib.loads(text), edited)
         document = tomlkit.parse(text)
-        _merge(document, wanted)
+        _merge(document, edited)
         merged = tomlkit.dumps(document)
-        if _same(tomllib.loads(merged), wanted):
+        if _same(tomllib.loads(merged), edited):
             return merged
     except (TOMLKitError, tomllib.TOMLDecodeError) as error:
         if not _is_toml(text):
@@ -46,14 +46,14 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     except RecursionError as error:
         raise InputError("lists or tables are nested too deeply; correct the text first") from error
     # Tables written out of order are beyond tomlkit's editing: the whole is then written afresh.
-    return tomlkit.dumps(toml_items.fresh_document(wanted))
+    return tomlkit.dumps(toml_items.fresh_document(edited))
 
 
 def _refuse_too_many(*said: Any) -> None:
-    most = max(map(_elements, said))
-    if most > MAX_ELEMENTS:
+    elements = max(map(_elements, said))
+    if elements > MAX_ELEMENTS:
         raise InputError(
-            f"expected at most {MAX_ELEMENTS} elements in all lists together, got {most}; "
+            f"expected at most {MAX_ELEMENTS} elements in all lists together, got {elements}; "
             "edit such a text by hand"
         )
 
@@ -94,10 +94,10 @@ def _plain(item: Any) -> Any:
     return item.unwrap() if hasattr(item, "unwrap") else item
 
 
-def _merge(table: Any, wanted: Mapping[str, Any]) -> None:
-    for key in [key for key in table if key not in wanted]:
+def _merge(table: Any, edited: Mapping[str, Any]) -> None:
+    for key in [key for key in table if key not in edited]:
         _remove(table, key)
-    for key, value in wanted.items():
+    for key, value in edited.items():
         if key not in table:
             _add(table, key, value)
         elif not _same(_plain(table[key]), value):
@@ -149,22 +149,22 @@ def _change(table: Any, key: str, value: Any) -> None:
         table[key] = toml_items.item(value, toml_items.is_inline(table))
 
 
-def _known_again(old: Sequence[Any], wanted: Sequence[Any]) -> list[int | None]:
+def _known_again(old: Sequence[Any], edited: Sequence[Any]) -> list[int | None]:
     """For each wanted element the number of the old one that it is an edit of; None for new ones."""
     free = list(range(len(old)))
-    known: list[int | None] = [None] * len(wanted)
+    known: list[int | None] = [None] * len(edited)
 
     def match(fits: Callable[[int, int], bool]) -> None:
-        for place in range(len(wanted)):
-            number = next((number for number in free if fits(number, place)), None)
-            if known[place] is None and number is not None:
-                known[place] = number
+        for index in range(len(edited)):
+            number = next((number for number in free if fits(number, index)), None)
+            if known[index] is None and number is not None:
+                known[index] = number
                 free.remove(number)
 
-    match(lambda number, place: _same(old[number], wanted[place]))
-    match(lambda number, place: _are_of_one_name(old[number], wanted[place]))
-    if len(old) == len(wanted):
-        match(lambda number, place: number == place)
+    match(lambda number, index: _same(old[number], edited[index]))
+    match(lambda number, index: _are_of_one_name(old[number], edited[index]))
+    if len(old) == len(edited):
+        match(lambda number, index: number == index)
     return known
 
 
@@ -178,14 +178,14 @@ def _identity(element: Any) -> str | None:
     return next((f"{key}={element[key]}" for key in IDENTITY if key in element), None)
 
 
-def _merged_tables(old: AoT, wanted: Sequence[Mapping[str, Any]]) -> tuple[AoT, list[Any]]:
+def _merged_tables(old: AoT, edited: Sequence[Mapping[str, Any]]) -> tuple[AoT, list[Any]]:
     """The elements in their new order, and the comments that now stand above the first."""
     tables = list(old.body)
     above = [[], *[_take_tail(table) for table in tables]]
-    known = _known_again([_plain(table) for table in tables], wanted)
+    known = _known_again([_plain(table) for table in tables], edited)
     fresh = tomlkit.aot()
     leads: list[list[Any]] = []
-    for number, value in zip(known, wanted, strict=True):
+    for number, value in zip(known, edited, strict=True):
         if number is None:
             table, lead = toml_items.table(value), []
             _take_tail(table)
@@ -235,21 +235,21 @@ def _give_tail(item: Any, tail: Sequence[Any]) -> None:
         container.body.extend((None, piece) for piece in tail)
 
 
-def _merge_array(array: Array, wanted: list[Any]) -> None:
+def _merge_array(array: Array, edited: list[Any]) -> None:
     """Change an array in its place, so that its lines and their comments stay."""
-    known = _known_again(_plain(array), wanted)
+    known = _known_again(_plain(array), edited)
     kept = [number for number in known if number is not None]
     if kept != sorted(kept) or not kept:
         array.clear()
-        for value in wanted:
+        for value in edited:
             array.append(toml_items.inline(value))
         toml_items.spread(array)
         return
     for number in reversed(range(len(array))):
         if number not in kept:
             del array[number]
-    for place, (origin, value) in enumerate(zip(known, wanted, strict=True)):
+    for index, (origin, value) in enumerate(zip(known, edited, strict=True)):
         if origin is None:
-            array.insert(place, toml_items.inline(value))
-        elif not _same(_plain(array[place]), value):
-            array[place] = toml_items.inline(value)
+            array.insert(index, toml_items.inline(value))
+        elif not _same(_plain(array[index]), value):
+            array[index] = toml_items.inline(value)

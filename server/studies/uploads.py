@@ -1,4 +1,4 @@
-"""Uploads of own clips: streamed to a folder of their own, unpacked with limits, probed."""
+"""Uploads of own clips: streamed to a folder of their own, unpacked with limits, and what became of them."""
 
 import re
 import secrets
@@ -9,17 +9,25 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from experiments.files import whole_file
-from experiments.manifest import MANIFEST_NAME, file_sha256
+from experiments.manifest import MANIFEST_NAME
 from experiments.own_clips import check_names, one_form, suggest_pattern
 from server.errors import ApiError, Invalid, NotFound
-from server.studies.probe import NotAFilm, probe
-from server.studies.schemas import UploadedFile, UploadOut
+from server.studies.schemas import UploadedFile, UploadOut, UploadProgress
+from server.transcoding.records import (
+    ask_rate,
+    asked_rate,
+    records_of,
+    videos_of,
+    write_record,
+)
+from video_conversion.prepared import VIDEO_ENDINGS, Prepared, clip_name
 
 KEEP_S = 24 * 3600
 MAX_FILES = 5000
 MAX_UNPACKED_BYTES = 4 * 1024**3
+MAX_KEPT_BYTES = 16 * 1024**3
+"""Of all files of one upload."""
 MAX_RATIO = 200
-FILMS = (".mp4", ".m4v", ".mov", ".webm")
 TABLES = (".csv", ".json")
 CHUNK_BYTES = 1 << 20
 _WHOSE = ".account"
@@ -34,14 +42,15 @@ class UploadTooLarge(ApiError):
     code = "too_large"
 
 
-def new_upload(folder: Path, account: int) -> tuple[str, Path]:
+def new_upload(folder: Path, account: int, fps: float | None = None) -> tuple[str, Path]:
     """Make the folder of an account's new upload, and remove uploads older than a day."""
     _sweep(folder)
     identifier = secrets.token_hex(16)
-    place = folder / identifier
-    place.mkdir(parents=True, mode=0o700)
-    (place / _WHOSE).write_text(str(account), encoding="ascii")
-    return identifier, place
+    upload = folder / identifier
+    upload.mkdir(parents=True, mode=0o700)
+    (upload / _WHOSE).write_text(str(account), encoding="ascii")
+    ask_rate(upload, fps)
+    return identifier, upload
 
 
 def _sweep(folder: Path) -> None:
@@ -50,51 +59,53 @@ def _sweep(folder: Path) -> None:
             shutil.rmtree(old, ignore_errors=True)
 
 
-def discard(place: Path) -> None:
+def discard(folder: Path) -> None:
     """Remove an upload that was refused."""
-    shutil.rmtree(place, ignore_errors=True)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def upload_folder(folder: Path, identifier: str, account: int) -> Path:
     """The folder of an account's upload; NotFound where there is none (identifiers are hexadecimal)."""
-    place = folder / identifier
-    known = len(identifier) == 32 and set(identifier) <= set("0123456789abcdef") and place.is_dir()
-    if not known or _sender(place) != str(account):
+    upload = folder / identifier
+    known = len(identifier) == 32 and set(identifier) <= set("0123456789abcdef") and upload.is_dir()
+    if not known or _sender(upload) != str(account):
         raise NotFound("There is no such upload, or it is older than a day; please upload the clips again.")
-    return place
+    return upload
 
 
-def _sender(place: Path) -> str | None:
+def _sender(folder: Path) -> str | None:
     # Uploads that an older release took have no sender; they end within a day.
     try:
-        return (place / _WHOSE).read_text(encoding="ascii")
+        return (folder / _WHOSE).read_text(encoding="ascii")
     except FileNotFoundError:
         return None
 
 
-def receive(place: Path, name: str, source: IO[bytes], limit: int) -> None:
+def receive(folder: Path, name: str, source: IO[bytes], limit: int) -> None:
     """Store one uploaded file, or unpack it where it is a zip; nothing is kept of a refused one."""
     if name.lower().endswith(".zip"):
-        packed = place / ".zip"
+        packed = folder / ".zip"
         try:
             _copy(source, packed, limit)
-            unpack(packed, place)
+            unpack(packed, folder)
         finally:
             packed.unlink(missing_ok=True)
     else:
-        target = place / safe_name(name)
+        target = folder / safe_name(name)
         if target.exists():
             raise Invalid(f"'{target.name}' came more than once; file names must differ.")
         _copy(source, target, limit)
 
 
 def safe_name(path: str) -> str:
-    """The file's own name; Invalid where the path climbs out or is not a film or table."""
+    """The file's own name; Invalid where the path climbs out or is not a clip or table."""
     pure = PurePosixPath(path.replace("\\", "/"))
     if pure.is_absolute() or ".." in pure.parts or not pure.name or pure.name.startswith("."):
         raise Invalid(f"The file '{path[:100]}' has a path that is not allowed; expected plain file names.")
-    if pure.suffix.lower() not in FILMS + TABLES:
-        raise Invalid(f"The file '{pure.name[:100]}' is neither a film ({', '.join(FILMS)}) nor a CSV table.")
+    if pure.suffix.lower() not in VIDEO_ENDINGS + TABLES:
+        raise Invalid(
+            f"The file '{pure.name[:100]}' is neither a video ({', '.join(VIDEO_ENDINGS)}) nor a CSV table."
+        )
     if len(pure.name) > 150:
         raise Invalid(f"The file name '{pure.name[:100]}...' is too long; 150 characters are the most.")
     name = one_form(pure.name)
@@ -103,7 +114,7 @@ def safe_name(path: str) -> str:
     return name
 
 
-def unpack(packed: Path, place: Path) -> None:
+def unpack(packed: Path, folder: Path) -> None:
     """Unpack a zip: flat, bounded in number and size, no name twice."""
     try:
         with zipfile.ZipFile(packed) as archive:
@@ -111,7 +122,7 @@ def unpack(packed: Path, place: Path) -> None:
             _check_members(members)
             for member in members:
                 with archive.open(member) as source:
-                    _copy(source, place / safe_name(member.filename), member.file_size)
+                    _copy(source, folder / safe_name(member.filename), member.file_size)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
         raise Invalid("The zip file is damaged or encrypted; please pack it again.") from error
 
@@ -130,41 +141,132 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
         )
     for member in members:
         if member.file_size > MAX_RATIO * max(member.compress_size, 1024):
-            raise Invalid(f"The zip's file '{member.filename[:100]}' unpacks to far more than a film would.")
+            raise Invalid(f"The zip's file '{member.filename[:100]}' unpacks to far more than a clip would.")
     names = [safe_name(member.filename) for member in members]
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise Invalid(f"The zip holds '{repeated[0]}' more than once; file names must differ.")
     check_names(names)
 
 
-def _copy(source: IO[bytes], target: Path, limit: int) -> None:
+def _copy(source: IO[bytes], target: Path, limit: int, called: str = "") -> None:
     written = 0
     with whole_file(target) as temporary, temporary.open("wb") as stream:
         while piece := source.read(CHUNK_BYTES):
             written += len(piece)
             if written > limit:
-                raise UploadTooLarge(f"'{target.name}' is larger than the {limit >> 20} MiB accepted.")
+                raise UploadTooLarge(
+                    f"'{called or target.name}' is larger than the {limit >> 20} MiB accepted."
+                )
             stream.write(piece)
 
 
-def describe(identifier: str, place: Path) -> UploadOut:
-    """Probe every film of an upload."""
-    paths = sorted(path for path in place.iterdir() if path.is_file() and not path.name.startswith("."))
-    films = [path for path in paths if path.suffix.lower() in FILMS]
-    check_names(path.name for path in films)
+def check_room(folder: Path) -> None:
+    """UploadTooLarge where an upload holds as much as one may."""
+    # Files that begin with a dot are the worker's, and may go at any moment.
+    kept = [path for path in folder.iterdir() if not path.name.startswith(".")]
+    if len(kept) > MAX_FILES or sum(path.stat().st_size for path in kept) > MAX_KEPT_BYTES:
+        raise UploadTooLarge(
+            f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB; add the others "
+            "to the study as a new version."
+        )
+
+
+def receive_more(folder: Path, name: str, source: IO[bytes], limit: int) -> None:
+    """Store one more file of an upload that goes on; one that has come already is passed over.
+
+    Raises
+    ------
+    Invalid
+        Another file of this name has come.
+    UploadTooLarge
+        The file is larger than this server takes.
+    """
+    target = folder / safe_name(name)
+    if target.exists() and target.stat().st_size == _length(source):
+        return
+    receive(folder, name, source, limit)
+
+
+def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int) -> None:
+    """Put another file in the place of one that has been looked into, such as one that was refused.
+
+    The new file is whole before the old one goes, and is looked into as any other.
+
+    Raises
+    ------
+    NotFound
+        The upload has no such file.
+    Invalid
+        It is still being looked into, or the new file's name is that of a third.
+    UploadTooLarge
+        The new file is larger than this server takes.
+    """
+    target, asked = folder / safe_name(name), one_form(old)
+    # Looked up among the names that there are: nothing else that is sent becomes a path.
+    known = next((path for path in videos_of(folder) if path.name == asked), None)
+    if known is None:
+        raise NotFound(f"This upload has no file '{old[:100]}' to replace.")
+    if not (folder / MANIFEST_NAME).exists() and known.name not in records_of(folder):
+        raise Invalid(f"'{known.name}' is still being looked into; replace it once it has been.")
+    if target != known and target.exists():
+        raise Invalid(f"'{target.name}' has come already; file names must differ.")
+    others = [path.name for path in videos_of(folder) if path not in (known, target)]
+    check_names(clip_name(one) for one in (*others, target.name))
+    staged = folder / f".{secrets.token_hex(8)}{target.suffix}"
+    try:
+        _copy(source, staged, limit, target.name)
+        known.unlink()
+        write_record(folder, Prepared(name=known.name, asked_fps=None, replaced=True))
+        staged.replace(target)
+    finally:
+        staged.unlink(missing_ok=True)
+
+
+def _length(source: IO[bytes]) -> int:
+    length = source.seek(0, 2)
+    source.seek(0)
+    return length
+
+
+def describe(identifier: str, folder: Path) -> UploadOut:
+    """Every video of an upload, and what became of those that have been looked into."""
+    paths = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    clips, records = videos_of(folder), records_of(folder)
+    has_manifest = any(path.name == MANIFEST_NAME for path in paths)
+    check_names(clip_name(path.name) for path in clips)
+    first_of: dict[str, str] = {}
+    files = [_described(path, records.get(path.name), first_of, built=has_manifest) for path in clips]
     return UploadOut(
         id=identifier,
-        files=[_described(path) for path in films],
-        has_manifest=any(path.name == MANIFEST_NAME for path in paths),
+        files=files,
+        waiting=sum(file.state == "waiting" for file in files),
+        fps=asked_rate(folder),
+        has_manifest=has_manifest,
         tables=[path.name for path in paths if path.suffix.lower() == ".csv"],
-        suggested_pattern=suggest_pattern([path.name for path in films]),
+        suggested_pattern=suggest_pattern([path.name for path in clips]),
     )
 
 
-def _described(path: Path) -> UploadedFile:
-    shared = {"name": path.name, "bytes": path.stat().st_size, "sha256": file_sha256(path)}
-    try:
-        film = probe(path)
-    except NotAFilm as error:
-        return UploadedFile.model_validate(shared | {"problem": str(error)})
-    return UploadedFile.model_validate(shared | vars(film))
+def _described(path: Path, record: Prepared | None, first_of: dict[str, str], *, built: bool) -> UploadedFile:
+    shared = {"name": path.name, "bytes": path.stat().st_size}
+    if record is None:
+        return UploadedFile.model_validate(shared | {"state": "ready" if built else "waiting"})
+    if record.problem is not None:
+        return UploadedFile.model_validate(shared | {"state": "refused", "problem": record.problem})
+    first = first_of.setdefault(record.sha256, path.name)
+    about = {name: getattr(record, name) for name in ("sha256", "fps", "frames", "width_px", "height_px")}
+    source = record.source and record.source.model_copy(update={"frame_map": ()})
+    same_as = first if first != path.name else None
+    return UploadedFile.model_validate(
+        shared | about | {"state": "ready", "same_as": same_as, "source": source}
+    )
+
+
+def progress(folder: Path) -> UploadProgress:
+    """How far an upload's videos have been looked into and converted."""
+    clips, records = videos_of(folder), records_of(folder)
+    known = [records[path.name] for path in clips if path.name in records]
+    waiting = 0 if (folder / MANIFEST_NAME).exists() else len(clips) - len(known)
+    return UploadProgress(
+        files=len(clips), waiting=waiting, refused=sum(record.problem is not None for record in known)
+    )

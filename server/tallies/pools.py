@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from server.tallies import repository
 from server.tallies.repository import CellClip
-from server.tallies.tally import ONSET_BINS, UNIT, Place, numbers, packed_codes, unpacked
+from server.tallies.tally import ONSET_BINS, UNIT, NumberedClip, numbers, packed_codes, unpacked
 
 
 @dataclass
@@ -20,10 +20,16 @@ class PooledTally:
 
     Attributes
     ----------
-    means: run -> levels in the order of the factors -> mean answer.
-    answers: (clip, second clip, answer) -> how often; clips by their id, second None where there is one.
-    times: bin of 250 ms -> answers. onsets: answers by bins of 10 ms.
-    plays: (verdict, method, rule) -> plays, those of excluded runs included.
+    means : dict of str to dict of tuple of str to float
+        Run -> levels in the order of the factors -> mean answer.
+    answers : mapping
+        (clip, second clip, answer) -> how often; clips by their id, second None where there is one.
+    times : mapping
+        Bin of 250 ms -> answers.
+    onsets : list of int
+        Answers by bins of 10 ms.
+    plays : mapping
+        (verdict, method, rule) -> plays, those of excluded runs included.
     """
 
     means: dict[str, dict[tuple[str, ...], float]] = field(default_factory=dict)
@@ -96,7 +102,7 @@ class _Versions:
         """The levels of each cell, by its number."""
         if version not in self._levels:
             clips = self.clips(version)
-            places: dict[int, Place] = numbers((clip.id, clip.cell) for clip in clips)
+            places: dict[int, NumberedClip] = numbers((clip.id, clip.cell) for clip in clips)
             by_cell: dict[int, tuple[str, ...]] = {}
             for clip in clips:
                 levels = tuple(clip.levels[name] for name in self._factors)

@@ -31,11 +31,13 @@ class Recount:
             self.runs, after = self.runs + len(runs), runs[-1]
 
     def counted(self, session: Session, runs: Sequence[int]) -> dict[int, Tally]:
-        """Run -> what its ratings come to; without runs that have none."""
+        """Run -> what its ratings and their evidence come to; without runs that have none."""
         tallies: dict[int, Tally] = {}
         rows = repository.shown_clips(session, runs)
         for (run, _, _), shown in groupby(rows, key=lambda row: row[:3]):
             tallies.setdefault(run, Tally()).add(self._play(session, list(shown)))
+        for run, clip_time in repository.clip_times(session, runs).items():
+            tallies.setdefault(run, Tally()).clip_time = clip_time
         return tallies
 
     def _play(self, session: Session, shown: Sequence[ShownClip]) -> Play:

@@ -7,8 +7,9 @@ from sqlalchemy import ColumnElement, delete, insert, select
 from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL
-from server.models import AssignedTrial, Rating, RunTally, StudyRun, TrialClip, VersionClip
-from server.tallies.tally import Tally, tally_of
+from server.evidence.clip_time import ClipTime
+from server.models import AnswerEvidence, AssignedTrial, Rating, RunTally, StudyRun, TrialClip, VersionClip
+from server.tallies.tally import COLUMNS, Tally, tally_of
 
 RUNS_AT_ONCE = 100
 _SHOWN_PLAYS = (
@@ -108,9 +109,21 @@ def shown_clips(session: Session, runs: Sequence[int]) -> list[ShownClip]:
 
 def stored_tallies(session: Session, runs: Sequence[int]) -> dict[int, Tally]:
     """Run -> its stored tally, of these runs (ascending numbers)."""
-    query = select(RunTally.study_run_id, RunTally.heat, RunTally.not_good, RunTally.counts, RunTally.answers)
+    query = select(RunTally.study_run_id, *(getattr(RunTally, name) for name in COLUMNS))
     rows = session.execute(query.where(RunTally.study_run_id.between(runs[0], runs[-1])))
-    return {run: tally_of(heat, not_good, counts, answers) for run, heat, not_good, counts, answers in rows}
+    return {run: tally_of(*columns) for run, *columns in rows}
+
+
+def clip_times(session: Session, runs: Sequence[int]) -> dict[int, ClipTime]:
+    """Run -> what its answers that brought tickets took of its time, of these runs (ascending numbers)."""
+    row = AnswerEvidence
+    query = select(row.study_run_id, row.clip_ms, row.issued_at, row.received_at)
+    made: dict[int, ClipTime] = {}
+    for run, clip_ms, issued_at, received_at in session.execute(
+        query.where(row.study_run_id.between(runs[0], runs[-1]))
+    ):
+        made[run] = made.get(run, ClipTime()).plus(clip_ms, issued_at, received_at)
+    return made
 
 
 def lock_run(session: Session, run: int) -> None:

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from server.evidence.clip_time import ClipTime
+
 LETTERS = {"good": "g", "uncertain": "u", "flagged": "f", "failed": "x"}
 """Of a trial in the heat map, by its best verdict; `.` where it was not shown yet."""
 _BETTER = {".": 0, "x": 1, "f": 2, "u": 3, "g": 4}
@@ -24,21 +26,22 @@ _CLIP_BITS, _VALUE_BITS = 18, 28
 _ZERO = 1 << _VALUE_BITS - 1
 
 
-class Place(NamedTuple):
+class NumberedClip(NamedTuple):
     """A clip in its study version: its number among the clips, from 0, and that of its cell."""
 
     clip: int
     cell: int
 
 
-def numbers(clips: Iterable[tuple[int, str]]) -> dict[int, Place]:
+def numbers(clips: Iterable[tuple[int, str]]) -> dict[int, NumberedClip]:
     """The place of each clip (its id, its cell) of a version, given in the order of their ids.
 
     Cells are numbered as they come. A version that was used keeps its clips, so the numbers stay.
     """
     cells: dict[str, int] = {}
     return {
-        clip: Place(number, cells.setdefault(cell, len(cells))) for number, (clip, cell) in enumerate(clips)
+        clip: NumberedClip(number, cells.setdefault(cell, len(cells)))
+        for number, (clip, cell) in enumerate(clips)
     }
 
 
@@ -47,9 +50,14 @@ class Counted(NamedTuple):
 
     Attributes
     ----------
-    scale: its name; empty where trials are not rated on scales.
-    clip, second: numbers of the clips in the version (`Place`); second is None where a trial shows one.
-    value: the answer as a number. cell: of the clip, where the mean of values by cell means something.
+    scale : str
+        Its name; empty where trials are not rated on scales.
+    clip, second : int, int or None
+        Numbers of the clips in the version (`NumberedClip`); second is None where a trial shows one.
+    value : float
+        The answer as a number.
+    cell : int or None
+        Of the clip, where the mean of values by cell means something.
     """
 
     scale: str
@@ -78,8 +86,14 @@ def unpacked(code: int) -> tuple[int, int | None, float]:
 class Play(NamedTuple):
     """What is counted of one stored play.
 
-    is_main: of a main trial; of others the heat map alone is kept. rt, onset: in ms; None where not measured.
-    answers: empty where none was given.
+    Attributes
+    ----------
+    is_main : bool
+        Of a main trial; of others the heat map alone is kept.
+    rt, onset : float or None
+        In ms; None where not measured.
+    answers : tuple of Counted
+        Empty where none was given.
     """
 
     trial_index: int
@@ -92,6 +106,9 @@ class Play(NamedTuple):
     answers: tuple[Counted, ...]
 
 
+COLUMNS = ("heat", "not_good", "counts", "answers", *ClipTime._fields)
+"""Of `RunTally`, without its run."""
+
 PlayKey = str
 """Verdict, method and rule of plays, with a blank between them."""
 
@@ -102,10 +119,22 @@ class Tally:
 
     Attributes
     ----------
-    heat: a letter a trial, as far as trials were shown. not_good: plays flagged or failed, of any trial.
-    plays: of main trials. times: bin of 250 ms -> answers. onsets: answers by bins of 10 ms.
-    cells: scale -> answers of cell 0 and their sum in thousandths, then of cell 1, and so on.
-    answers: scale -> packed answers.
+    heat : str
+        A letter a trial, as far as trials were shown.
+    not_good : int
+        Plays flagged or failed, of any trial.
+    plays : dict of PlayKey to int
+        Of main trials.
+    times : dict of str to int
+        Bin of 250 ms -> answers.
+    onsets : list of int
+        Answers by bins of 10 ms.
+    cells : dict of str to list of int
+        Scale -> answers of cell 0 and their sum in thousandths, then of cell 1, and so on.
+    answers : dict of str to array
+        Scale -> packed answers.
+    clip_time : ClipTime
+        What the answers that brought tickets took of the run's time.
     """
 
     heat: str = ""
@@ -115,6 +144,7 @@ class Tally:
     onsets: list[int] = field(default_factory=list)
     cells: dict[str, list[int]] = field(default_factory=dict)
     answers: "dict[str, array[int]]" = field(default_factory=dict)
+    clip_time: ClipTime = field(default_factory=ClipTime)
 
     def add(self, play: Play) -> None:
         """Count one more play."""
@@ -159,11 +189,12 @@ class Tally:
             "not_good": self.not_good,
             "counts": json.dumps(counts, separators=(",", ":")),
             "answers": json.dumps(packed, separators=(",", ":")),
+            **self.clip_time._asdict(),
         }
 
     def same(self, other: "Tally") -> bool:
         """True where the same was counted, in whatever order."""
-        return self._sorted() == other._sorted()
+        return self._sorted() == other._sorted() and self.clip_time.same(other.clip_time)
 
     def _sorted(self) -> tuple[Any, ...]:
         answers = {scale: sorted(codes) for scale, codes in self.answers.items()}
@@ -190,12 +221,13 @@ def _little(codes: "array[int]") -> "array[int]":
     return turned
 
 
-def tally_of(heat: str, not_good: int, counts: str, answers: str) -> Tally:
-    """The tally that was stored as these columns."""
+def tally_of(heat: str, not_good: int, counts: str, answers: str, *clip_time: Any) -> Tally:
+    """The tally that was stored as these columns, in the order of `COLUMNS`."""
     packed: Mapping[str, str] = json.loads(answers)
     return Tally(
         heat=heat,
         not_good=not_good,
         **json.loads(counts),
         answers={scale: packed_codes([text]) for scale, text in packed.items()},
+        clip_time=ClipTime(*clip_time),
     )

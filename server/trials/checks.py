@@ -6,8 +6,8 @@ from experiments.checks import CHECK_KINDS
 from experiments.trials.check import CheckAnswer
 from server.errors import Invalid
 from server.trials.kinds import answer_of
-from server.trials.kinds.clip_rating import playback_of
 from server.trials.schemas import RatingIn
+from server.trials.several_clips import playback_of
 from server.trials.verdict import Ruling
 from server.trials.verdict import judge as judge_play
 from server.versions import LoadedVersion

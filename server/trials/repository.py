@@ -4,68 +4,85 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, NamedTuple, cast
 
-from sqlalchemy import Connection, Table, bindparam, insert, or_, select, true, update
+from sqlalchemy import Connection, Table, bindparam, insert, or_, select, update
 
-from server.evidence.repository import SPENT, Spent
 from server.models import AssignedTrial, Rating, RunEvent, RunTally, StudyRun, TrialClip
-from server.tallies.tally import Tally, tally_of
+from server.prepared import Prepared, Query
+from server.tallies.tally import COLUMNS, Tally, tally_of
 from server.trials.kinds import Part
+from server.trials.schemas import RunStatus
+from server.trials.verdict import Verdict
 
-# Tables instead of classes, and statements built once: the ORM would take twice the time of all the rest.
+# Tables instead of classes, and statements made ready once: else they would take most of a rating's time.
 _runs = cast(Table, StudyRun.__table__)
 _trials = cast(Table, AssignedTrial.__table__)
 _clips = cast(Table, TrialClip.__table__)
 _ratings = cast(Table, Rating.__table__)
 _tallies = cast(Table, RunTally.__table__)
 
-_RUN = (
-    select(
-        _runs.c.id,
-        _runs.c.public_id,
-        _runs.c.origin,
-        _runs.c.evidence,
-        _runs.c.version_id,
-        _runs.c.status,
-        _runs.c.consented_at,
-        _runs.c.px_per_mm,
-        _runs.c.viewing_distance_mm,
-        _runs.c.trials_total,
-        _runs.c.trials_answered,
-        _runs.c.elapsed_ms,
-    )
+
+class RunForRating(NamedTuple):
+    """The columns of a run that a rating needs."""
+
+    id: int
+    public_id: str
+    origin: str
+    evidence: str
+    version_id: int
+    status: RunStatus
+    consented_at: datetime | None
+    px_per_mm: float | None
+    viewing_distance_mm: float | None
+    trials_total: int
+    trials_answered: int
+    elapsed_ms: float
+
+
+class StoredRating(NamedTuple):
+    """The columns of a stored rating that a new one is compared with."""
+
+    rating_id: str
+    trial_index: int
+    play: int
+    kind: str
+    payload: dict[str, Any]
+    verdict: Verdict
+    verdict_rule: str
+    saved_at: datetime
+
+
+_RUN = Query(
+    select(*(_runs.c[name] for name in RunForRating._fields))
     .where(_runs.c.token_hash == bindparam("token_hash"))
-    .with_for_update()
+    .with_for_update(),
+    RunForRating._make,
 )
-_TRIAL = (
+_TRIAL = Query[tuple[Any, ...]](
     select(
         _trials.c.kind,
         _clips.c.role,
         _clips.c.version_clip_id,
-        _tallies.c.heat,
-        _tallies.c.not_good,
-        _tallies.c.counts,
-        _tallies.c.answers,
+        *(_tallies.c[name] for name in COLUMNS),
     )
     .select_from(
         _trials.outerjoin(_clips).outerjoin(_tallies, _tallies.c.study_run_id == _trials.c.study_run_id)
     )
     .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial_index"))
+    # A digest is over the clips in the order of their places, which the key (by role) is not.
+    .order_by(_clips.c.position),
+    tuple,
 )
-_TRIAL_AND_SPENT = _TRIAL.add_columns(*SPENT.c).join(SPENT, true())
-_STORED = select(
-    _ratings.c.rating_id,
-    _ratings.c.trial_index,
-    _ratings.c.play,
-    _ratings.c.kind,
-    _ratings.c.payload,
-    _ratings.c.verdict,
-    _ratings.c.verdict_rule,
-    _ratings.c.saved_at,
-).where(
-    _ratings.c.study_run_id == bindparam("run"),
-    or_(_ratings.c.trial_index == bindparam("trial_index"), _ratings.c.rating_id == bindparam("rating_id")),
+_STORED = Query(
+    select(*(_ratings.c[name] for name in StoredRating._fields)).where(
+        _ratings.c.study_run_id == bindparam("run"),
+        or_(
+            _ratings.c.trial_index == bindparam("trial_index"),
+            _ratings.c.rating_id == bindparam("rating_id"),
+        ),
+    ),
+    StoredRating._make,
 )
-_INSERT = insert(_ratings).inline()
+_INSERT = Prepared(insert(_ratings).inline(), [column.name for column in _ratings.c if column.name != "id"])
 _CHECKS = (
     select(_ratings.c.payload, _trials.c.expected_response)
     .select_from(_ratings.join(_trials))
@@ -77,13 +94,13 @@ _LATEST = (
     .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "main")
     .order_by(_ratings.c.id.desc())
 )
-_ADD_TALLY = insert(_tallies).inline()
-_SET_TALLY = (
+_ADD_TALLY = Prepared(insert(_tallies).inline(), ("study_run_id", *COLUMNS))
+_SET_TALLY = Prepared(
     update(_tallies)
     .where(_tallies.c.study_run_id == bindparam("run"))
-    .values({name: bindparam(name) for name in ("heat", "not_good", "counts", "answers")})
+    .values({name: bindparam(name) for name in COLUMNS})
 )
-_SEEN = (
+_SEEN = Prepared(
     update(_runs)
     .where(_runs.c.id == bindparam("run"))
     .values(
@@ -94,67 +111,55 @@ _SEEN = (
 )
 
 
-def run_for_rating(connection: Connection, token_hash: str) -> Any:
-    """The columns of the run that a rating needs; None where no run has this token. Locks it (PostgreSQL)."""
-    return connection.execute(_RUN, {"token_hash": token_hash}).one_or_none()
+def run_for_rating(connection: Connection, token_hash: str) -> RunForRating | None:
+    """The run with this token, None where there is none. Locks it (PostgreSQL)."""
+    return _RUN.one_or_none(connection, {"token_hash": token_hash})
 
 
 class StoredTrial(NamedTuple):
-    """A trial as assigned: its part of the run, its clips' ids by role, the run's tally (None at first).
-
-    spent: what the run's answers took of its time; None where no ticket was named.
-    """
+    """A trial as assigned: its part of the run, its clips' ids by role, the run's tally (None at first)."""
 
     kind: Part
     clips: dict[str, int]
     tally: Tally | None
-    spent: Spent | None = None
 
 
-def trial(
-    connection: Connection, run: int, trial_index: int, issued_at: datetime | None = None
-) -> StoredTrial | None:
+def trial(connection: Connection, run: int, trial_index: int) -> StoredTrial | None:
     """Part and clips of a trial, with the run's tally; None where the run has no such trial.
 
     To be asked once the run is locked: another server may have written the tally before.
-    issued_at: of the ticket that an answer names, to get with it what the run's answers took since.
     """
-    values = {"run": run, "trial_index": trial_index}
-    if issued_at is None:
-        rows = connection.execute(_TRIAL, values).all()
-    else:
-        rows = connection.execute(_TRIAL_AND_SPENT, values | {"issued_at": issued_at}).all()
+    rows = _TRIAL.all(connection, {"run": run, "trial_index": trial_index})
     if not rows:
         return None
-    kind, _, _, heat, not_good, counts, answers = rows[0][:7]
-    spent = rows[0][7:]
-    clips = {row.role: row.version_clip_id for row in rows if row.role is not None}
-    tally = None if heat is None else tally_of(heat, not_good, counts, answers)
-    return StoredTrial(kind, clips, tally, Spent(*spent) if spent else None)
+    kind, counted = rows[0][0], rows[0][3:]
+    clips = {role: clip for _, role, clip, *_ in rows if role is not None}
+    tally = None if counted[0] is None else tally_of(*counted)
+    return StoredTrial(kind, clips, tally)
 
 
-def stored_ratings(connection: Connection, run: int, trial_index: int, rating_id: str) -> list[Any]:
+def stored_ratings(connection: Connection, run: int, trial_index: int, rating_id: str) -> list[StoredRating]:
     """Ratings of this trial, and the one with this id."""
     values = {"run": run, "trial_index": trial_index, "rating_id": rating_id}
-    return list(connection.execute(_STORED, values))
+    return _STORED.all(connection, values)
 
 
 def add_rating(connection: Connection, values: dict[str, Any]) -> None:
     """Store one rating."""
-    connection.execute(_INSERT, values)
+    _INSERT.run(connection, values)
 
 
 def keep_tally(connection: Connection, run: int, tally: Tally, *, is_new: bool) -> None:
     """Store the tally of a run."""
     if is_new:
-        connection.execute(_ADD_TALLY, {"study_run_id": run, **tally.values()})
+        _ADD_TALLY.run(connection, {"study_run_id": run, **tally.values()})
     else:
-        connection.execute(_SET_TALLY, {"run": run, **tally.values()})
+        _SET_TALLY.run(connection, {"run": run, **tally.values()})
 
 
 def mark_seen(connection: Connection, run: int, seen: datetime, elapsed_ms: float, answered: int) -> None:
     """Note when the run was last seen, how far its clock is, and how many trials were settled now."""
-    connection.execute(_SEEN, {"run": run, "seen": seen, "elapsed": elapsed_ms, "answered": answered})
+    _SEEN.run(connection, {"run": run, "seen": seen, "elapsed": elapsed_ms, "answered": answered})
 
 
 def checks(connection: Connection, run: int) -> list[tuple[dict[str, Any], int | None]]:

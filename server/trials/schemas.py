@@ -111,24 +111,22 @@ class RatingIn(BaseModel):
 
 
 class TrialClip(BaseModel):
-    """One clip of a trial, and the role in which it is shown."""
+    """One clip of a trial, and the role in which it is shown; it is at `/clips/{clip_sha256}.mp4`.
+
+    Every clip of a trial is shown at the size of the first, which stands with the trial.
+    """
 
     role: Role
     clip_sha256: str
-    clip_url: str
     frames: int
     fps: float
-    width_px: int
-    height_px: int
-    width_mm: float | None
-    inter_ocular_px: float | None
 
 
-class SeriesPlace(BaseModel):
+class SeriesPosition(BaseModel):
     """Where a trial stands in an adaptive series, and how much of it the choice of its clip knew."""
 
     number: int = Field(description="Which series, from 0.")
-    position: int = Field(description="Place in the series, from 1.")
+    position: int = Field(description="Position in the series, from 1.")
     known: int = Field(
         description="Answers of the series that the choice rests on; sent back with the answer."
     )
@@ -141,10 +139,8 @@ class TrialInfo(BaseModel):
     kind: Literal["practice", "main", "attention", "check"]
     block: int
     clip_sha256: str | None
-    clip_url: str | None
     frames: int | None
     fps: float | None
-    bytes: int | None
     width_px: int | None
     height_px: int | None
     width_mm: float | None
@@ -159,7 +155,7 @@ class TrialInfo(BaseModel):
     answered: bool
     views_begun: int = Field(description="The highest number of a view of this trial; 0 where it has none.")
     views: list[ViewState] = Field(description="Views that still wait for the answer of their play.")
-    series: SeriesPlace | None = Field(default=None, description="Of trials that answers decide on.")
+    series: SeriesPosition | None = Field(default=None, description="Of trials that answers decide on.")
 
 
 class WarningShown(BaseModel):

@@ -10,14 +10,14 @@ from experiments.definition import Experiment
 from experiments.trials import KINDS
 from experiments.trials.check import CheckAnswer
 from server.errors import Conflict, Invalid, NotFound
-from server.evidence.intake import Answer, Intake, issued_at
+from server.evidence.intake import Answer, Intake
 from server.tallies.tally import Counted, Play, Tally
 from server.tokens import hash_token
 from server.trials import checks, repository, warnings
 from server.trials.attention import by_attention
 from server.trials.kinds import Part, served
 from server.trials.refusals import ConsentMissing, RunClosed, RunUnknown
-from server.trials.schemas import RatingIn, Receipt, RunStatus
+from server.trials.schemas import RatingIn, Receipt, RunStatus, ShownClips
 from server.trials.series import service as series
 from server.trials.verdict import Ruling, is_settled
 from server.versions import LoadedVersion, Versions
@@ -54,9 +54,7 @@ def save_rating(
     run = repository.run_for_rating(connection, hash_token(token))
     if run is None:
         raise RunUnknown("This visit is not known; please open the link you were given again.")
-    asked = run.evidence == "asked"
-    issued = issued_at(rating.evidence) if asked else None
-    trial = repository.trial(connection, run.id, rating.trial_index, issued)
+    trial = repository.trial(connection, run.id, rating.trial_index)
     if trial is None:
         raise TrialNotInRun(
             f"Trial {rating.trial_index} is not in this run, which has trials 0 to {run.trials_total - 1}."
@@ -69,23 +67,26 @@ def save_rating(
     kind = loaded.experiment.trial.kind
     answer = rating.answer.stored()
     known = _known(stored, rating_id, rating, answer)
-    most = loaded.experiment.playback.max_repeats
+    max_repeats = loaded.experiment.playback.max_repeats
     if known is not None:
-        again = not is_settled(trial.kind, known.play, known.verdict, most)
+        again = not is_settled(trial.kind, known.play, known.verdict, max_repeats)
         left = run.trials_total - run.trials_answered
         ruling = (known.verdict, known.verdict_rule)
         receipt = _receipt(rating_id, known.saved_at, ruling, again, left, run.status)
         receipt.warning = warnings.warning_of(connection, run.id, loaded.experiment, known.rating_id)
         return receipt, False
     _check(run, loaded, trial, rating)
-    if asked:
-        intake.take(connection, _answer(run, loaded, trial, rating, saved_at))
+    tally = trial.tally or Tally()
+    if run.evidence == "asked":
+        given = _answer(run, loaded, trial, rating, saved_at)
+        tally.clip_time = intake.take(connection, given, tally.clip_time)
     judge = checks.judge if trial.kind == "check" else served(kind).judge
     ruling = judge(loaded, trial.clips, rating)
     repository.add_rating(connection, _row(run, rating_id, kind, answer, rating, ruling, saved_at))
-    _count(connection, run.id, trial, _play(loaded, trial, rating, answer, ruling))
-    settles = is_settled(trial.kind, rating.play, ruling[0], most)
-    before = any(is_settled(trial.kind, row.play, row.verdict, most) for row in stored)
+    tally.add(_play(loaded, trial, rating, answer, ruling))
+    repository.keep_tally(connection, run.id, tally, is_new=trial.tally is None)
+    settles = is_settled(trial.kind, rating.play, ruling[0], max_repeats)
+    before = any(is_settled(trial.kind, row.play, row.verdict, max_repeats) for row in stored)
     if adapts and series.take(connection, run.id, loaded, trial, rating, ruling):
         before = True
     answered = int(settles and not before)
@@ -134,14 +135,9 @@ def _play(
     )
 
 
-def _count(connection: Connection, run: int, trial: repository.StoredTrial, play: Play) -> None:
-    """Add a play to the run's tally, in the transaction that stores it."""
-    tally = trial.tally or Tally()
-    tally.add(play)
-    repository.keep_tally(connection, run, tally, is_new=trial.tally is None)
-
-
-def _known(stored: list[Any], rating_id: str, rating: RatingIn, answer: dict[str, Any]) -> Any:
+def _known(
+    stored: list[repository.StoredRating], rating_id: str, rating: RatingIn, answer: dict[str, Any]
+) -> repository.StoredRating | None:
     """The stored rating this one repeats; RatingDiffers where it says something else."""
     for row in stored:
         same_play = (row.trial_index, row.play) == (rating.trial_index, rating.play)
@@ -161,7 +157,9 @@ def _short(answer: dict[str, Any]) -> Any:
     return next(iter(answer.values()))
 
 
-def _check(run: Any, loaded: LoadedVersion, trial: repository.StoredTrial, rating: RatingIn) -> None:
+def _check(
+    run: repository.RunForRating, loaded: LoadedVersion, trial: repository.StoredTrial, rating: RatingIn
+) -> None:
     if run.status != "active":
         raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
     if run.consented_at is None:
@@ -171,13 +169,17 @@ def _check(run: Any, loaded: LoadedVersion, trial: repository.StoredTrial, ratin
         checks.validate(loaded, trial.clips, rating)
     else:
         served(experiment.trial.kind).validate(experiment, trial.kind, rating)
-    most = experiment.playback.max_repeats + 1
-    if rating.play > most:
-        raise PlayOutOfRange(f"A clip is shown at most {most} times, got play {rating.play}.")
+    max_plays = experiment.playback.max_repeats + 1
+    if rating.play > max_plays:
+        raise PlayOutOfRange(f"A clip is shown at most {max_plays} times, got play {rating.play}.")
 
 
 def _answer(
-    run: Any, loaded: LoadedVersion, trial: repository.StoredTrial, rating: RatingIn, received_at: datetime
+    run: repository.RunForRating,
+    loaded: LoadedVersion,
+    trial: repository.StoredTrial,
+    rating: RatingIn,
+    received_at: datetime,
 ) -> Answer:
     rated = rating.answer.given
     clips = [loaded.clips[ident] for ident in trial.clips.values()]
@@ -194,7 +196,6 @@ def _answer(
         received_at=received_at,
         answered_at=_with_zone(rating.answered_at_client),
         evidence=rating.evidence,
-        spent=trial.spent,
     )
 
 
@@ -203,7 +204,7 @@ def _with_zone(moment: datetime | None) -> datetime | None:
 
 
 def _row(
-    run: Any,
+    run: repository.RunForRating,
     rating_id: str,
     kind: str,
     answer: dict[str, Any],
@@ -211,6 +212,8 @@ def _row(
     ruling: Ruling,
     saved_at: datetime,
 ) -> dict[str, Any]:
+    playback = dict(rating.playback)
+    clips: ShownClips | None = playback.pop("clips")
     return {
         "rating_id": rating_id,
         "study_run_id": run.id,
@@ -224,8 +227,8 @@ def _row(
         "changes": rating.changes,
         "comment": rating.comment,
         "answered_at_client": _with_zone(rating.answered_at_client),
-        **rating.playback.model_dump(exclude={"clips"}),
-        "playback": rating.playback.model_dump(include={"clips"}, exclude_none=True).get("clips"),
+        **playback,
+        "playback": clips and clips.model_dump(exclude_none=True),
         "focus_lost": None if rating.playback.focus_lost is None else rating.playback.focus_lost > 0,
         "px_per_mm": run.px_per_mm,
         "viewing_distance_mm": run.viewing_distance_mm,

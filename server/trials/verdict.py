@@ -27,9 +27,14 @@ ROUNDING = 0.05
 class Playback:
     """What the page measured of one play, over all its views; None where it could not.
 
-    frames_seen: different frames in the page's log of drawn frames, see `frames_in_log`.
-    clock_gap_ms, clock_late_ms: how unevenly the animation clock ran that drew the clip.
-    disturbances: how often each disturbed the views, by name.
+    Attributes
+    ----------
+    frames_seen : int or None
+        Different frames in the page's log of drawn frames, see `frames_in_log`.
+    clock_gap_ms, clock_late_ms : float or None
+        How unevenly the animation clock ran that drew the clip.
+    disturbances : mapping of str to int
+        How often each disturbed the views, by name.
     """
 
     method: Literal["webcodecs", "video", "none"]
@@ -59,10 +64,18 @@ def judge(
 
     Parameters
     ----------
-    rules: as declared. playback: as measured.
-    clip_sha256: of the clip assigned, None for trials without one.
-    frames: that should have been drawn, over all views. fps: of the clip, in frames a second.
-    rated: False where no rating could be given.
+    rules : PlaybackRules
+        As declared.
+    playback : Playback
+        As measured.
+    clip_sha256 : str or None
+        Of the clip assigned, None for trials without one.
+    frames : int
+        That should have been drawn, over all views.
+    fps : float
+        Of the clip, in frames a second.
+    rated : bool
+        False where no rating could be given.
     """
     if clip_sha256 is None:
         return GOOD if rated else ("failed", "not_rated")

@@ -6,6 +6,7 @@ from uuid import UUID
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
 
+from server.evidence.schemas import ViewEvidence
 from server.trials.measures import Count, DisturbanceCounts, FrameTime, Milliseconds, Role
 
 # The earliest and latest moments of the calendar have no UTC in it.
@@ -73,6 +74,9 @@ class ViewIn(BaseModel):
     )
     showings: Annotated[list[ViewShowing], Field(max_length=6)] | None = None
     disturbances: DisturbanceCounts = {}
+    evidence: ViewEvidence | None = Field(
+        default=None, description="The ticket of its play; an older page has none for views."
+    )
 
 
 class ViewsIn(BaseModel):

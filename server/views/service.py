@@ -1,16 +1,28 @@
 """Store views once each: what began is known though the page dies, what ended carries its frames."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
+from typing import Any
 
+from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
+from experiments.trials import KINDS
 from server.errors import Conflict
+from server.evidence.intake import Intake
+from server.evidence.views import Arrival, ArrivingView, take_views
 from server.models import StudyRun, View, ViewClip
-from server.trials.refusals import ConsentMissing
+from server.tokens import hash_token
+from server.trials.refusals import ConsentMissing, RunUnknown
 from server.trials.service import TrialNotInRun
+from server.versions import LoadedVersion, Versions
 from server.views import repository
 from server.views.frame_log import packed, unpacked
+from server.views.repository import RunOfViews, StoredView
 from server.views.schemas import SeenClip, ViewIn, ViewsIn, ViewsSaved, ViewState
+
+_Lengths = Mapping[int, Mapping[str, float]]
+"""Of each trial: how long its clips last in ms, by their hashes."""
 
 
 class ViewDiffers(Conflict):
@@ -19,84 +31,179 @@ class ViewDiffers(Conflict):
     code = "view_differs"
 
 
-def save_views(session: Session, run: StudyRun, sent: ViewsIn, moment: datetime) -> ViewsSaved:
-    """Begin and complete views of a locked run, all of them or none.
+def save_views(
+    versions: Versions, intake: Intake, connection: Connection, token: str, sent: ViewsIn, moment: datetime
+) -> ViewsSaved:
+    """Begin and complete views of a run, all of them or none.
 
     Also after the run's end, since the page sends late.
     """
+    run = repository.run_of_views(connection, hash_token(token))
+    if run is None:
+        raise RunUnknown(
+            "This visit is not known; please open the link you were given again.",
+            headers={"www-authenticate": "Bearer"},
+        )
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
-    trials = {view.trial_index for view in sent.views}
-    if unknown := trials - repository.trial_indices(session, run, trials):
-        raise TrialNotInRun(
-            f"Trial {min(unknown)} is not in this run, which has trials 0 to {run.trials_total - 1}."
-        )
-    known = {view.view_id: view for view in repository.stored(session, run, trials)}
+    known = {view.view_id: view for view in _known(connection, run, sent)}
     numbers = {(view.trial_index, view.number): view.view_id for view in known.values()}
     _refuse_others(sent, known, numbers)
-    run.last_seen_at = moment
+    news = [view for view in sent.views if _says_more(view, known.get(str(view.id)))]
+    clip_ms = _clip_ms(connection, versions.get(connection, run.version_id), run, news)
+    issued = _tickets(intake, connection, run, news, clip_ms, moment)
+    repository.mark_seen(connection, run.id, moment)
     begun = completed = 0
-    for view in sent.views:
-        row = known.get(str(view.id))
-        if row is None:
-            row = known[str(view.id)] = _begin(session, run, view, moment)
+    for view, issued_at, length in zip(news, issued, clip_ms, strict=True):
+        ident = str(view.id)
+        row = known.get(ident) or StoredView(ident, view.trial_index, view.number, completed=False)
+        if ident not in known:
+            repository.begin(connection, _begun(run, view, moment, issued_at))
             begun += 1
-        if (view.outcome or view.ended_at_client) and not row.completed:
-            _complete(session, row, view)
+        if _ends(view) and not row.completed:
+            _complete(connection, run, view, length)
+            row = row._replace(completed=True)
             completed += 1
+        known[ident] = row
     return ViewsSaved(begun=begun, completed=completed, saved_at=moment)
 
 
-def _refuse_others(sent: ViewsIn, known: dict[str, View], numbers: dict[tuple[int, int], str]) -> None:
+def _known(connection: Connection, run: RunOfViews, sent: ViewsIn) -> Iterable[StoredView]:
+    """The stored views of the trials that these are of; TrialNotInRun where the run has no such trial."""
+    for trial in sorted({view.trial_index for view in sent.views}):
+        stored = repository.stored(connection, run.id, trial)
+        if stored is None:
+            raise TrialNotInRun(
+                f"Trial {trial} is not in this run, which has trials 0 to {run.trials_total - 1}."
+            )
+        yield from stored
+
+
+def _refuse_others(sent: ViewsIn, known: dict[str, StoredView], numbers: dict[tuple[int, int], str]) -> None:
     for view in sent.views:
-        ident, place = str(view.id), (view.trial_index, view.number)
+        ident, position = str(view.id), (view.trial_index, view.number)
         row = known.get(ident)
-        if numbers.setdefault(place, ident) != ident or (row and (row.trial_index, row.number) != place):
+        if numbers.setdefault(position, ident) != ident or (
+            row and (row.trial_index, row.number) != position
+        ):
             raise ViewDiffers(
                 f"View {view.number} of trial {view.trial_index} is stored under another id, or this id is "
                 "that of another view; the first is kept."
             )
 
 
-def _begin(session: Session, run: StudyRun, view: ViewIn, moment: datetime) -> View:
-    row = View(
-        view_id=str(view.id),
-        study_run_id=run.id,
-        trial_index=view.trial_index,
-        number=view.number,
-        play=view.play or view.number,
-        started_at_client=view.started_at_client,
-        received_at=moment,
-        screen=view.screen,
-        completed=False,
-    )
-    repository.add(session, row)
-    return row
+def _ends(view: ViewIn) -> bool:
+    return bool(view.outcome or view.ended_at_client)
 
 
-def _complete(session: Session, row: View, view: ViewIn) -> None:
-    row.ended_at_client, row.completed, row.outcome = view.ended_at_client, True, view.outcome
-    row.disturbances = dict(view.disturbances)
-    if view.showings is not None:
-        row.showings = [showing.model_dump() for showing in view.showings]
-    clips = {clip.role: clip for clip in view.clips}
-    repository.add_clips(
-        session,
-        [
-            ViewClip(view=row.id, role=role, clip_sha256=clip.clip_sha256, frame_log=packed(clip.drawn))
-            for role, clip in clips.items()
-        ],
-    )
+def _says_more(view: ViewIn, row: StoredView | None) -> bool:
+    """Whether anything of a view is to be stored; what the outbox sends again is not looked at."""
+    return row is None or (_ends(view) and not row.completed)
+
+
+def _clip_ms(
+    connection: Connection, loaded: LoadedVersion, run: RunOfViews, views: Sequence[ViewIn]
+) -> list[float]:
+    """How long the longest clip of each view lasts that was shown to its end, 0 for others.
+
+    The clips are those of its trial: a view is no shorter for naming others. Where answers decide on clips,
+    they are those that it names of all that were chosen for the trial, since others may have been since.
+    """
+    shown = [_shows(view, run) for view in views]
+    trials = {view.trial_index for view, is_shown in zip(views, shown, strict=True) if is_shown}
+    own = {trial: _lengths(loaded, repository.clips_of_trial(connection, run.id, trial)) for trial in trials}
+    if KINDS[loaded.experiment.trial.kind].adapts:
+        chosen = {
+            trial: _lengths(loaded, repository.clips_chosen(connection, run.id, trial)) for trial in trials
+        }
+        longest = [_longest(view, own, chosen) for view in views]
+    else:
+        longest = [max(own.get(view.trial_index, {}).values(), default=0.0) for view in views]
+    return [length if is_shown else 0.0 for length, is_shown in zip(longest, shown, strict=True)]
+
+
+def _shows(view: ViewIn, run: RunOfViews) -> bool:
+    """Whether a view was shown to its end; pages that bring tickets with views say so of each that ended."""
+    untold = view.outcome is None and view.ended_at_client is not None
+    return view.outcome == "shown" or (run.view_tickets and untold)
+
+
+def _lengths(loaded: LoadedVersion, clips: Iterable[int]) -> dict[str, float]:
+    """How long clips last, by their hashes."""
+    hashes = (loaded.clips[ident].sha256 for ident in clips)
+    return {sha256: loaded.lengths[sha256] for sha256 in hashes}
+
+
+def _longest(view: ViewIn, own: _Lengths, chosen: _Lengths) -> float:
+    """Of the clips that a view names and that were chosen for its trial; of the trial's own without any."""
+    of_trial = own.get(view.trial_index, {})
+    known = {**chosen.get(view.trial_index, {}), **of_trial}
+    named = [known[clip.clip_sha256] for clip in view.clips if clip.clip_sha256 in known]
+    return max(named or of_trial.values(), default=0.0)
+
+
+def _tickets(
+    intake: Intake,
+    connection: Connection,
+    run: RunOfViews,
+    views: Sequence[ViewIn],
+    clip_ms: Sequence[float],
+    moment: datetime,
+) -> list[datetime | None]:
+    """When the ticket of each view was issued; None without one."""
+    if run.evidence != "asked":
+        return [None] * len(views)
+    arriving = [
+        ArrivingView(
+            view.trial_index,
+            view.play or view.number,
+            length,
+            view.ended_at_client or view.started_at_client,
+            view.evidence,
+        )
+        for view, length in zip(views, clip_ms, strict=True)
+    ]
+    arrival = Arrival(run.id, run.public_id, run.origin, run.view_tickets, moment, arriving)
+    return take_views(intake, connection, arrival)
+
+
+def _begun(run: RunOfViews, view: ViewIn, moment: datetime, issued_at: datetime | None) -> dict[str, Any]:
+    return {
+        "view_id": str(view.id),
+        "study_run_id": run.id,
+        "trial_index": view.trial_index,
+        "number": view.number,
+        "play": view.play or view.number,
+        "started_at_client": view.started_at_client,
+        "received_at": moment,
+        "completed": False,
+        "screen": view.screen,
+        "disturbances": {},
+        "issued_at": issued_at,
+    }
+
+
+def _complete(connection: Connection, run: RunOfViews, view: ViewIn, length: float) -> None:
+    ended = {
+        "ended_at_client": view.ended_at_client,
+        "outcome": view.outcome,
+        "disturbances": view.disturbances,
+        "showings": None if view.showings is None else [one.model_dump() for one in view.showings],
+        "clip_ms": length or None,
+    }
+    repository.complete(connection, run.id, str(view.id), ended)
+    for role, clip in {clip.role: clip for clip in view.clips}.items():
+        repository.add_clip(connection, run.id, str(view.id), role, clip.clip_sha256, packed(clip.drawn))
 
 
 def unanswered_views(session: Session, run: StudyRun) -> dict[int, list[ViewState]]:
     """The views of each trial that were begun for a play without an answer yet, in their order."""
     waiting = repository.unanswered(session, run)
     clips = repository.clips_of(session, waiting)
-    found: dict[int, list[ViewState]] = {}
+    by_trial: dict[int, list[ViewState]] = {}
     for view in waiting:
-        found.setdefault(view.trial_index, []).append(_state(view, clips.get(view.id, [])))
-    return found
+        by_trial.setdefault(view.trial_index, []).append(_state(view, clips.get(view.id, [])))
+    return by_trial
 
 
 def _state(view: View, clips: list[ViewClip]) -> ViewState:

@@ -9,11 +9,11 @@ from server.context import Services, ServicesDep
 from server.workspaces import repository
 
 
-def _must_make_studies(services: Services, who: Identity) -> Identity:
+def _must_make_studies(services: Services, identity: Identity) -> Identity:
     with services.database.read() as session:
-        if not repository.may_upload(session, who):
+        if not repository.may_upload(session, identity):
             raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
-    return who
+    return identity
 
 
 def recognise_uploader(request: Request, services: Services) -> Identity:
@@ -21,8 +21,8 @@ def recognise_uploader(request: Request, services: Services) -> Identity:
     return _must_make_studies(services, WRITER(request, services, None, None))
 
 
-def _uploader(services: ServicesDep, who: Writer) -> Identity:
-    return _must_make_studies(services, who)
+def _uploader(services: ServicesDep, identity: Writer) -> Identity:
+    return _must_make_studies(services, identity)
 
 
 Uploader = Annotated[Identity, Depends(_uploader)]

@@ -6,10 +6,10 @@ import typer
 from pydantic import TypeAdapter, ValidationError
 from rich.table import Table
 
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, out
-from server.models import RIGHTS, ROLES, Right, Role
+from server.cli_common import migrated_services, one_of, out
+from server.models import RIGHTS, ROLES
 from server.studies.lookup import find_study
 from server.workspaces import repository, service
 from server.workspaces.schemas import WorkspaceName
@@ -25,20 +25,6 @@ def register(parent: typer.Typer) -> None:
     parent.add_typer(app, name="workspace")
 
 
-def _role(word: str) -> Role:
-    known = next((one for one in ROLES if one == word), None)
-    if known is None:
-        raise InputError(f"expected the role {', '.join(ROLES)}, got '{word}'{did_you_mean(word, ROLES)}")
-    return known
-
-
-def _right(word: str) -> Right:
-    known = next((one for one in RIGHTS if one == word), None)
-    if known is None:
-        raise InputError(f"expected rights of {', '.join(RIGHTS)}, got '{word}'{did_you_mean(word, RIGHTS)}")
-    return known
-
-
 @app.command("list")
 def list_workspaces() -> None:
     """List the workspaces with their members and number of studies.
@@ -49,7 +35,9 @@ def list_workspaces() -> None:
         table = Table("workspace", "title", "studies", "second factor", "members")
         counts = repository.counts(session)
         for one in repository.every(session):
-            people = ", ".join(f"{who.name} ({role})" for who, role in repository.members(session, one))
+            people = ", ".join(
+                f"{account.name} ({role})" for account, role in repository.members(session, one)
+            )
             needed = "required" if one.second_factor_required else ""
             table.add_row(one.name, one.title, str(counts.get(one.id, (0, 0))[1]), needed, people)
         out.print(
@@ -86,10 +74,10 @@ def set_member(
 
     Example: server workspace member perception-lab ada --role owner
     """
-    wanted = None if remove else _role(role)
+    new_role = None if remove else one_of(ROLES, role, "the role")
     with migrated_services() as services, services.database.write() as session:
-        found = service.managed(session, workspace, OPERATOR)
-        service.set_member(session, found, account, wanted, OPERATOR)
+        known = service.managed(session, workspace, OPERATOR)
+        service.set_member(session, known, account, new_role, OPERATOR)
     out.print(f"workspace {workspace}: {account} {'is out' if remove else f'is {role}'}")
 
 
@@ -103,10 +91,10 @@ def grant(
 
     Example: server workspace grant exp3 ada --rights view,export
     """
-    wanted = [_right(word.strip()) for word in rights.split(",") if word.strip()]
+    given = [one_of(RIGHTS, word.strip(), "rights of") for word in rights.split(",") if word.strip()]
     with migrated_services() as services, services.database.write() as session:
-        service.grant(session, find_study(session, study, OPERATOR, "own"), account, wanted, OPERATOR)
-    out.print(f"study {study}: {account} may {', '.join(wanted) or 'do what the role allows'}")
+        service.grant(session, find_study(session, study, OPERATOR, "own"), account, given, OPERATOR)
+    out.print(f"study {study}: {account} may {', '.join(given) or 'do what the role allows'}")
 
 
 @app.command("move")
@@ -116,6 +104,6 @@ def move(study: StudyArgument, workspace: WorkspaceArgument) -> None:
     Example: server workspace move exp3 perception-lab
     """
     with migrated_services() as services, services.database.write() as session:
-        found = find_study(session, study, OPERATOR, "own")
-        service.move(session, found, service.find_workspace(session, workspace), OPERATOR)
+        known = find_study(session, study, OPERATOR, "own")
+        service.move(session, known, service.find_workspace(session, workspace), OPERATOR)
     out.print(f"study {study}: in the workspace {workspace}")

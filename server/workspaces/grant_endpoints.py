@@ -13,22 +13,22 @@ router = APIRouter(prefix="/api/admin/studies/{study}", tags=["workspaces"], res
 
 
 @router.get("/grants")
-def list_grants(services: ServicesDep, who: Myself, study: str) -> list[GrantOut]:
+def list_grants(services: ServicesDep, identity: Myself, study: str) -> list[GrantOut]:
     """The rights granted on a study."""
     with services.database.read() as session:
-        return service.grants_on(session, find_study(session, study, who, "own"))
+        return service.grants_on(session, find_study(session, study, identity, "own"))
 
 
 @router.put("/grants/{account}", status_code=204)
-def set_grant(services: ServicesDep, who: Myself, study: str, account: str, body: SetGrant) -> None:
+def set_grant(services: ServicesDep, identity: Myself, study: str, account: str, body: SetGrant) -> None:
     """Grant an account rights on a study, beside those it has by its role; an empty list takes them back."""
     with services.database.write() as session:
-        service.grant(session, find_study(session, study, who, "own"), account, body.rights, who)
+        service.grant(session, find_study(session, study, identity, "own"), account, body.rights, identity)
 
 
 @router.put("/workspace", status_code=204)
-def move_study(services: ServicesDep, who: Myself, study: str, body: MoveStudy) -> None:
+def move_study(services: ServicesDep, identity: Myself, study: str, body: MoveStudy) -> None:
     """Put a study into another workspace in which one may make studies."""
     with services.database.write() as session:
-        found = find_study(session, study, who, "own")
-        service.move(session, found, service.workspace_for(session, who, body.workspace), who)
+        known = find_study(session, study, identity, "own")
+        service.move(session, known, service.workspace_for(session, identity, body.workspace), identity)

@@ -21,47 +21,49 @@ from server.models import (
     WorkspaceMember,
 )
 from server.repository import insert_once
-from server.workspaces.rights import MAKING_STUDIES, effective
+from server.workspaces.rights import MAKING_STUDIES, effective, ordered
 
 
-def seen_by(who: Identity | Operator) -> ColumnElement[bool]:
+def seen_by(identity: Identity | Operator) -> ColumnElement[bool]:
     """Holds for the studies that somebody may see: of her workspaces, or granted to her."""
-    if isinstance(who, Operator):
+    if isinstance(identity, Operator):
         return true()
-    mine = select(WorkspaceMember.workspace_id).where(WorkspaceMember.account_id == who.account_id)
-    granted = select(StudyGrant.study_id).where(StudyGrant.account_id == who.account_id)
+    mine = select(WorkspaceMember.workspace_id).where(WorkspaceMember.account_id == identity.account_id)
+    granted = select(StudyGrant.study_id).where(StudyGrant.account_id == identity.account_id)
     return Study.workspace_id.in_(mine) | Study.id.in_(granted)
 
 
-def opened_to(who: Identity | Operator) -> ColumnElement[bool]:
+def opened_to(identity: Identity | Operator) -> ColumnElement[bool]:
     """As `seen_by`, without the studies that wait for a second factor."""
-    if isinstance(who, Operator) or who.second_factor:
-        return seen_by(who)
+    if isinstance(identity, Operator) or identity.second_factor:
+        return seen_by(identity)
     closed = select(Workspace.id).where(Workspace.second_factor_required.is_(True))
-    return seen_by(who) & (Study.workspace_id.is_(None) | Study.workspace_id.not_in(closed))
+    return seen_by(identity) & (Study.workspace_id.is_(None) | Study.workspace_id.not_in(closed))
 
 
-def study_seen_by(session: Session, name: str, who: Identity | Operator) -> Study | None:
+def study_seen_by(session: Session, name: str, identity: Identity | Operator) -> Study | None:
     """The study called `name` where she may see it."""
-    return session.scalar(select(Study).where(Study.name == name, seen_by(who)))
+    return session.scalar(select(Study).where(Study.name == name, seen_by(identity)))
 
 
-def study_names_seen_by(session: Session, who: Identity | Operator) -> Sequence[str]:
+def study_names_seen_by(session: Session, identity: Identity | Operator) -> Sequence[str]:
     """The names of the studies she may see."""
-    return session.scalars(select(Study.name).where(seen_by(who))).all()
+    return session.scalars(select(Study.name).where(seen_by(identity))).all()
 
 
-def studies_opened_to(session: Session, who: Identity | Operator) -> list[Study]:
+def studies_opened_to(session: Session, identity: Identity | Operator) -> list[Study]:
     """The studies that are open to her, the latest first."""
-    return list(session.scalars(select(Study).where(opened_to(who)).order_by(Study.id.desc())))
+    return list(session.scalars(select(Study).where(opened_to(identity)).order_by(Study.id.desc())))
 
 
-def rights_on(session: Session, studies: Iterable[Study], who: Identity) -> dict[int, frozenset[Right]]:
+def rights_on(session: Session, studies: Iterable[Study], identity: Identity) -> dict[int, frozenset[Right]]:
     """Study number -> her rights on it."""
     listed = list(studies)
-    roles = roles_of(session, who.account_id)
+    roles = roles_of(session, identity.account_id)
     granted: dict[int, set[Right]] = defaultdict(set)
-    query = select(StudyGrant.study_id, StudyGrant.granted).where(StudyGrant.account_id == who.account_id)
+    query = select(StudyGrant.study_id, StudyGrant.granted).where(
+        StudyGrant.account_id == identity.account_id
+    )
     for study_id, word in session.execute(query):
         granted[study_id].add(RIGHTS[RIGHTS.index(word)])
     return {one.id: effective(roles.get(one.workspace_id or 0), granted[one.id]) for one in listed}
@@ -86,24 +88,24 @@ def workspace_of(session: Session, study: Study) -> Workspace | None:
     return session.get(Workspace, study.workspace_id) if study.workspace_id is not None else None
 
 
-def workspaces_for_new_studies(session: Session, who: Identity | Operator) -> list[Workspace]:
+def workspaces_for_new_studies(session: Session, identity: Identity | Operator) -> list[Workspace]:
     """Where she may make studies."""
     query = select(Workspace).order_by(Workspace.id)
-    if isinstance(who, Identity):
+    if isinstance(identity, Identity):
         query = query.join(WorkspaceMember).where(
-            WorkspaceMember.account_id == who.account_id, WorkspaceMember.role.in_(MAKING_STUDIES)
+            WorkspaceMember.account_id == identity.account_id, WorkspaceMember.role.in_(MAKING_STUDIES)
         )
-        if not who.second_factor:
+        if not identity.second_factor:
             query = query.where(Workspace.second_factor_required.is_(False))
     return list(session.scalars(query))
 
 
-def may_upload(session: Session, who: Identity) -> bool:
+def may_upload(session: Session, identity: Identity) -> bool:
     """True where she may make studies somewhere, or edit one."""
     editing = select(StudyGrant.study_id).where(
-        StudyGrant.account_id == who.account_id, StudyGrant.granted.in_(("edit", "own"))
+        StudyGrant.account_id == identity.account_id, StudyGrant.granted.in_(("edit", "own"))
     )
-    return bool(workspaces_for_new_studies(session, who)) or session.scalar(editing.limit(1)) is not None
+    return bool(workspaces_for_new_studies(session, identity)) or session.scalar(editing.limit(1)) is not None
 
 
 def default_workspace(session: Session) -> Workspace:
@@ -117,7 +119,13 @@ def _named(name: str) -> Select[Workspace]:
 
 
 def find(session: Session, name: str, *, lock: bool = False) -> Workspace | None:
-    """The workspace called `name`; lock: hold it until the transaction ends."""
+    """The workspace called `name`.
+
+    Parameters
+    ----------
+    lock : bool, optional
+        Hold it until the transaction ends.
+    """
     return session.scalar(_named(name).with_for_update() if lock else _named(name))
 
 
@@ -140,16 +148,6 @@ def members(session: Session, workspace: Workspace) -> list[tuple[Account, Role]
     query = select(Account, WorkspaceMember.role).join(WorkspaceMember)
     rows = session.execute(query.where(WorkspaceMember.workspace_id == workspace.id).order_by(Account.name))
     return [(account, ROLES[ROLES.index(role)]) for account, role in rows]
-
-
-def account_called(session: Session, name: str) -> Account | None:
-    """The account of this name, letters small or large."""
-    return session.scalar(select(Account).where(func.lower(Account.name) == name.lower()))
-
-
-def account_numbered(session: Session, number: int) -> Account | None:
-    """The account of this number."""
-    return session.get(Account, number)
 
 
 def delete_workspace(session: Session, workspace: Workspace) -> None:
@@ -195,7 +193,7 @@ def grants(session: Session, study: Study) -> dict[str, list[Right]]:
     listed: dict[str, list[Right]] = {}
     for name, word in session.execute(query.order_by(Account.name)):
         listed.setdefault(name, []).append(RIGHTS[RIGHTS.index(word)])
-    return {name: [one for one in RIGHTS if one in given] for name, given in listed.items()}
+    return {name: ordered(given) for name, given in listed.items()}
 
 
 def set_grants(

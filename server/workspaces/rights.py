@@ -7,7 +7,7 @@ export: downloads, the files of reports, and the answers of single persons.
 own: recruiters' ids, grants, the workspace a study belongs to; whoever owns a study may do all of it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Final
 
 from server.errors import ApiError
@@ -44,3 +44,12 @@ def effective(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:
     if "own" in rights:
         return frozenset(RIGHTS)
     return rights | {"view"} if rights else rights
+
+
+def ordered(rights: Collection[Right]) -> list[Right]:
+    """Rights in the order in which they are told.
+
+    >>> ordered({"own", "view"})
+    ['view', 'own']
+    """
+    return [one for one in RIGHTS if one in rights]

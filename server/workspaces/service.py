@@ -6,16 +6,18 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
+from server.accounts import repository as accounts
 from server.accounts.audit import record
-from server.accounts.identity import Identity, NotAllowed, Operator
+from server.accounts.identity import Identity, NotAllowed, Operator, account_of, must_be_fresh
 from server.errors import Conflict, Invalid, NotFound
-from server.models import DEFAULT_WORKSPACE, RIGHTS, Account, Right, Role, Study, Workspace
+from server.models import DEFAULT_WORKSPACE, Account, Right, Role, Study, Workspace
 from server.workspaces import repository
+from server.workspaces.rights import ordered
 from server.workspaces.schemas import GrantOut, MemberOut, WorkspaceOut
 
 
 @dataclass(frozen=True)
-class Place:
+class Membership:
     """Where an account belongs, and as what."""
 
     workspace: Workspace
@@ -30,16 +32,20 @@ class Standing:
     rights: list[Right]
 
 
-def standing_of(session: Session, studies: Sequence[Study], who: Identity) -> dict[int, Standing]:
+def standing_of(session: Session, studies: Sequence[Study], identity: Identity) -> dict[int, Standing]:
     """Study number -> its workspace and her rights."""
     names = {workspace.id: workspace.name for workspace in repository.every(session)}
-    rights = repository.rights_on(session, studies, who)
+    rights = repository.rights_on(session, studies, identity)
     return {
-        study.id: Standing(
-            names.get(study.workspace_id or 0, ""), [one for one in RIGHTS if one in rights[study.id]]
-        )
+        study.id: Standing(names.get(study.workspace_id or 0, ""), ordered(rights[study.id]))
         for study in studies
     }
+
+
+def standing_on(session: Session, study: Study, rights: frozenset[Right]) -> Standing:
+    """Where one study belongs, with the rights on it that are known."""
+    workspace = repository.workspace_of(session, study)
+    return Standing(workspace.name if workspace else "", ordered(rights))
 
 
 def find_workspace(session: Session, name: str, *, lock: bool = False) -> Workspace:
@@ -53,9 +59,9 @@ def find_workspace(session: Session, name: str, *, lock: bool = False) -> Worksp
     return workspace
 
 
-def workspace_for(session: Session, who: Identity, name: str | None) -> Workspace:
+def workspace_for(session: Session, identity: Identity, name: str | None) -> Workspace:
     """Where a new study goes: the workspace named, or the only one (else the default one) she may use."""
-    open_ones = {one.name: one for one in repository.workspaces_for_new_studies(session, who)}
+    open_ones = {one.name: one for one in repository.workspaces_for_new_studies(session, identity)}
     if not open_ones:
         raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
     if name is not None:
@@ -69,15 +75,15 @@ def workspace_for(session: Session, who: Identity, name: str | None) -> Workspac
     raise Invalid(f"Say in which workspace: {', '.join(open_ones)}.")
 
 
-def place_of_copy(session: Session, study: Study, who: Identity, name: str | None) -> Workspace:
+def place_of_copy(session: Session, study: Study, identity: Identity, name: str | None) -> Workspace:
     """Where a copy of a study goes: into the workspace named, else beside its source.
 
     Invalid where she may make no studies beside it and names no other: a copy opens the declaration to
     another laboratory, which nothing but her word does.
     """
-    own = {one.id: one for one in repository.workspaces_for_new_studies(session, who)}
+    own = {one.id: one for one in repository.workspaces_for_new_studies(session, identity)}
     if name is not None or not own:
-        return workspace_for(session, who, name)
+        return workspace_for(session, identity, name)
     if study.workspace_id not in own:
         names = ", ".join(one.name for one in own.values())
         raise Invalid(
@@ -92,9 +98,9 @@ def own_workspaces(session: Session, account_id: int) -> list[tuple[Workspace, R
     return repository.workspaces_of(session, account_id)
 
 
-def listed(session: Session, who: Identity) -> list[WorkspaceOut]:
+def listed(session: Session, identity: Identity) -> list[WorkspaceOut]:
     """The workspaces she belongs to; all of them where she manages the server."""
-    roles, counts = repository.roles_of(session, who.account_id), repository.counts(session)
+    roles, counts = repository.roles_of(session, identity.account_id), repository.counts(session)
     return [
         WorkspaceOut(
             name=one.name,
@@ -105,7 +111,7 @@ def listed(session: Session, who: Identity) -> list[WorkspaceOut]:
             studies=counts.get(one.id, (0, 0))[1],
         )
         for one in repository.every(session)
-        if one.id in roles or who.role == "owner"
+        if one.id in roles or identity.role == "owner"
     ]
 
 
@@ -128,26 +134,30 @@ def grants_on(session: Session, study: Study) -> list[GrantOut]:
     return [GrantOut(account=name, rights=rights) for name, rights in given.items()]
 
 
-def managed(session: Session, name: str, who: Identity | Operator) -> Workspace:
+def managed(session: Session, name: str, identity: Identity | Operator) -> Workspace:
     """A workspace she may manage: her own, or any where she manages the server.
 
     One that asks for a second factor is managed by nobody without, the server's owners included; the command
     line needs none. The row is held until the transaction ends, so that two owners do not take each other out
     at once.
     """
-    if isinstance(who, Operator):
+    if isinstance(identity, Operator):
         return find_workspace(session, name, lock=True)
     workspace = (
-        find_workspace(session, name, lock=True) if who.role == "owner" else _owned(session, name, who)
+        find_workspace(session, name, lock=True)
+        if identity.role == "owner"
+        else _owned(session, name, identity)
     )
-    if workspace.second_factor_required and not who.second_factor:
+    if workspace.second_factor_required and not identity.second_factor:
         raise NotAllowed(f"The workspace '{name}' asks for a second factor; set one up under My account.")
     return workspace
 
 
-def _owned(session: Session, name: str, who: Identity) -> Workspace:
+def _owned(session: Session, name: str, identity: Identity) -> Workspace:
     workspace = repository.find(session, name, lock=True)
-    role = repository.roles_of(session, who.account_id).get(workspace.id) if workspace is not None else None
+    role = (
+        repository.roles_of(session, identity.account_id).get(workspace.id) if workspace is not None else None
+    )
     if workspace is None or role is None:
         raise NotFound(f"There is no workspace '{name[:60]}'.")
     if role != "owner":
@@ -155,55 +165,57 @@ def _owned(session: Session, name: str, who: Identity) -> Workspace:
     return workspace
 
 
-def create(session: Session, name: str, title: str, who: Identity | Operator) -> Workspace:
+def create(session: Session, name: str, title: str, identity: Identity | Operator) -> Workspace:
     """Make a workspace; the account that makes it owns it."""
     if repository.find(session, name) is not None:
         raise Conflict(f"There is already a workspace called '{name}'; choose another name.")
-    author = who if isinstance(who, Identity) else None
-    workspace = Workspace(name=name, title=title, created_by=author.account_id if author else None)
+    workspace = Workspace(name=name, title=title, created_by=identity.account_id)
     session.add(workspace)
     session.flush()
-    record(session, author, "workspace made", "workspace", name)
-    if author is not None:
-        account = repository.account_numbered(session, author.account_id)
-        if account is not None:
-            repository.set_member(session, workspace, account, "owner")
+    record(session, identity, "workspace made", "workspace", name)
+    if isinstance(identity, Identity):
+        repository.set_member(session, workspace, account_of(session, identity), "owner")
     return workspace
 
 
 def change(
-    session: Session, workspace: Workspace, title: str, second_factor_required: bool, who: Identity
+    session: Session, workspace: Workspace, title: str, second_factor_required: bool, identity: Identity
 ) -> None:
-    """Give a workspace another title, or ask its people for a second factor."""
-    if second_factor_required and not who.second_factor:
+    """Give a workspace another title, or ask its people for a second factor.
+
+    No longer to ask for one needs a sign-in of a short while ago: it would outlive a stolen session.
+    """
+    if workspace.second_factor_required and not second_factor_required:
+        must_be_fresh(identity)
+    if second_factor_required and not identity.second_factor:
         raise Conflict("Set up a second factor of your own first, or you would shut yourself out.")
     workspace.title, workspace.second_factor_required = title, second_factor_required
     record(
-        session, who, "workspace changed", "workspace", workspace.name,
+        session, identity, "workspace changed", "workspace", workspace.name,
         title=title, second_factor_required=second_factor_required,
     )  # fmt: skip
 
 
-def delete(session: Session, workspace: Workspace, who: Identity) -> None:
+def delete(session: Session, workspace: Workspace, identity: Identity) -> None:
     """Remove a workspace that holds no study."""
     if repository.counts(session).get(workspace.id, (0, 0))[1]:
         raise Conflict("The workspace holds studies; move them to another one first.")
     if workspace.name == DEFAULT_WORKSPACE:
         raise Conflict("The default workspace stays; give it another title if you like.")
-    record(session, who, "workspace deleted", "workspace", workspace.name)
+    record(session, identity, "workspace deleted", "workspace", workspace.name)
     repository.delete_workspace(session, workspace)
 
 
 def account_named(session: Session, name: str) -> Account:
     """The account of this name; NotFound where there is none (names are not guessed at)."""
-    account = repository.account_called(session, name)
+    account = accounts.account_named(session, name)
     if account is None:
         raise NotFound(f"There is no account '{name[:100]}'; invite the person first.")
     return account
 
 
 def set_member(
-    session: Session, workspace: Workspace, name: str, role: Role | None, who: Identity | Operator
+    session: Session, workspace: Workspace, name: str, role: Role | None, identity: Identity | Operator
 ) -> None:
     """Take somebody into a workspace, change her role, or (None) take her out; one owner must remain."""
     account = account_named(session, name)
@@ -215,23 +227,21 @@ def set_member(
     if owners and not repository.number_of_owners(session, workspace):
         raise Conflict("One owner must remain; make another member an owner first.")
     action = "member removed" if role is None else "member set"
-    author = who if isinstance(who, Identity) else None
-    record(session, author, action, "workspace", workspace.name, account=account.name, role=role)
+    record(session, identity, action, "workspace", workspace.name, account=account.name, role=role)
 
 
 def grant(
-    session: Session, study: Study, name: str, rights: Sequence[Right], who: Identity | Operator
+    session: Session, study: Study, name: str, rights: Sequence[Right], identity: Identity | Operator
 ) -> None:
     """Give somebody exactly these rights on a study beside those of her role; none takes them all back."""
     account = account_named(session, name)
-    author = who if isinstance(who, Identity) else None
-    repository.set_grants(session, study, account, rights, author.account_id if author else None)
-    given = [one for one in RIGHTS if one in rights]
-    record(session, author, "rights granted", "study", study.name, account=account.name, rights=given)
+    repository.set_grants(session, study, account, rights, identity.account_id)
+    record(
+        session, identity, "rights granted", "study", study.name, account=account.name, rights=ordered(rights)
+    )
 
 
-def move(session: Session, study: Study, workspace: Workspace, who: Identity | Operator) -> None:
+def move(session: Session, study: Study, workspace: Workspace, identity: Identity | Operator) -> None:
     """Put a study into another workspace; grants stay."""
     study.workspace_id = workspace.id
-    author = who if isinstance(who, Identity) else None
-    record(session, author, "study moved", "study", study.name, workspace=workspace.name)
+    record(session, identity, "study moved", "study", study.name, workspace=workspace.name)

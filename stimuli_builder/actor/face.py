@@ -84,8 +84,10 @@ def landmarks(closure: Values, head: Values) -> Values:
 
     Parameters
     ----------
-    closure : (2,) of the image-left and image-right eye.
-    head : (4,) shift x, shift y, turn, scale.
+    closure : float64 array (2,)
+        Of the image-left and image-right eye.
+    head : float64 array (4,)
+        Shift x, shift y, turn, scale.
     """
     parts = []
     for eye, centre in enumerate(EYE_CENTRES):

@@ -30,9 +30,12 @@ class Blink:
 
     Attributes
     ----------
-    apex_s : time of greatest closure.
-    down_s, up_s : from 5% of the amplitude to the apex, and from the apex to 95% recovery.
-    depth : closure at the apex, 1 for a complete blink.
+    apex_s : float
+        Time of greatest closure.
+    down_s, up_s : float
+        From 5% of the amplitude to the apex, and from the apex to 95% recovery.
+    depth : float
+        Closure at the apex, 1 for a complete blink.
     """
 
     apex_s: float
@@ -87,12 +90,18 @@ class Course:
 
     Attributes
     ----------
-    closure : (samples, 2), per eye: 0 open, 1 closed.
-    blink : int, blink number from 1, 0 between blinks.
-    phase : 'open', 'down' or 'up'.
-    head : (samples, 4): shift x and y in pixels, turn in radians, scale.
-    gaze : (samples, 2), shift of the iris in eye widths.
-    light : gain of the lighting.
+    closure : float64 array (samples, 2)
+        Per eye: 0 open, 1 closed.
+    blink : int
+        Blink number from 1, 0 between blinks.
+    phase : str array
+        'open', 'down' or 'up'.
+    head : float64 array (samples, 4)
+        Shift x and y in pixels, turn in radians, scale.
+    gaze : float64 array (samples, 2)
+        Shift of the iris in eye widths.
+    light : float64 array
+        Gain of the lighting.
     """
 
     times_s: Values

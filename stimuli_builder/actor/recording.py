@@ -189,7 +189,7 @@ def choose_frames(now: Course, count: int, within: int = 20_000) -> list[int]:
     while len(chosen) < min(count, len(numbers)):
         distance = np.minimum(distance, ((features - features[chosen[-1]]) ** 2).sum(1))
         chosen.append(int(distance.argmax()))
-    return sorted(int(numbers[place]) for place in chosen)
+    return sorted(int(numbers[index]) for index in chosen)
 
 
 def label_points(actor: Actor, count: int, noise_px: float) -> dict[int, Values]:

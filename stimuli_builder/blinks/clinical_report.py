@@ -41,8 +41,10 @@ def report_text(
 
     Parameters
     ----------
-    frame : the blinks table, reviewed.
-    doubts : lines about the recording's quality beside those that are counted here.
+    frame : DataFrame
+        The blinks table, reviewed.
+    doubts : sequence of str
+        Lines about the recording's quality beside those that are counted here.
     """
     accepted = frame[frame["accepted"]]
     environment = Environment(

@@ -64,8 +64,10 @@ def blinks_of(
 
     Parameters
     ----------
-    edges : by minimum frame, an (onset, end) of a person's that takes the place of the labelled one.
-    recognised : what `recognise` told of this series; None labels by the paper's rule with `options`.
+    edges : mapping of int to (int, int), optional
+        By minimum frame, an (onset, end) of a person's that takes the place of the labelled one.
+    recognised : Recognised, optional
+        What `recognise` told of this series; None labels by the paper's rule with `options`.
     """
     if recognised is None:
         labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)

@@ -74,8 +74,8 @@ def find_blinks(
     for start, stop in runs(np.isfinite(distance)):
         if stop - start > scaled_frames(options.gradient_frames + options.filter_frames, fps) + 2:
             piece = _Piece(distance[start:stop], fps, options, is_px=is_px)
-            found, lost = piece.label(offset=start)
-            blinks += found
+            labelled, lost = piece.label(offset=start)
+            blinks += labelled
             refused += lost
     return blinks, refused
 
@@ -123,8 +123,8 @@ class _Piece:
         """Minima at least `minimum_depth` of the local opening deep, and no mere ripple of a deeper one."""
         relative = self.smooth / self.opening
         depth = self.options.minimum_depth
-        found, _ = find_peaks(-relative, height=depth - 1, prominence=depth / 2)
-        return [int(minimum) for minimum in found]
+        minima, _ = find_peaks(-relative, height=depth - 1, prominence=depth / 2)
+        return [int(minimum) for minimum in minima]
 
     def _baseline(self, minimum: int) -> float:
         first = max(0, minimum - self.baseline_reach)

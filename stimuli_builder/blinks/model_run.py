@@ -44,7 +44,7 @@ def fit_model(
 def training_profiles(tables: Sequence[Path], eyes: str = "auto") -> list[BlinkProfile]:
     """Return the profiles to learn from: the tables', the shipped library's where there are none."""
     if tables:
-        found = [
+        profiles = [
             replace(
                 profile,
                 profile_id=f"{table.stem}:{profile.profile_id}" if len(tables) > 1 else profile.profile_id,
@@ -53,11 +53,11 @@ def training_profiles(tables: Sequence[Path], eyes: str = "auto") -> list[BlinkP
             for profile in read_profile_table(table)
         ]
     else:
-        found = [*load_library(), *load_library(paired=True)]
-    pairs = [profile for profile in found if profile.closure_other is not None]
+        profiles = [*load_library(), *load_library(paired=True)]
+    pairs = [profile for profile in profiles if profile.closure_other is not None]
     together = eyes == "both" or (eyes == "auto" and bool(tables) and len(pairs) >= 3)
     if not together:
-        return [profile for profile in found if profile.closure_other is None]
+        return [profile for profile in profiles if profile.closure_other is None]
     if not pairs:
         raise InputError("--eyes both: no blink was seen in both eyes; label both columns in one call")
     return pairs

@@ -63,8 +63,8 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
     grid = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(grid):
         stop_s = duration_s if row == rows - 1 else (row + 1) * row_s
-        for place, eye in enumerate(eyes):
-            _series_row(axes, eye, row * row_s, stop_s, place, rejected)
+        for position, eye in enumerate(eyes):
+            _series_row(axes, eye, row * row_s, stop_s, position, rejected)
         axes.set_xlim(row * row_s, stop_s if rows == 1 else max(stop_s, (row + 1) * row_s))
         axes.spines[["top", "right"]].set_visible(False)
     unit = "px" if eyes[0].series.is_px else "as recorded"
@@ -76,9 +76,9 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
 
 
 def _series_row(
-    axes: "Axes", eye: EyeBlinks, start_s: float, stop_s: float, place: int, rejected: set[tuple[str, int]]
+    axes: "Axes", eye: EyeBlinks, start_s: float, stop_s: float, position: int, rejected: set[tuple[str, int]]
 ) -> None:
-    colour = (BLUE, AMBER, GREEN, GREY)[place % 4]
+    colour = (BLUE, AMBER, GREEN, GREY)[position % 4]
     fps = eye.series.fps
     first, last = int(start_s * fps), min(int(np.ceil(stop_s * fps)) + 1, eye.smooth.size)
     step = max(1, (last - first) // 6000)
@@ -96,7 +96,7 @@ def _series_row(
         label = f"({blink.number})" if out else f"{blink.number}"
         axes.annotate(
             label,
-            (blink.end_s, (0.7 - 0.2 * place) * top),
+            (blink.end_s, (0.7 - 0.2 * position) * top),
             xytext=(3, 0),
             textcoords="offset points",
             fontsize=7,
@@ -108,8 +108,8 @@ def sequence_figure(blinks: pd.DataFrame) -> "Figure":
     """Main sequence: peak closing and opening speed over amplitude, and closure over duration."""
     figure = _figure(12, 4)
     left, right = figure.subplots(1, 2)
-    for place, (column, part) in enumerate(blinks.groupby("column", sort=False)):
-        colour = (BLUE, AMBER, GREEN, GREY)[place % 4]
+    for position, (column, part) in enumerate(blinks.groupby("column", sort=False)):
+        colour = (BLUE, AMBER, GREEN, GREY)[position % 4]
         left.scatter(part["amplitude"], part["peak_closing_velocity"], 18, colour, label=f"{column}, closing")
         left.scatter(
             part["amplitude"], part["peak_opening_velocity"], 18, "none", edgecolors=colour,

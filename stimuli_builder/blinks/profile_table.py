@@ -63,8 +63,8 @@ def read_profile_table(path: Path) -> list[BlinkProfile]:
 
 
 def _profile(profile_id: str, rows: pd.DataFrame, path: Path) -> BlinkProfile:
-    place = rows["from_minimum_frames"].to_numpy()
-    if place.dtype.kind != "i" or (np.diff(place) != 1).any() or not place[0] < 0 < place[-1]:
+    offset = rows["from_minimum_frames"].to_numpy()
+    if offset.dtype.kind != "i" or (np.diff(offset) != 1).any() or not offset[0] < 0 < offset[-1]:
         raise InputError(
             f"{path.name}: profile {profile_id}: from_minimum_frames must rise by 1 from below 0 to above 0"
         )
@@ -83,9 +83,9 @@ def _profile(profile_id: str, rows: pd.DataFrame, path: Path) -> BlinkProfile:
         closure_other=column("closure_other"),
         lower_up_mm=column("lower_up_mm"),
         lower_nasal_mm=column("lower_nasal_mm"),
-        minimum_index=int(-place[0]),
-        down_frames=int(-place[0]),
-        up_frames=int(place[-1]),
+        minimum_index=int(-offset[0]),
+        down_frames=int(-offset[0]),
+        up_frames=int(offset[-1]),
         amplitude=float(np.ptp(closure)),
         source=f"profile table {path.name}",
         eye=EYES.get(str(eye) if isinstance(eye, str) else ""),

@@ -42,15 +42,15 @@ def recognised_blinks(
 def _parted(events: Sequence[LidEvent], smooth: Array, fps: float) -> list[tuple[LidEvent, bool]]:
     """Part blinks that overlap at the widest opening between them."""
     parted = [(event, False) for event in events]
-    for place, (first, second) in enumerate(pairwise(list(events))):
+    for index, (first, second) in enumerate(pairwise(list(events))):
         if first.end_s <= second.onset_s:
             continue
         between = smooth[first.frame : second.frame + 1]
         if between.size < 3 or not np.isfinite(between).any():
             continue
         widest = (first.frame + int(np.nanargmax(between))) / fps
-        parted[place] = (replace(parted[place][0], end_s=widest), True)
-        parted[place + 1] = (replace(second, onset_s=widest), True)
+        parted[index] = (replace(parted[index][0], end_s=widest), True)
+        parted[index + 1] = (replace(second, onset_s=widest), True)
     return parted
 
 

@@ -117,12 +117,12 @@ def parse_choice(text: str, decision: Decision, blinks: Sequence[MeasuredBlink])
         raise InputError(f"--{decision} {text}: blink {digits} of which column? write {columns[0]}:{digits}")
     if column and column not in columns:
         raise InputError(f"--{decision} {text}: no column '{column}'{did_you_mean(column, columns)}")
-    wanted = column or columns[0]
+    chosen = column or columns[0]
     for blink in blinks:
-        if blink.column == wanted and blink.number == int(digits):
-            return Review(wanted, blink.minimum_frame, decision, reason.strip())
-    count = sum(blink.column == wanted for blink in blinks)
-    raise InputError(f"--{decision} {text}: {wanted} has blinks 1 to {count}")
+        if blink.column == chosen and blink.number == int(digits):
+            return Review(chosen, blink.minimum_frame, decision, reason.strip())
+    count = sum(blink.column == chosen for blink in blinks)
+    raise InputError(f"--{decision} {text}: {chosen} has blinks 1 to {count}")
 
 
 def merge(old: Sequence[Review], new: Sequence[Review], reach_frames: float) -> list[Review]:
@@ -131,17 +131,17 @@ def merge(old: Sequence[Review], new: Sequence[Review], reach_frames: float) -> 
     merged = list(new)
     for review in old:
         same = [
-            place
-            for place, later in enumerate(merged)
+            index
+            for index, later in enumerate(merged)
             if later.column == review.column
             and abs(later.minimum_frame - review.minimum_frame) <= reach_frames
         ]
         if not same:
             kept.append(review)
-        for place in same:
-            if not merged[place].moves:
-                merged[place] = replace(
-                    merged[place], onset_frame=review.onset_frame, end_frame=review.end_frame
+        for index in same:
+            if not merged[index].moves:
+                merged[index] = replace(
+                    merged[index], onset_frame=review.onset_frame, end_frame=review.end_frame
                 )
     return kept + merged
 

@@ -83,18 +83,18 @@ def read_table(path: Path) -> pd.DataFrame:
     return table
 
 
-def choose_columns(table: pd.DataFrame, wanted: Sequence[str], path: Path) -> list[str]:
+def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> list[str]:
     """Return the distance columns to label: the wanted ones, else a track's, else the only candidate."""
     candidates = [
         str(name)
         for name in table.columns
         if table[name].dtype.kind == "f" and str(name).lower() not in INDEX_COLUMNS
     ]
-    for name in wanted:
+    for name in named:
         if name not in table.columns:
             raise InputError(f"{path.name} has no column '{name}'{did_you_mean(name, candidates)}")
-    if wanted:
-        return list(wanted)
+    if named:
+        return list(named)
     tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
     if tracked:
         return tracked
@@ -177,7 +177,7 @@ def make_series(
     if np.nanmin(values) < 0:
         raise InputError(f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g})")
     lid = tracked_lower_lid(table, column) if column in DISTANCE_COLUMNS else None
-    up, nasal = (None, None) if lid is None else (bridge_gaps(place, reach)[0] for place in lid)
+    up, nasal = (None, None) if lid is None else (bridge_gaps(coordinate, reach)[0] for coordinate in lid)
     return BlinkSeries(
         distance=filled,
         fps=fps,

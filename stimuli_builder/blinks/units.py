@@ -34,7 +34,7 @@ class Scale:
     rule: str
 
 
-def scale_of(table: pd.DataFrame, wanted: str | None, path: Path) -> Scale | None:
+def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None:
     """Return the scale of a track: a number of mm in a pixel, or a rule of `SCALES`; None without a wish.
 
     Raises
@@ -42,14 +42,14 @@ def scale_of(table: pd.DataFrame, wanted: str | None, path: Path) -> Scale | Non
     InputError
         The wish is no number and no rule, or the table has no landmarks for the rule.
     """
-    if wanted is None:
+    if scale is None:
         return None
     try:
-        value = float(wanted)
+        value = float(scale)
     except ValueError:
-        return _by_rule(table, wanted, path)
+        return _by_rule(table, scale, path)
     if not (np.isfinite(value) and 0 < value < 10):
-        raise InputError(f"--scale is a number of mm in a pixel, above 0 and below 10, got {wanted}")
+        raise InputError(f"--scale is a number of mm in a pixel, above 0 and below 10, got {scale}")
     return Scale(value, f"{value:g} mm in a pixel, as given (a card or a ruler in the picture)")
 
 

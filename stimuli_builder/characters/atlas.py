@@ -4,9 +4,9 @@ The atlas holds one full open-eye frame and, for a rising list of closures, the 
 """
 
 import hashlib
-from collections.abc import Iterable
-from functools import cached_property
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,13 @@ from stimuli_builder.characters.colour import srgb_to_linear
 from stimuli_builder.characters.declaration import (
     DECLARATION_FILE,
     Declaration,
+    Level,
     LowerLidPose,
     Picture,
     PictureOrFrame,
     read_declaration,
 )
-from stimuli_builder.characters.level_video import decode_level_video
+from stimuli_builder.characters.level_video import StillPixels, decode_level_video, video_frames
 from stimuli_builder.characters.lower_lid_layer import LowerLidLayer
 from stimuli_builder.characters.reading import declared_bytes, decode_picture, slices
 
@@ -95,10 +96,52 @@ class Atlas:
             levels[index] = srgb_to_linear(self.level_srgb(index))
         return levels
 
-    @cached_property
+    def read_levels(self, out: NDArray[Any], convert: Callable[[NDArray[np.uint8]], NDArray[Any]]) -> None:
+        """Write each level's crop into `out` (n, h, w, 3), its code values given through `convert`.
+
+        A video whose frames are the levels is converted as it is decoded, without being kept.
+        """
+        video = self._video_of_levels()
+        if video is None or not self._convert_frames(video, out, convert):
+            for index in range(len(out)):
+                out[index] = convert(self.level_srgb(index))
+
+    def _video_of_levels(self) -> Level | None:
+        """The first level where all are the frames of one video in their order."""
+        first, *others = self.declaration.levels
+        ordered = all(level.frame == number for number, level in enumerate(self.declaration.levels))
+        return first if ordered and {level.file for level in others} == {first.file} else None
+
+    def _convert_frames(
+        self, video: Picture, out: NDArray[Any], convert: Callable[[NDArray[np.uint8]], NDArray[Any]]
+    ) -> bool:
+        """Whether the video holds what is declared; else `level_srgb` says what it lacks."""
+        frames = video_frames(declared_bytes(self.folder, video, "atlas levels"), "atlas levels", video.file)
+        first = next(frames)
+        if first.shape[1::-1] != self.declaration.crop[2:]:
+            return False
+        still, count = StillPixels(first), 1
+        out[0] = convert(first)
+        for count, frame in enumerate(frames, start=2):
+            still.see(frame)
+            if count <= len(out):
+                out[count - 1] = convert(frame)
+        still.hold(out)
+        return count >= len(out)
+
+    @property
     def lower_lid_layer(self) -> LowerLidLayer:
-        """The decoded lower-lid layer; InputError where the character has none."""
+        """The lower-lid layer, read anew at each call; InputError where the character has none.
+
+        It knows this atlas: kept here, the two would hold one another's pictures in memory.
+        """
         return LowerLidLayer(self)
+
+    def forget_poses(self) -> None:
+        """Give up the decoded video of the lower lid's poses; it is read again when asked for."""
+        lower = self.declaration.lower_lid
+        for file in {pose.file for pose in lower.poses} if lower else ():
+            self._videos.pop(file, None)
 
     def fingerprint(self) -> str:
         """SHA-256 of the declaration and every picture file, in hexadecimal digits."""
@@ -118,7 +161,8 @@ class Atlas:
         for index in range(len(self.declaration.levels)):
             self.level_srgb(index)
         if self.has_lower_lid:
-            _ = self.lower_lid_layer
+            for _ in self.lower_lid_layer.each_change():
+                pass
 
     def _picture_or_frame(
         self, picture: PictureOrFrame, size: tuple[int, int], what: str

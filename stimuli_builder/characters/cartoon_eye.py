@@ -203,8 +203,8 @@ def _lower_lid(canvas: skia.Canvas, x: Curve, lower: Curve) -> None:
     fold = slice(28, 128)
     bow = np.sin(np.linspace(0, np.pi, 100))
     taper(canvas, x[fold], lower[fold] - 2.0 - 1.1 * bow, 0.5, colour("#a5573f", 0.45), blur_mm=0.12)
-    for place, length in ((0.80, 1.2), (0.88, 1.5)):
-        at = int(place * (len(x) - 1))
+    for share, length in ((0.80, 1.2), (0.88, 1.5)):
+        at = int(share * (len(x) - 1))
         start = np.array([x[at], lower[at] - 0.95])
         tip = start + length * np.array([0.75, -0.66])
         line = np.linspace(start, tip, 8)
@@ -223,8 +223,8 @@ def _lash_line(canvas: skia.Canvas, shape: EyeShape, x: Curve, upper: Curve, clo
     low = np.r_[upper, wing_low]
     high = np.r_[upper + thickness * swell, wing_low + thickness * (1 - wing_t) ** 1.1]
     fill(canvas, between(np.r_[x, wing_x], high, low), colour(LASH))
-    for place, length, width in LASHES:
-        _lash(canvas, shape, x, upper, closure, (place, length, width))
+    for share, length, width in LASHES:
+        _lash(canvas, shape, x, upper, closure, (share, length, width))
 
 
 def _lash(
@@ -235,11 +235,11 @@ def _lash(
     closure: float,
     clump: tuple[float, float, float],
 ) -> None:
-    place, length, width = clump
-    at = int(place * (len(x) - 1))
+    share, length, width = clump
+    at = int(share * (len(x) - 1))
     root = np.array([x[at], upper[at] + 1.0 * (1 - closure) + 0.35 * closure])
     # Lashes swing from up and out to down and out as the lid turns over the eyeball.
-    opened, closed = np.deg2rad(72 - 42 * (place - 0.5) * 2), np.deg2rad(-66 + 44 * (place - 0.5) * 2)
+    opened, closed = np.deg2rad(72 - 42 * (share - 0.5) * 2), np.deg2rad(-66 + 44 * (share - 0.5) * 2)
     swing = 0.5 - 0.5 * np.cos(np.pi * closure)
     angle = opened + (closed - opened) * swing
     reach = length * shape.lash_scale * (1.0 - 0.45 * np.sin(np.pi * swing))

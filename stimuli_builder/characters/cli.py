@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from stimuli_builder.characters.cli_face import bake_face
+from stimuli_builder.characters.cli_samples import bake_samples
 from stimuli_builder.characters.retired import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
 
@@ -30,10 +31,10 @@ def list_characters() -> None:
     """
     names = shipped_names()
     for name in names:
-        place = geometry(name)
-        lower = "its lower lid moves" if place.lower_range_mm else "no lower lid of its own"
+        shape = geometry(name)
+        lower = "its lower lid moves" if shape.lower_range_mm else "no lower lid of its own"
         typer.echo(
-            f"{name:16} {place.size_px[0]} x {place.size_px[1]} px, opens {place.opening_mm:g} mm, {lower}"
+            f"{name:16} {shape.size_px[0]} x {shape.size_px[1]} px, opens {shape.opening_mm:g} mm, {lower}"
         )
     for name, retired in load_retired().items():
         if name not in names:
@@ -71,5 +72,6 @@ def fetch_character(
 def register(app: typer.Typer) -> None:
     """Add `bake` and `character` to the command line."""
     bake_app.command("face")(bake_face)
+    bake_app.command("samples")(bake_samples)
     app.add_typer(bake_app, name="bake")
     app.add_typer(character_app, name="character")

@@ -7,7 +7,7 @@ import typer
 
 from experiments.errors import InputError
 from stimuli_builder.characters.cli_progress import baking
-from stimuli_builder.characters.facekit.bake import FaceBake, FaceOrder
+from stimuli_builder.characters.facekit.bake import FaceBake, FaceOrder, character_name
 from stimuli_builder.characters.facekit.framing import parse_size
 from stimuli_builder.characters.facekit.identity import (
     IDENTITIES_FILE,
@@ -34,6 +34,9 @@ def bake_face(
     rendered: Annotated[
         int | None, typer.Option(help="How many of them to render; the others are moved in between [all].")
     ] = None,
+    denser_ends: Annotated[
+        bool, typer.Option(help="Render twice as many in the first and last eighth of the closure.")
+    ] = False,
     size: Annotated[
         str | None, typer.Option(help="Size of the full frame in px [960x360 or 720x900].")
     ] = None,
@@ -68,7 +71,7 @@ def bake_face(
 
       stimuli bake face --facekit ict_facekit.npz --seed 4711 --out my/face
 
-      stimuli bake face --facekit ICT-FaceKit --identity birch --framing face
+      stimuli bake face --facekit ICT-FaceKit --identity birch --framing face --rendered 17   # birch-face
     """
     closures_of(levels)
     closures_of(rendered or levels)
@@ -80,6 +83,7 @@ def bake_face(
     name, face = _face(identity, seed, identities)
     order = FaceOrder(
         name=name,
+        seed=seed,
         identity=face,
         framing=framing,
         size_px=parse_size(size, framing),
@@ -88,11 +92,12 @@ def bake_face(
         samples=Samples(samples, frame_samples),
         lower_lid=lower_lid,
         light=light,
-        out=out or Path("out/characters") / name,
+        out=out or Path("out/characters") / character_name(name, framing),
         work=work,
         blender=blender,
         device=device,
         threads=threads,
+        denser_ends=denser_ends and (rendered or levels) < levels,
     )
     bake = FaceBake(order, load_facekit(facekit))
     if render:
@@ -100,7 +105,7 @@ def bake_face(
             bake.run(report)
     else:
         bake.write()
-    typer.echo(f"'{name}' is in {order.out}")
+    typer.echo(f"'{order.character}' is in {order.out}")
 
 
 def _face(name: str | None, seed: int | None, file: Path) -> tuple[str, Identity]:

@@ -77,9 +77,9 @@ class LowerLid(_Declared):
 
     @model_validator(mode="after")
     def _full_grid(self) -> "LowerLid":
-        found = sorted((pose.vertical_mm, pose.horizontal_mm) for pose in self.poses)
-        wanted = sorted((v, h) for v in self.vertical_mm for h in self.horizontal_mm)
-        if found != wanted:
+        given = sorted((pose.vertical_mm, pose.horizontal_mm) for pose in self.poses)
+        needed = sorted((v, h) for v in self.vertical_mm for h in self.horizontal_mm)
+        if given != needed:
             raise ValueError("lower_lid.poses must hold every pair of vertical_mm and horizontal_mm once")
         if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
             raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
@@ -157,16 +157,23 @@ def read_declaration(folder: Path) -> Declaration:
     file = folder / DECLARATION_FILE
     try:
         text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise InputError(
-            f"{folder} is no character: cannot read its {DECLARATION_FILE} ({type(error).__name__})"
+            f"{folder} is no character: its {DECLARATION_FILE} is no text in UTF-8; bake it again"
+        ) from error
+    except OSError as error:
+        raise InputError(
+            f"{folder} is no character: it has no {DECLARATION_FILE} that can be read"
         ) from error
     try:
         return Declaration.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file} is not TOML: {error}; correct that line") from error
     except ValidationError as error:
-        raise InputError(f"{file}: {_first_fault(error)}") from error
+        raise InputError(
+            f"{file}: {_first_fault(error)}; correct it (docs/own-character.md), or bake it again where "
+            "another version of Palpebra wrote it"
+        ) from error
 
 
 def _first_fault(error: ValidationError) -> str:

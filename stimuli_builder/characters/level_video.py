@@ -3,7 +3,7 @@
 H.264 in RGB planes: its decoding is exact by the standard, so every machine reads the same code values.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -39,27 +39,63 @@ def write_level_video(folder: Path, file: str, pictures: Sequence[NDArray[np.uin
     return write_bytes_declared(folder, file, buffer.getvalue())
 
 
+class StillPixels:
+    """Which pixels of pictures seen one after another change by no more than the encoder's own noise."""
+
+    def __init__(self, first: NDArray[np.uint8]) -> None:
+        self._first, self._low, self._high = first.copy(), first.copy(), first.copy()
+
+    def see(self, picture: NDArray[np.uint8]) -> None:
+        """Take in one more picture of code values."""
+        np.minimum(self._low, picture, out=self._low)
+        np.maximum(self._high, picture, out=self._high)
+
+    def hold(self, pictures: NDArray[Any]) -> None:
+        """Give such pixels of (n, h, w, 3) pictures, in whatever encoding, their value in the first."""
+        off = np.maximum(self._high - self._first, self._first - self._low)
+        still = ~(off > STILL_CODES).any(axis=-1, keepdims=True)
+        for picture in pictures[1:]:
+            np.copyto(picture, pictures[0], where=still)
+
+
 def decode_level_video(content: bytes, what: str, file: str) -> NDArray[np.uint8]:
     """(n, h, w, 3) sRGB code values of every frame; InputError where it is none or damaged."""
+    shown, frames = 0, np.empty((0, 0, 0, 3), np.uint8)
+    for shown, frame in enumerate(video_frames(content, what, file), start=1):
+        if shown == 1:
+            # Into one array: a list of frames and their stack would be there twice.
+            frames, still = np.empty((_count(content), *frame.shape), np.uint8), StillPixels(frame)
+        frames[shown - 1] = frame
+        still.see(frame)
+    still.hold(frames[:shown])
+    return frames[:shown]
+
+
+def video_frames(content: bytes, what: str, file: str) -> Iterator[NDArray[np.uint8]]:
+    """(h, w, 3) sRGB code values of frame after frame, still pixels with the encoder's noise.
+
+    Raises
+    ------
+    InputError
+        The content is no such video, is damaged, or holds no frame.
+    """
+    shown = 0
     try:
         with av.open(BytesIO(content)) as container:
             container.streams.video[0].thread_type = "AUTO"
-            frames: list[Any] = [_rgb(frame) for frame in container.decode(video=0)]
+            for frame in container.decode(video=0):
+                yield _rgb(frame)
+                shown += 1
     except (av.error.FFmpegError, ValueError, IndexError) as error:
         raise InputError(f"{what} is damaged: cannot decode {file}; bake it again") from error
-    if not frames:
+    if not shown:
         raise InputError(f"{what} is damaged: {file} holds no frame; bake it again")
-    return _held_still(np.stack(frames))
 
 
-def _held_still(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The frames with every pixel that changes by no more than the encoder's own noise as in the first."""
-    low, high = frames.min(axis=0), frames.max(axis=0)
-    first = frames[0]
-    moves = (np.maximum(high - first, first - low) > STILL_CODES).any(axis=-1)
-    for frame in frames[1:]:
-        np.copyto(frame, first, where=~moves[..., None])
-    return frames
+def _count(content: bytes) -> int:
+    """Frames at the most: every packet may be one."""
+    with av.open(BytesIO(content)) as container:
+        return sum(packet.size > 0 for packet in container.demux(video=0))
 
 
 def _rgb(frame: Any) -> NDArray[np.uint8]:

@@ -38,7 +38,8 @@ def build_checks(
 
     Parameters
     ----------
-    anew: draw another seed than that of the checks that are there.
+    anew : bool, optional
+        Draw another seed than that of the checks that are there.
 
     Raises
     ------

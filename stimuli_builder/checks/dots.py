@@ -30,7 +30,13 @@ WAYS = ((0, -1), (0, 1), (-1, 0), (1, 0))
 
 @dataclass(frozen=True)
 class Motion:
-    """How the dots move. way: of the dots inside the mask, from 1 in the order of `WAYS`."""
+    """How the dots move.
+
+    Attributes
+    ----------
+    way : int
+        Of the dots inside the mask, from 1 in the order of `WAYS`.
+    """
 
     mask: Mask
     way: int
@@ -54,7 +60,7 @@ def pictures(motion: Motion, rng: Generator) -> Dots:
     segments = [_segment(motion, rng) for _ in range(pairs)]
     order = rng.permutation(2 * pairs)
     both = [*segments, *(~segment for segment in segments)]
-    return np.concatenate([both[place] for place in order])
+    return np.concatenate([both[index] for index in order])
 
 
 def _segment(motion: Motion, rng: Generator) -> Dots:

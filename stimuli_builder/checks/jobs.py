@@ -16,7 +16,6 @@ from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.encode import encode_clip, encoder_signature
 from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.jobs import Look
-from stimuli_builder.clips.levels import kept_levels
 from stimuli_builder.clips.seeds import generator
 
 CHECK_VERSION = 1
@@ -36,8 +35,14 @@ Planes = NDArray[np.uint8]
 class CheckJob:
     """A check's clip to render.
 
-    seed, number: everything random is drawn from them. background: (Y, Cb, Cr) of the page around the clip.
-    look: of the character, for checks in the study's own look.
+    Attributes
+    ----------
+    seed, number : int
+        Everything random is drawn from them.
+    background : (int, int, int)
+        (Y, Cb, Cr) of the page around the clip.
+    look : Look or None
+        Of the character, for checks in the study's own look.
     """
 
     check: CheckName
@@ -70,7 +75,7 @@ class CheckJob:
         """SHA-256 over everything that decides the clip's bytes; paths do not count."""
         values = asdict(self)
         if self.look:
-            values["look"] = asdict(self.look) | {"beside": None, "character": None}
+            values["look"] = self.look.hashed()
         values |= {"encoder": self.encoder, "check_version": CHECK_VERSION}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
@@ -123,7 +128,7 @@ class CheckJob:
                 yield picture
 
     def _own_look(self, look: Look) -> Iterator[Planes]:
-        painter = FramePainter(kept_levels(look.character, look.fingerprint, look.size_px, look.beside))
+        painter = FramePainter(look.levels())
         # Blurred always: only the means of whole frames are the same in the reverse order.
         return painter.frames(self.curve, look.fps, blur=True)
 

@@ -14,7 +14,13 @@ from stimuli_builder.clips.seeds import generator
 
 @dataclass(frozen=True)
 class PlannedCheck:
-    """A check's clip with all that decides it. width_mm: shown width at actual size."""
+    """A check's clip with all that decides it.
+
+    Attributes
+    ----------
+    width_mm : float
+        Shown width at actual size.
+    """
 
     job: CheckJob
     width_mm: float
@@ -62,7 +68,7 @@ def _settings(experiment: Experiment, seed: int, number: int) -> RenderSettings:
 
 def bt709(colour: str) -> tuple[int, int, int]:
     """`#rrggbb` as limited-range BT.709 Y, Cb, Cr, 8 bits each (ITU-R BT.709-6, items 3.2 to 3.5)."""
-    red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
+    red, green, blue = (int(colour[digit : digit + 2], 16) / 255 for digit in (1, 3, 5))
     luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue
     return (
         round(16 + 219 * luma),

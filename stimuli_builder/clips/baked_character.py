@@ -1,20 +1,26 @@
 """A baked character as clips need it: its atlas at its own size, or resampled in linear light."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.atlas import Atlas, load_atlas
-from stimuli_builder.characters.colour import srgb_to_linear
+from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
+from stimuli_builder.characters.lower_lid_layer import LevelCodes
 from stimuli_builder.clips.characters import Geometry
-from stimuli_builder.clips.levels import LevelSet, Window, quantised, window_inside
+from stimuli_builder.clips.levels import LevelSet, Light, Window, quantised, window_inside
 from stimuli_builder.clips.lower_lid import LowerLid
 
 MARGIN_PX = 4
+LIGHT_OF_CODE = quantised(LINEAR_OF_CODE)
+"""16-bit linear light of every sRGB code value."""
 
 
 class BakedCharacter:
@@ -34,6 +40,8 @@ class BakedCharacter:
             declared.inter_ocular_mm,
             declared.opening_mm,
             None if declared.lower_lid is None else _ends(declared.lower_lid),
+            measured_movement(declared.provenance),
+            blink_rows=(declared.crop[1], declared.crop[1] + declared.crop[3]),
         )
 
     @cached_property
@@ -44,6 +52,14 @@ class BakedCharacter:
     def levels(self, size_px: tuple[int, int]) -> LevelSet:
         """The atlas at a size: the width scales it, a lower height cuts skin above and below."""
         return atlas_levels(load_atlas(self.folder), self.geometry, size_px)
+
+
+def measured_movement(provenance: Mapping[str, Any]) -> dict[str, float]:
+    """Millimetres by part of the face, as its bake measured them; empty for characters made elsewhere."""
+    measured = provenance.get("moved_mm_at_closure_1")
+    if not isinstance(measured, Mapping):
+        return {}
+    return {str(part): float(mm) for part, mm in measured.items() if isinstance(mm, int | float)}
 
 
 def _ends(lid: DeclaredLowerLid) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -63,22 +79,69 @@ def atlas_levels(character: Atlas, geometry: Geometry, size_px: tuple[int, int])
         (columns.stop - columns.start) * scale + 2 * MARGIN_PX,
         (rows.stop - rows.start) * scale + 2 * MARGIN_PX,
         size_px,
-        character.name,
     )
+    read = _read_at_own_size if scaled == native else _read_resized
+    content = read(character, scaled, slice(top, top + size_px[1]), window)
+    px_per_mm = character.declaration.px_per_mm * scale
+
+    def lower() -> LowerLid:
+        return _scaled_lower_lid(load_atlas(character.folder), scaled, top, window, content.level_srgb)
+
+    read_lower = lower if character.has_lower_lid else None
+    return LevelSet(
+        character.name, content.base, content.levels, character.closures, window, px_per_mm, read_lower
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Content:
+    """The whole frame and the window's levels; `level_srgb` where code values can be had from them."""
+
+    base: Light
+    levels: Light
+    level_srgb: LevelCodes | None = None
+
+
+def _read_at_own_size(character: Atlas, _: tuple[int, int], shown: slice, window: Window) -> _Content:
+    """Each code value has one value of light, so a table gives it, and the code value again."""
+    rows, columns = character.crop
+    base = quantised(character.base_linear())
+    levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
+    levels[:] = base[shown][window.slices]
+    first_row, first_column = shown.start + window.y, window.x
+    crops = levels[
+        :,
+        rows.start - first_row : rows.stop - first_row,
+        columns.start - first_column : columns.stop - first_column,
+    ]
+    character.read_levels(crops, LIGHT_OF_CODE.__getitem__)
+    base[rows, columns] = crops[0]
+
+    def level_srgb(index: int) -> NDArray[np.uint8]:
+        return np.asarray(np.searchsorted(LIGHT_OF_CODE, crops[index]), np.uint8)
+
+    return _Content(np.ascontiguousarray(base[shown]), levels, level_srgb)
+
+
+def _read_resized(character: Atlas, scaled: tuple[int, int], shown: slice, window: Window) -> _Content:
     frame = character.base_linear()
     levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
     for index in range(len(levels)):
-        frame[rows, columns] = srgb_to_linear(character.level_srgb(index))
-        scaled_frame = _resized(frame, scaled)[top : top + size_px[1]]
+        frame[character.crop] = srgb_to_linear(character.level_srgb(index))
+        scaled_frame = _resized(frame, scaled)[shown]
         levels[index] = quantised(scaled_frame[window.slices])
         if index == 0:
             base = quantised(scaled_frame)
-    px_per_mm = character.declaration.px_per_mm * scale
-    lower = _scaled_lower_lid(character, scaled, top, window) if character.has_lower_lid else None
-    return LevelSet(character.name, base, levels, character.closures, window, px_per_mm, lower)
+    return _Content(base, levels)
 
 
-def _scaled_lower_lid(character: Atlas, scaled: tuple[int, int], top: int, window: Window) -> LowerLid:
+def _scaled_lower_lid(
+    character: Atlas,
+    scaled: tuple[int, int],
+    top: int,
+    window: Window,
+    level_srgb: LevelCodes | None,
+) -> LowerLid:
     crop, native = character.crop, character.size_px
 
     def to_window(part: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -87,7 +150,7 @@ def _scaled_lower_lid(character: Atlas, scaled: tuple[int, int], top: int, windo
         shifted = _resized(frame, scaled)[top:]
         return np.ascontiguousarray(shifted[window.slices])
 
-    return LowerLid.of_character(character, to_window)
+    return LowerLid.of_character(character, to_window, level_srgb)
 
 
 def _resized(frame: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np.float32]:

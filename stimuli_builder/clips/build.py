@@ -23,7 +23,7 @@ Progress = Callable[[int, int], None]
 """Called with the clips done and the clips to do."""
 
 
-def silent(_done: int, _wanted: int) -> None:
+def silent(_done: int, _total: int) -> None:
     """Progress that nobody watches."""
 
 
@@ -95,8 +95,8 @@ def build(
 
 def _missing(planned: list[PlannedClip], state: BuildState) -> list[PlannedClip]:
     """The clips to render, each input once."""
-    wanted = {clip.job.input_hash: clip for clip in reversed(planned)}
-    return [clip for key, clip in reversed(wanted.items()) if not state.intact(key)]
+    by_hash = {clip.job.input_hash: clip for clip in reversed(planned)}
+    return [clip for key, clip in reversed(by_hash.items()) if not state.intact(key)]
 
 
 def _rendered(missing: list[PlannedClip], folder: Path, machines: Machines) -> Iterator[Built]:

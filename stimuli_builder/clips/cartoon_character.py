@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters import cartoon
+from stimuli_builder.characters.cartoon_face import BROW_DROP_MM
 from stimuli_builder.clips.characters import Geometry
 from stimuli_builder.clips.levels import LevelSet, Light, quantised, window_inside
 
 NAME = "cartoon"
 NATIVE_WIDTH_PX = 960
+SPARE_PX = 4
+"""Rows of the crop, above and below, in which nothing moves."""
 
 
 class CartoonCharacter:
@@ -22,7 +25,17 @@ class CartoonCharacter:
         height = round(NATIVE_WIDTH_PX * cartoon.FRAME_MM[1] / cartoon.FRAME_MM[0])
         scale = NATIVE_WIDTH_PX / cartoon.FRAME_MM[0]
         size = (NATIVE_WIDTH_PX, height)
-        return Geometry(NAME, size, scale, cartoon.INTER_OCULAR_MM, cartoon.OPENING_MM, None)
+        _, first, _, rows = cartoon.crop_px(size)
+        return Geometry(
+            NAME,
+            size,
+            scale,
+            cartoon.INTER_OCULAR_MM,
+            cartoon.OPENING_MM,
+            lower_range_mm=None,
+            moved_mm={"brow": BROW_DROP_MM},
+            blink_rows=(first + SPARE_PX, first + rows - SPARE_PX),
+        )
 
     @cached_property
     def fingerprint(self) -> str:
@@ -33,12 +46,12 @@ class CartoonCharacter:
         """The cartoon at a size: the width scales it, a lower height cuts skin above and below."""
         scaled, top = self.geometry.scaled(*size_px)
         x, y, width, height = cartoon.crop_px(scaled)
-        window = window_inside(x, y - top, width, height, size_px, NAME)
+        window = window_inside(x, y - top, width, height, size_px)
         closures = np.linspace(0.0, 1.0, cartoon.LEVELS)
         levels = np.empty((len(closures), window.height, window.width, 3), np.uint16)
-        place = (window.x, window.y + top, window.width, window.height)
+        rectangle = (window.x, window.y + top, window.width, window.height)
         for index, closure in enumerate(closures):
-            levels[index] = _light_of_code(cartoon.draw_frame(float(closure), scaled, place))
+            levels[index] = _light_of_code(cartoon.draw_frame(float(closure), scaled, rectangle))
         base = _light_of_code(cartoon.draw_frame(0.0, scaled, (0, top, *size_px)))
         base[window.slices] = levels[0]
         return LevelSet(NAME, base, levels, closures, window, scaled[0] / cartoon.FRAME_MM[0])

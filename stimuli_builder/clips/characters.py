@@ -1,7 +1,7 @@
 """What clips need of a character, and finding one by name or folder."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -26,6 +26,10 @@ class Geometry:
     opening_mm: float
     lower_range_mm: tuple[tuple[float, float], tuple[float, float]] | None
     """Least and greatest lift, and slide, of the lower lid; None without a lower-lid layer."""
+    moved_mm: Mapping[str, float] = field(default_factory=dict)
+    """What else a whole closure moves, by part; empty where nobody measured it."""
+    blink_rows: tuple[int, int] = (0, 0)
+    """First row of the whole frame that a blink changes, and the row after the last."""
 
     def scaled(self, width_px: int, height_px: int) -> tuple[tuple[int, int], int]:
         """Size of the whole frame when `width_px` wide, and the rows to cut above to get `height_px`.
@@ -33,7 +37,7 @@ class Geometry:
         Raises
         ------
         InputError
-            The character is less high than that.
+            The character is less high than that, or a blink would not be seen whole.
         """
         whole = (width_px, round(self.size_px[1] * width_px / self.size_px[0]))
         spare = whole[1] - height_px
@@ -42,7 +46,14 @@ class Geometry:
                 f"character '{self.name}' is {whole[1]} px high at a width of {width_px} px; expected a "
                 f"height of at most that, got {height_px}"
             )
-        return whole, 2 * (spare // 4)
+        top, scale = 2 * (spare // 4), width_px / self.size_px[0]
+        first, after = self.blink_rows
+        if after and (first * scale < top or after * scale > top + height_px):
+            raise InputError(
+                f"a picture of {width_px} x {height_px} px cuts off what moves in a blink of '{self.name}', "
+                f"which is {whole[1]} px high at that width; ask for a greater height"
+            )
+        return whole, top
 
     def px_per_mm_at(self, width_px: int) -> float:
         """Scale of a clip of that width."""

@@ -174,4 +174,4 @@ def progress_bar(what: str) -> "Iterator[Progress]":
     hidden = not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), disable=hidden, transient=True) as bar:
         task = bar.add_task(what, total=None)
-        yield lambda done, wanted: bar.update(task, completed=done, total=wanted)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

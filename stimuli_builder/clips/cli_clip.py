@@ -22,6 +22,8 @@ Examples:
 
   stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
 
+  stimuli clip --character hazel --brow-mm 0.25 --cheek-mm 0.3 --squint-mm 0.2 --gaze-mm 0.4 --out moved.mp4
+
   stimuli clip --profile mine.csv --character my_renders/ --size 1920x720 --fps 60 --out big.mp4
 """
 Amplitude = Literal["full", "natural"]
@@ -42,13 +44,19 @@ def clip_command(
     ] = "full",
     blur: Annotated[bool, typer.Option("--blur/--no-blur", help="Motion blur (MB) or none (NB).")] = True,
     lower_lid: Annotated[LowerLid, typer.Option(help="Lower-lid signals that move.")] = "none",
+    brow_mm: Annotated[float | None, typer.Option(help="mm that the brows sink while the eye shuts.")] = None,
+    cheek_mm: Annotated[float | None, typer.Option(help="mm that the cheeks rise.")] = None,
+    squint_mm: Annotated[
+        float | None, typer.Option(help="mm that the skin below the eye draws up and nasally.")
+    ] = None,
+    gaze_mm: Annotated[float | None, typer.Option(help="mm that the iris turns down under the lid.")] = None,
     eyes: Annotated[
         Eyes, typer.Option(help="One signal for both eyes, or left and right recorded.")
     ] = "alike",
     exemplar: Annotated[int, typer.Option(min=1, help="Which blink of that kind.")] = 1,
     seed: Annotated[int, typer.Option(help="Decides every random choice.")] = 2011,
     fps: Annotated[int, typer.Option(min=24, max=60, help="Frame rate.")] = 30,
-    size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x720.")] = "960x360",
+    size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x1200.")] = "960x360",
     clip_frames: Annotated[int | None, typer.Option(min=1, help="Length of the clip in frames.")] = None,
     barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
 ) -> None:
@@ -64,13 +72,17 @@ def clip_command(
         amplitude=amplitude,
         motion_blur=blur,
         lower_lid=lower_lid,
+        brow_mm=brow_mm,
+        cheek_mm=cheek_mm,
+        squint_mm=squint_mm,
+        gaze_mm=gaze_mm,
         eyes=eyes,
         fps=fps,
         width_px=width,
         height_px=height,
     )
-    wanted = SingleClip(settings, profile, exemplar, seed, clip_frames, barcode)
-    made = render_single(wanted, out)
+    clip = SingleClip(settings, profile, exemplar, seed, clip_frames, barcode)
+    made = render_single(clip, out)
     print(
         f"wrote {out}: {made.frames} frames at {fps} fps, profile {made.curve.profile_id}, "
         f"{made.curve.duration_frames:g} frames at 30 fps from frame {made.onset_frame}"

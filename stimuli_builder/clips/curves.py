@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.lower_lid import lower_lid
 from stimuli_builder.blinks.profile import BlinkProfile, to_full_closure, to_natural_closure
 from stimuli_builder.clips.motion_blur import samples_per_frame
@@ -146,8 +147,29 @@ def clip_curve(
     )
 
 
+def with_lower_lid_gain(curve: ClipCurve, gain: float) -> ClipCurve:
+    """The curve with the lower lid's lift and slide times `gain`; itself at 1."""
+    if gain == 1.0 or curve.lower_vertical_mm is None or curve.lower_horizontal_mm is None:
+        return curve
+    return replace(
+        curve,
+        lower_vertical_mm=np.round(gain * curve.lower_vertical_mm, DECIMALS),
+        lower_horizontal_mm=np.round(gain * curve.lower_horizontal_mm, DECIMALS),
+    )
+
+
+def shown_by(
+    curve: ClipCurve, settings: RenderSettings, reach: Reach | None
+) -> tuple[ClipCurve, dict[str, str]]:
+    """The curve as a character shows it: the lower lid with the gain of the settings, checked for reach.
+
+    Returns and raises as `within_reach` does.
+    """
+    return within_reach(with_lower_lid_gain(curve, settings.lower_lid_gain), reach)
+
+
 def within_reach(curve: ClipCurve, reach: Reach | None) -> tuple[ClipCurve, dict[str, str]]:
-    """Check that a character was baked for the lower lid's motion; signals are never scaled.
+    """Check that a character was baked for the lower lid's motion; signals are not scaled to fit.
 
     Where a signal passes a limit by at most HELD_MM (a tracked lid wavers about its resting place), it is
     held there.

@@ -10,9 +10,10 @@ from experiments.definition import Experiment
 from experiments.design import ClipSpec
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
-from stimuli_builder.clips.characters import Geometry, fingerprint, geometry
-from stimuli_builder.clips.curves import Timing, clip_curve, within_reach
+from stimuli_builder.clips.characters import DRAWN, Geometry, fingerprint, geometry
+from stimuli_builder.clips.curves import Timing, clip_curve, shown_by
 from stimuli_builder.clips.exemplars import exemplar
+from stimuli_builder.clips.face_movement.amounts import Movement
 from stimuli_builder.clips.jobs import ClipJob, Look
 from stimuli_builder.clips.performances import performance_curve
 
@@ -82,8 +83,8 @@ def _planned(experiment: Experiment, options: Options) -> Iterator[PlannedClip]:
 def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedClip:
     settings = design.render_settings(experiment, spec)
     seed = options.seed_for(experiment)
-    place = geometry(settings.character, options.beside)
-    check_look(settings, place)
+    character = geometry(settings.character, options.beside)
+    check_look(settings, character)
     family = exemplar_family(design.exemplar_key(experiment, spec))
     if settings.performance is not None:
         curve, repeated = performance_curve(settings, family, spec.exemplar, seed, options.beside), False
@@ -91,9 +92,9 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
         shown = exemplar(settings, family, spec.exemplar, seed, options.beside)
         timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
         curve, repeated = clip_curve(shown.profile, timing, settings.lower_lid), shown.repeated
-    curve, held = within_reach(curve, place.lower_range_mm)
+    curve, held = shown_by(curve, settings, character.lower_range_mm)
     job = ClipJob(look_of(settings, options), curve)
-    return PlannedClip(spec, settings, job, repeated, place, held)
+    return PlannedClip(spec, settings, job, repeated, character, held)
 
 
 def exemplar_family(key: str) -> str:
@@ -101,14 +102,19 @@ def exemplar_family(key: str) -> str:
     return key.rpartition("/")[0]
 
 
-def check_look(settings: RenderSettings, place: Geometry) -> None:
+def check_look(settings: RenderSettings, character: Geometry) -> None:
     """Refuse a character that cannot do what a cell asks, or cannot be shown at its size."""
-    if settings.lower_lid != "none" and place.lower_range_mm is None:
+    if settings.lower_lid != "none" and character.lower_range_mm is None:
         raise InputError(
             f"character '{settings.character}' has no lower-lid layer; use lower_lid = 'none' or a "
             "character baked with one"
         )
-    place.scaled(settings.width_px, settings.height_px)
+    if settings.gaze_mm and settings.character in DRAWN:
+        raise InputError(
+            f"character '{settings.character}' is drawn with eyes that look straight on; leave gaze_mm out, "
+            "set it to 0, or use a baked face"
+        )
+    character.scaled(settings.width_px, settings.height_px)
 
 
 def look_of(settings: RenderSettings, options: Options) -> Look:
@@ -122,6 +128,7 @@ def look_of(settings: RenderSettings, options: Options) -> Look:
         motion_blur=settings.motion_blur,
         barcode=options.barcode,
         beside=options.beside,
+        movement=Movement.of_settings(settings),
     )
 
 

@@ -31,7 +31,7 @@ class FramePainter:
 
     def frames(self, curve: ClipCurve, fps: float, blur: bool, barcode: bool = False) -> Iterator[Planes]:
         """Yield each frame as a (height * 3 / 2, width) array of 4:2:0 planes, fresh each time."""
-        if curve.lower_vertical_mm is not None and self.character.lower is None:
+        if curve.lower_vertical_mm is not None and self.character.read_lower is None:
             raise InputError(
                 f"character '{self.character.name}' has no lower-lid layer: use lower_lid = 'none'"
             )
@@ -79,8 +79,9 @@ class FramePainter:
             blue[half_rows, half_columns],
             red[half_rows, half_columns],
         )
-        # This chroma column also weighs a luma column outside the window; nothing moves at the edge.
-        blue[half_rows, half_columns.start], red[half_rows, half_columns.start] = first_column
+        if window.x > 0:
+            # This chroma column also weighs a luma column outside the window; nothing moves at the edge.
+            blue[half_rows, half_columns.start], red[half_rows, half_columns.start] = first_column
         return planes
 
     def _seam(self) -> Light:
@@ -105,7 +106,7 @@ def eye_light(
     blend(flat, chosen, level_weights[chosen].astype(np.float32), light)
     picture: Light = light.reshape(character.levels.shape[1:])
     vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
-    if character.lower is not None and vertical is not None and horizontal is not None:
+    if character.read_lower is not None and vertical is not None and horizontal is not None:
         character.lower.add(picture, weights, closure[samples], vertical[samples], horizontal[samples])
     return picture
 

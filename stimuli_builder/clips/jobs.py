@@ -4,11 +4,16 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.curves import ClipCurve
+from stimuli_builder.clips.face_movement.amounts import AS_BAKED, Movement
+
+if TYPE_CHECKING:
+    from stimuli_builder.clips.levels import LevelSet
 
 RENDER_VERSION = 2
 """Raise this when the same inputs come to give other pictures; every clip is then built again."""
@@ -19,7 +24,8 @@ class Look:
     """How a clip is rendered, apart from what moves in it.
 
     `character` is a name or a folder; `beside` the folder it may be relative to. `fingerprint` is the
-    SHA-256 of all its pictures, `encoder` names the encoder and its settings.
+    SHA-256 of all its pictures, `encoder` names the encoder and its settings, `movement` what of the face
+    moves beside what those pictures show.
     """
 
     character: str
@@ -30,6 +36,20 @@ class Look:
     motion_blur: bool
     barcode: bool = False
     beside: Path | None = None
+    movement: Movement = AS_BAKED
+
+    def hashed(self) -> dict[str, Any]:
+        """What of it decides a clip's bytes, as JSON data; paths do not count, nor what is not declared."""
+        values = asdict(self) | {"beside": None, "character": None}
+        if not self.movement.declared:
+            del values["movement"]
+        return values
+
+    def levels(self) -> "LevelSet":
+        """The character's levels as they move, kept for the next clip."""
+        from stimuli_builder.clips.kept_levels import kept_levels
+
+        return kept_levels(self.character, self.fingerprint, self.size_px, self.beside, self.movement)
 
 
 @dataclass(frozen=True)
@@ -47,7 +67,7 @@ class ClipJob:
     @property
     def input_hash(self) -> str:
         """SHA-256 over everything that decides the clip's bytes; paths do not count."""
-        look = asdict(self.look) | {"beside": None, "character": None, "render_version": RENDER_VERSION}
+        look = self.look.hashed() | {"render_version": RENDER_VERSION}
         digest = hashlib.sha256(json.dumps(look, sort_keys=True).encode())
         curve = self.curve
         for name in ("closure", "closure_other", "lower_vertical_mm", "lower_horizontal_mm"):
@@ -63,9 +83,8 @@ def render(job: ClipJob) -> bytes:
     """Render and encode a clip; returns the bytes of its MP4 file."""
     from stimuli_builder.clips.encode import encode_clip
     from stimuli_builder.clips.frames import FramePainter
-    from stimuli_builder.clips.levels import kept_levels
 
     look = job.look
-    painter = FramePainter(kept_levels(look.character, look.fingerprint, look.size_px, look.beside))
+    painter = FramePainter(look.levels())
     frames = painter.frames(job.curve, look.fps, look.motion_blur, look.barcode)
     return encode_clip(frames, look.size_px, look.fps)

@@ -1,24 +1,19 @@
 """A character at one picture size, ready to be blended: its levels as 16-bit linear light."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from pathlib import Path
+from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.characters.interpolation import level_weights
-from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.kernels import FULL_SCALE
 from stimuli_builder.clips.lower_lid import LowerLid
 
 Light = NDArray[np.uint16]
-MARGIN_PX = 4
-ROOMY_WIDTH_PX = 1200
-"""Up to this width a process keeps two characters; two at the largest size would pass 1.5 GB."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +43,8 @@ class LevelSet:
         What `window` shows at each of `closures`; its outermost pixels never change.
     closures : float64 array (n,)
         Ascending from 0 to 1.
-    lower : LowerLid or None
-        The lower lid's layer where the character has one.
+    read_lower : function or None
+        Reads the lower lid's layer where the character has one; clips in which it moves need it.
     """
 
     name: str
@@ -58,7 +53,14 @@ class LevelSet:
     closures: NDArray[np.float64]
     window: Window
     px_per_mm: float
-    lower: LowerLid | None = None
+    read_lower: Callable[[], LowerLid] | None = None
+
+    @cached_property
+    def lower(self) -> LowerLid:
+        """The lower lid's layer, read when it is first asked for; InputError where there is none."""
+        if self.read_lower is None:
+            raise InputError(f"character '{self.name}' has no lower-lid layer: use lower_lid = 'none'")
+        return self.read_lower()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -71,8 +73,8 @@ class LevelSet:
 
     def thinned(self, step: int) -> "LevelSet":
         """Every `step`th pixel of the window both ways, to measure by; `window` and `base` stay."""
-        lower = None if self.lower is None else self.lower.thinned(step)
-        return replace(self, levels=np.ascontiguousarray(self.levels[:, ::step, ::step]), lower=lower)
+        lower = None if self.read_lower is None else lambda: self.lower.thinned(step)
+        return replace(self, levels=np.ascontiguousarray(self.levels[:, ::step, ::step]), read_lower=lower)
 
     def picture(self, closure: float) -> NDArray[np.uint8]:
         """(height, width, 3) sRGB code values of the still frame at a closure."""
@@ -82,33 +84,8 @@ class LevelSet:
         return linear_to_srgb(light / np.float32(FULL_SCALE))
 
 
-@lru_cache(maxsize=2)
-def kept_levels(
-    character: str,
-    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
-    size_px: tuple[int, int],
-    beside: Path | None,
-) -> LevelSet:
-    """A character (a name, or a folder relative to `beside`) at a picture size, (width, height).
-
-    The last two are kept; at great sizes only the last one.
-    """
-    # Every core is already taken by a process of its own.
-    cv2.setNumThreads(1)
-    if size_px[0] > ROOMY_WIDTH_PX:
-        kept_levels.cache_clear()
-    return find_character(character, beside).levels(size_px)
-
-
-def window_inside(
-    x: float, y: float, width: float, height: float, size_px: tuple[int, int], name: str
-) -> Window:
-    """The even window around a region; InputError where the picture would cut it above or below."""
-    if y + MARGIN_PX < 0 or y + height - MARGIN_PX > size_px[1]:
-        raise InputError(
-            f"a picture of {size_px[0]} x {size_px[1]} px cuts off what moves in a blink of '{name}'; "
-            "ask for a greater height"
-        )
+def window_inside(x: float, y: float, width: float, height: float, size_px: tuple[int, int]) -> Window:
+    """The even window around a region, as far as it lies in the picture."""
     x0, y0 = max(0, 2 * int(x // 2)), max(0, 2 * int(y // 2))
     x1 = min(size_px[0], 2 * int(np.ceil((x + width) / 2)))
     y1 = min(size_px[1], 2 * int(np.ceil((y + height) / 2)))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.atlas import Atlas
+from stimuli_builder.characters.lower_lid_layer import LevelCodes, LowerLidLayer
 from stimuli_builder.clips.kernels import FULL_SCALE, add_products
 
 CHANGE_STEP, FACTOR_STEP = 2.0, 2.0**-15
@@ -23,10 +24,14 @@ class LowerLid:
 
     Attributes
     ----------
-    vertical_mm, horizontal_mm, closures : ascending grids of poses and mattes.
-    changes : int16 array (vertical x horizontal, h, w, 3), in CHANGE_STEP of 65535.
-    factors : uint16 array (mattes, h, w, 3), in FACTOR_STEP. Floats would take 200 MB more at most.
-    rows, columns : place in the character's window.
+    vertical_mm, horizontal_mm, closures : float64 array
+        Ascending grids of poses and mattes.
+    changes : int16 array (vertical x horizontal, h, w, 3)
+        In CHANGE_STEP of 65535.
+    factors : uint16 array (mattes, h, w, 3)
+        In FACTOR_STEP. Floats would take 200 MB more at most.
+    rows, columns : slice
+        Place in the character's window.
     """
 
     vertical_mm: Array
@@ -38,9 +43,11 @@ class LowerLid:
     columns: slice
 
     @classmethod
-    def of_character(cls, character: Atlas, to_window: Callable[[Picture], Picture]) -> "LowerLid":
+    def of_character(
+        cls, character: Atlas, to_window: Callable[[Picture], Picture], level_srgb: LevelCodes | None = None
+    ) -> "LowerLid":
         """Decode a character's layer; `to_window` brings a picture of its crop to the size in use."""
-        layer = character.lower_lid_layer
+        layer = LowerLidLayer(character, level_srgb)
         vertical, horizontal, closures = layer.vertical_mm, layer.horizontal_mm, layer.matte_closures
         shape = (character.declaration.crop[3], character.declaration.crop[2], 3)
 
@@ -50,13 +57,15 @@ class LowerLid:
             return to_window(whole)
 
         # Cut as they come: whole windows of all poses at once would take 1 GB at the largest size.
-        rows, columns = _where_any(placed(np.ones_like(layer.changes[0, 0])))
-        place = (rows.stop - rows.start, columns.stop - columns.start, 3)
-        changes = np.empty((len(vertical) * len(horizontal), *place), np.int16)
-        for index, change in enumerate(change for row in layer.changes for change in row):
+        rows, columns = _where_any(placed(np.ones(layer.shape, np.float32)))
+        array_shape = (rows.stop - rows.start, columns.stop - columns.start, 3)
+        changes = np.empty((len(vertical) * len(horizontal), *array_shape), np.int16)
+        for index, change in enumerate(layer.each_change()):
             part = placed(change)[rows, columns] * np.float32(FULL_SCALE / CHANGE_STEP)
             changes[index] = np.clip(np.rint(part), -32767, 32767)
-        factors = np.empty((len(closures), *place), np.uint16)
+        # The poses' video need not lie beside that of the levels, from which the factors' shade is made.
+        character.forget_poses()
+        factors = np.empty((len(closures), *array_shape), np.uint16)
         for index in range(len(closures)):
             part = placed(layer.factor_at(index))[rows, columns] / np.float32(FACTOR_STEP)
             factors[index] = np.clip(np.rint(part), 0, FULL_SCALE)

@@ -5,6 +5,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from experiments.definition import Experiment
 from experiments.manifest import Clip, Manifest
 from experiments.rendering import RenderSettings
@@ -109,12 +111,30 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
             "amplitude": settings.amplitude,
             "motion_blur": str(settings.motion_blur).lower(),
             "lower_lid": settings.lower_lid,
+            **moved_mm(clip),
+            **job.look.movement.inputs(),
             "eyes": settings.eyes,
             **clip.lower_held,
             "encoder": job.look.encoder,
         },
         seed=seed,
     )
+
+
+def moved_mm(clip: PlannedClip) -> dict[str, str]:
+    """By how many mm what is not the upper lid moves at the most: as declared, or as the bake measured it.
+
+    The lower lid's own signals come on top of what rises with the blink; all else moves with closure.
+    """
+    curve, said = clip.job.curve, {}
+    signals = {"lift": curve.lower_vertical_mm, "slide": curve.lower_horizontal_mm}
+    for name, signal in signals.items():
+        if signal is not None:
+            said[f"lower_lid_{name}_mm"] = f"{float(signal[np.argmax(np.abs(signal))]):.3f}"
+    parts = dict(clip.geometry.moved_mm) | clip.job.look.movement.declared
+    for name, moved in parts.items():
+        said[f"{name}_mm"] = f"{moved * float(curve.closure.max()):.3f}"
+    return said
 
 
 def _samples(signal: Array | None) -> tuple[float, ...]:

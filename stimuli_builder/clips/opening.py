@@ -47,12 +47,12 @@ class OpeningMeter:
     def __init__(self, character: LevelSet, opening_mm: float) -> None:
         self._character, self._opening_mm = character.thinned(STEP_PX), opening_mm
         rows, columns = character.window.slices
-        self._place = slice(rows.start, rows.stop, STEP_PX), slice(columns.start, columns.stop, STEP_PX)
+        self._pixels = slice(rows.start, rows.stop, STEP_PX), slice(columns.start, columns.stop, STEP_PX)
         self._eyes = _eyes(self._character)
 
     def measured_mm(self, luma: NDArray[np.uint8]) -> Array:
         """(frames, eyes) opening in mm in pictures of (frames, height, width) limited-range luma."""
-        pictures = (luma[:, *self._place].astype(np.float64) - 16) / 219
+        pictures = (luma[:, *self._pixels].astype(np.float64) - 16) / 219
         return self._opening([[eye.project(picture) for eye in self._eyes] for picture in pictures])
 
     def promised_mm(self, clip: Clip) -> Array:
@@ -64,7 +64,7 @@ class OpeningMeter:
             The clip's curves do not fit one another or the character.
         """
         curve = _curve_of(clip)
-        if curve.lower_vertical_mm is not None and self._character.lower is None:
+        if curve.lower_vertical_mm is not None and self._character.read_lower is None:
             raise InputError("its lower lid moves, its character's does not")
         known: dict[bytes, list[float]] = {}
         rows = []

@@ -2,53 +2,143 @@
 
 import hashlib
 import re
+import shutil
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.manifest import MANIFEST_NAME, Clip, Manifest, file_sha256
+from experiments.files import temporary_beside
+from experiments.manifest import MANIFEST_NAME, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, check_names, one_form
 from experiments.schema.canonical import definition_sha256
 from stimuli_builder.characters.writing import write_bytes
 from stimuli_builder.clips.manifest_file import manifest_text, program_version
-from stimuli_builder.video import opened, scan_video
+from video_conversion.prepare import prepare
+from video_conversion.prepared import VIDEO_ENDINGS, Prepared, clip_name
+from video_conversion.video_file import NotAClip
 
-ENDINGS = (".mp4", ".m4v", ".mov")
+MAX_NAMED = 5
+CONVERTED_FOLDER = "clips"
+"""Of the folder of videos: where clips go if one of them has to be converted."""
 NO_DEFINITION = hashlib.sha256(b"").hexdigest()
 """Hash of the definition where none was given."""
 
 
-def film_names(folder: Path) -> list[str]:
-    """Names of the clips of a folder; InputError where there are none, or two would be one."""
+def clip_names(folder: Path) -> list[str]:
+    """Names of the videos of a folder; InputError where there are none, or two would be one clip."""
     if not folder.is_dir():
-        raise InputError(f"expected a folder of clips, got {folder}, which is none")
-    names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in ENDINGS)
+        raise InputError(f"expected a folder of videos, got {folder}, which is none")
+    names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in VIDEO_ENDINGS)
     if not names:
-        raise InputError(f"expected clips ({', '.join(ENDINGS)}) in {folder}, got none")
-    check_names(names)
+        raise InputError(f"expected videos ({', '.join(VIDEO_ENDINGS)}) in {folder}, got none")
+    check_names(clip_name(name) for name in names)
     return names
 
 
-def write_own_manifest(folder: Path, placed: Placed, experiment: Experiment | None) -> Manifest:
-    """Write `folder/manifest.json`; InputError for the first clip that cannot be shown or has no cell."""
+def write_own_manifest(
+    folder: Path,
+    placed: Placed,
+    experiment: Experiment | None,
+    out: Path | None = None,
+    fps: float | None = None,
+    report: Callable[[int], object] = lambda _done: None,
+) -> tuple[Manifest, Path]:
+    """Convert what browsers do not play, and write the manifest of the clips of a folder.
+
+    Parameters
+    ----------
+    placed : dict
+        Levels and exemplar of each video, by its name.
+    experiment : Experiment or None
+        The declaration whose design they are to have.
+    out : Path or None
+        Folder for clips and manifest. None: `folder` where every video is shown as it is, else
+        `folder/clips`.
+    fps : float or None
+        Frames per second of every clip; None: each its own.
+    report : callable
+        Is told how many videos have been looked into.
+
+    Returns
+    -------
+    manifest, folder : Manifest, Path
+        What was written, and where.
+
+    Raises
+    ------
+    InputError
+        A video has no cell or cannot be a clip; nothing has been written then.
+    """
     check_factorial(placed)
     factors = tuple(next(iter(placed.values()))[0])
     if experiment is not None:
         _check_factors(factors, experiment)
         factors = experiment.factor_names
-    manifest = Manifest(
-        experiment=experiment.name if experiment else _name_of(folder),
-        definition_sha256=definition_sha256(experiment) if experiment else NO_DEFINITION,
-        program_version=program_version(),
-        seed=experiment.exemplars.seed if experiment else 0,
-        notes=("clips made elsewhere",),
-        clips=tuple(_clip(folder / name, *placed[name], factors) for name in sorted(placed)),
-    )
-    if experiment is not None:
-        _check_cells(manifest, experiment)
-    write_bytes(folder / MANIFEST_NAME, manifest_text(manifest).encode())
-    return manifest
+        _check_cells({(_cell(levels, factors), exemplar) for levels, exemplar in placed.values()}, experiment)
+    with TemporaryDirectory(dir=folder, prefix=".clips-") as temporary:
+        prepared = _prepared(folder, sorted(placed), Path(temporary), fps, report)
+        manifest = Manifest(
+            experiment=experiment.name if experiment else _name_of(folder),
+            definition_sha256=definition_sha256(experiment) if experiment else NO_DEFINITION,
+            program_version=program_version(),
+            seed=experiment.exemplars.seed if experiment else 0,
+            notes=("clips made elsewhere",),
+            clips=tuple(_clip(record, *placed[record.name], factors) for record in prepared),
+        )
+        target = out or (folder / CONVERTED_FOLDER if manifest.sources else folder)
+        if target.resolve() != folder.resolve():
+            _fill(target, folder, Path(temporary), prepared)
+        elif manifest.sources:
+            raise InputError(
+                f"{len(manifest.sources)} of {len(prepared)} videos have to be converted; expected another "
+                f"folder than {folder} for --out, since originals stay as they are"
+            )
+    write_bytes(target / MANIFEST_NAME, manifest_text(manifest).encode())
+    return manifest, target
+
+
+def _prepared(
+    folder: Path, names: Sequence[str], made: Path, fps: float | None, report: Callable[[int], object]
+) -> list[Prepared]:
+    """Every video looked into, and converted into `made` where it has to be; InputError names all refused."""
+    records, problems = [], []
+    for done, name in enumerate(names, start=1):
+        try:
+            records.append(prepare(folder / name, made, fps))
+        except NotAClip as error:
+            problems.append(f"{name}: {error}")
+        report(done)
+    if problems:
+        raise InputError(
+            f"{len(problems)} of {len(names)} videos cannot become clips; {'; '.join(problems[:MAX_NAMED])}"
+        )
+    return records
+
+
+def _fill(target: Path, folder: Path, made: Path, prepared: Sequence[Prepared]) -> None:
+    """Clips, and originals of those that were converted, into the folder of the manifest."""
+    target.mkdir(parents=True, exist_ok=True)
+    for record in prepared:
+        original = folder / record.name
+        if record.source is None:
+            _copy(original, target / one_form(record.name))
+        else:
+            _copy(original, target / one_form(record.source.kept_as))
+            # Equal originals have one clip: it is copied for each.
+            _copy(made / Path(record.clip).name, target / one_form(clip_name(record.name)))
+
+
+def _copy(source: Path, target: Path) -> None:
+    """A whole copy or none."""
+    temporary = temporary_beside(target, source.suffix)
+    try:
+        shutil.copyfile(source, temporary)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _name_of(folder: Path) -> str:
@@ -63,9 +153,8 @@ def _check_factors(factors: tuple[str, ...], experiment: Experiment) -> None:
         )
 
 
-def _check_cells(manifest: Manifest, experiment: Experiment) -> None:
+def _check_cells(present: set[tuple[str, int]], experiment: Experiment) -> None:
     declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
-    present = {(clip.cell, clip.exemplar) for clip in manifest.clips}
     for word, cells in (("is missing", declared - present), ("is not declared", present - declared)):
         if cells:
             cell, exemplar = min(cells)
@@ -75,24 +164,21 @@ def _check_cells(manifest: Manifest, experiment: Experiment) -> None:
             )
 
 
-def _clip(path: Path, levels: dict[str, str], exemplar: int, factors: tuple[str, ...]) -> Clip:
-    with opened(path) as (_, stream):
-        codec = stream.codec_context.name
-    if codec != "h264":
-        raise InputError(
-            f"{path.name}: expected H.264, which every browser plays, got {codec}; convert it with "
-            f"`ffmpeg -i {path.name} -c:v libx264 -pix_fmt yuv420p -an NEW.mp4`"
-        )
-    info = scan_video(path)
+def _cell(levels: dict[str, str], factors: tuple[str, ...]) -> str:
+    return "/".join(levels[factor] for factor in factors)
+
+
+def _clip(record: Prepared, levels: dict[str, str], exemplar: int, factors: tuple[str, ...]) -> Clip:
     return Clip(
         levels={factor: levels[factor] for factor in factors},
-        cell="/".join(levels[factor] for factor in factors),
+        cell=_cell(levels, factors),
         exemplar=exemplar,
-        file=one_form(path.name),
-        sha256=file_sha256(path),
-        bytes=path.stat().st_size,
-        fps=info.fps,
-        frames=info.frame_count,
-        width_px=info.size_px[0],
-        height_px=info.size_px[1],
+        file=one_form(clip_name(record.name)),
+        sha256=record.sha256,
+        bytes=record.bytes,
+        fps=record.fps,
+        frames=record.frames,
+        width_px=record.width_px,
+        height_px=record.height_px,
+        source=record.source,
     )

@@ -70,7 +70,7 @@ def _performed(
         events += speech_events(stretches)
         changes = speech_states(stretches, settings.state) if stretches else []
     elif settings.performance != "intervals":
-        mean_s = parameters.intervals[settings.state].mean
+        mean_s = parameters.mean_interval_s(settings.state)
         parameters = _without_spontaneous(parameters)
         if settings.performance == "uniform":
             events = [Event("blink", time_s) for time_s in _timer(settings.seconds, mean_s, rng)]
@@ -100,10 +100,11 @@ def _without_spontaneous(parameters: Parameters) -> Parameters:
 
 
 def _timer(length_s: float, mean_s: float, rng: np.random.Generator) -> list[float]:
-    """Blinks of a timer that runs already when the clip begins."""
+    """Blinks of a timer that runs already when the clip begins: in a long wait rather than a short one."""
     shortest, longest = (share * mean_s for share in TIMER_SHARES)
     times: list[float] = []
-    time_s = float(rng.uniform(0.0, 1.0) * rng.uniform(shortest, longest))
+    under_way = float(np.sqrt(rng.uniform(shortest**2, longest**2)))
+    time_s = float(rng.uniform(0.0, under_way))
     while time_s < length_s:
         times.append(time_s)
         time_s += float(rng.uniform(shortest, longest))

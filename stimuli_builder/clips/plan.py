@@ -13,15 +13,19 @@ from stimuli_builder.clips.exemplars import recorded_order
 def summary(experiment: Experiment) -> dict[str, Any]:
     """The design as plain values.
 
-    Keys
-    ----
-    name, title, participants : as declared.
-    factors : list of {name, label, levels: list of {name, label}}.
-    cells : list of cell labels, last factor fastest.
-    exemplars_per_cell, unique_clips, trials_per_participant, practice_trials : counts.
-    blocks : list of {label, trials} in declared order; order : how a participant's order is drawn.
-    expected_minutes : length of a visit. notes : what the kind of trial adds, such as counts of pairs.
-    repeated_profiles : list of {exemplar, profile, group}: recordings that stand for a second exemplar.
+    Returns
+    -------
+    dict of str to Any
+        By key:
+
+        - `name`, `title`, `participants` as declared;
+        - `factors`, a list of {name, label, levels: list of {name, label}};
+        - `cells`, a list of cell labels, last factor fastest;
+        - `exemplars_per_cell`, `unique_clips`, `trials_per_participant`, `practice_trials`, counts;
+        - `blocks`, a list of {label, trials} in declared order, and `order`, how the blocks' order is drawn;
+        - `expected_minutes`, the length of a visit in minutes;
+        - `notes`, what the kind of trial adds, such as counts of pairs;
+        - `repeated_profiles`, a list of {exemplar, profile, group}: recordings that stand for a second one.
     """
     return {
         "name": experiment.name,
@@ -50,23 +54,23 @@ def summary(experiment: Experiment) -> dict[str, Any]:
 
 def repeated_profiles(experiment: Experiment, seed: int | None = None) -> list[dict[str, Any]]:
     """Exemplars whose recorded profile already stands for an earlier exemplar of the same cells."""
-    found: dict[str, list[dict[str, Any]]] = {}
+    clips: dict[str, list[dict[str, Any]]] = {}
     for spec in design.clips(experiment):
         settings = design.render_settings(experiment, spec)
         group = design.exemplar_key(experiment, spec).rpartition("/")[0]
-        if settings.performance is None and settings.profile == "real" and group not in found:
+        if settings.performance is None and settings.profile == "real" and group not in clips:
             order = recorded_order(
                 experiment.exemplars.per_cell,
                 experiment.exemplars.seed if seed is None else seed,
                 group,
                 paired=settings.eyes == "separate",
             )
-            found[group] = [
+            clips[group] = [
                 {"exemplar": number, "profile": profile.profile_id, "group": group}
                 for number, (profile, repeated) in enumerate(order, start=1)
                 if repeated
             ]
-    return [entry for entries in found.values() for entry in entries]
+    return [entry for entries in clips.values() for entry in entries]
 
 
 def experiment_folder(name_or_path: str) -> Path | None:

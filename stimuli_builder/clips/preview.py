@@ -46,8 +46,8 @@ def contact_sheet(manifest: Manifest, folder: Path) -> Rgb:
     for number, (clip, frames) in enumerate(zip(firsts, rows, strict=True)):
         top = number * (height + 2)
         draw.multiline_text((8, top + 10), _label(clip), fill=INK, font=font, spacing=4)
-        for place, frame in enumerate(frames):
-            sheet.paste(Image.fromarray(frame), (LABEL_PX + place * (width + 2), top))
+        for column, frame in enumerate(frames):
+            sheet.paste(Image.fromarray(frame), (LABEL_PX + column * (width + 2), top))
     return np.asarray(sheet)
 
 

@@ -96,8 +96,8 @@ def _numbers(path: Path, table: pd.DataFrame, name: str) -> Array:
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
-        found = table[name].iloc[int(wrong[0])]
-        raise InputError(f"{path.name}: {name} must be a number, sample {wrong[0] + 1} is '{found}'")
+        text = table[name].iloc[int(wrong[0])]
+        raise InputError(f"{path.name}: {name} must be a number, sample {wrong[0] + 1} is '{text}'")
     return values
 
 

@@ -8,7 +8,7 @@ from experiments.files import whole_file
 from experiments.rendering import PROFILES, RenderSettings
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.clips.characters import geometry
-from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve, within_reach
+from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve, shown_by
 from stimuli_builder.clips.design_clips import Options, check_look, look_of
 from stimuli_builder.clips.exemplars import Exemplar, exemplar, of_declared_length
 from stimuli_builder.clips.jobs import ClipJob, render
@@ -36,34 +36,34 @@ class Made:
     onset_frame: int
 
 
-def render_single(wanted: SingleClip, out: Path) -> Made:
+def render_single(clip: SingleClip, out: Path) -> Made:
     """Render one clip into `out`, whole or not at all."""
-    settings = wanted.settings
-    place = geometry(settings.character)
-    check_look(settings, place)
-    shown = _blink(wanted)
-    timing = Timing.drawn(settings.fps, shown.phase_samples, wanted.seed, wanted.profile, wanted.exemplar)
-    curve = clip_curve(shown.profile, timing, settings.lower_lid, wanted.clip_frames)
-    curve, _ = within_reach(curve, place.lower_range_mm)
-    job = ClipJob(look_of(settings, Options(barcode=wanted.barcode)), curve)
+    settings = clip.settings
+    character = geometry(settings.character)
+    check_look(settings, character)
+    shown = _blink(clip)
+    timing = Timing.drawn(settings.fps, shown.phase_samples, clip.seed, clip.profile, clip.exemplar)
+    curve = clip_curve(shown.profile, timing, settings.lower_lid, clip.clip_frames)
+    curve, _ = shown_by(curve, settings, character.lower_range_mm)
+    job = ClipJob(look_of(settings, Options(barcode=clip.barcode)), curve)
     with whole_file(out) as temporary:
         temporary.write_bytes(render(job))
     return Made(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))
 
 
-def _blink(wanted: SingleClip) -> Exemplar:
-    settings = wanted.settings
-    if wanted.profile in PROFILES or wanted.profile.endswith(".csv"):
-        chosen = settings.model_copy(update={"profile": wanted.profile})
-        return exemplar(chosen, wanted.profile, wanted.exemplar, wanted.seed)
+def _blink(clip: SingleClip) -> Exemplar:
+    settings = clip.settings
+    if clip.profile in PROFILES or clip.profile.endswith(".csv"):
+        chosen = settings.model_copy(update={"profile": clip.profile})
+        return exemplar(chosen, clip.profile, clip.exemplar, clip.seed)
     shipped = {p.profile_id: p for paired in (False, True) for p in load_library(paired=paired)}
-    if wanted.profile not in shipped:
+    if clip.profile not in shipped:
         names = [*PROFILES, *shipped]
-        raise InputError(f"no blink profile '{wanted.profile}'{did_you_mean(wanted.profile, names)}")
-    profile = shipped[wanted.profile]
+        raise InputError(f"no blink profile '{clip.profile}'{did_you_mean(clip.profile, names)}")
+    profile = shipped[clip.profile]
     profile = of_declared_length(profile, settings)
     if settings.eyes == "separate" and profile.closure_other is None:
-        raise InputError(f"profile {wanted.profile} shows one eye; --eyes separate needs one of both eyes")
+        raise InputError(f"profile {clip.profile} shows one eye; --eyes separate needs one of both eyes")
     if settings.eyes == "alike":
         profile = replace(profile, closure_other=None)
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated=False, phase_samples=0)

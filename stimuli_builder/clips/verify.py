@@ -14,7 +14,8 @@ from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, file_sha256, place_of, read_manifest
 from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
-from stimuli_builder.clips.levels import kept_levels
+from stimuli_builder.clips.face_movement.amounts import Movement
+from stimuli_builder.clips.kept_levels import kept_levels
 from stimuli_builder.clips.opening import OpeningMeter
 
 TOLERANCE_MM = 0.3
@@ -74,7 +75,10 @@ def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[lis
         return [f"missing from {folder}"], None
     if file_sha256(path) != clip.sha256:
         return [f"its bytes are not those of the {MANIFEST_NAME} (another sha256)"], None
-    meter = None if isinstance(clip, CheckClip) or not clip.closure else meters.of(clip)
+    try:
+        meter = None if isinstance(clip, CheckClip) or not clip.closure else meters.of(clip)
+    except (InputError, ValueError) as error:
+        return [f"its inputs in the {MANIFEST_NAME} cannot be read ({error})"], None
     try:
         measured, problems = _decoded(path, clip, meter)
     except (av.error.FFmpegError, InputError, ValueError) as error:
@@ -133,21 +137,25 @@ class _Meters:
 
     def __init__(self, beside: Path | None) -> None:
         self._beside, self._folder = beside, beside or Path()
-        self._key: tuple[str, str, int, int] | None = None
+        self._key: tuple[str, str, int, int, Movement] | None = None
         self._meter: OpeningMeter | None = None
 
     def of(self, clip: Clip) -> OpeningMeter | None:
         """The meter of a clip's character; None where it is not here or looks different now."""
-        name, wanted = clip.inputs.get("character", ""), clip.inputs.get("character_sha256", "")
-        key = (name, wanted, clip.width_px, clip.height_px)
+        name, sha256 = clip.inputs.get("character", ""), clip.inputs.get("character_sha256", "")
+        movement = Movement.of_inputs(clip.inputs)
+        key = (name, sha256, clip.width_px, clip.height_px, movement)
         if key != self._key:
-            self._key, self._meter = key, self._made(name, wanted, (clip.width_px, clip.height_px))
+            self._key, self._meter = key, self._made(name, sha256, (clip.width_px, clip.height_px), movement)
         return self._meter
 
-    def _made(self, name: str, wanted: str, size_px: tuple[int, int]) -> OpeningMeter | None:
-        place = name if name in shipped_names() or (self._folder / name).is_dir() else None
-        if not place or fingerprint(place, self._beside) != wanted:
+    def _made(
+        self, name: str, sha256: str, size_px: tuple[int, int], movement: Movement
+    ) -> OpeningMeter | None:
+        folder_name = name if name in shipped_names() or (self._folder / name).is_dir() else None
+        if not folder_name or fingerprint(folder_name, self._beside) != sha256:
             return None
         return OpeningMeter(
-            kept_levels(place, wanted, size_px, self._beside), geometry(place, self._beside).opening_mm
+            kept_levels(folder_name, sha256, size_px, self._beside, movement),
+            geometry(folder_name, self._beside).opening_mm,
         )

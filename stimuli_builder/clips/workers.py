@@ -36,13 +36,18 @@ def run_jobs(jobs: Sequence[ClipJob], workers: int, dask: str | None = None) -> 
     dask : str, optional
         Address of a running Dask scheduler (`tcp://host:8786`) to use instead.
     """
-    order = sorted(range(len(jobs)), key=lambda i: (jobs[i].look.fingerprint, jobs[i].look.size_px, i))
+    order = sorted(range(len(jobs)), key=lambda i: (*_levels_of(jobs[i]), i))
     if dask is not None:
         yield from _on_dask(jobs, order, dask)
     elif workers <= 1 or len(jobs) <= 1:
         yield from ((index, render(jobs[index])) for index in order)
     else:
         yield from _on_pool(jobs, order, workers)
+
+
+def _levels_of(job: ClipJob) -> tuple[str, tuple[int, int], str]:
+    """Equal for jobs that are painted from the same levels."""
+    return job.look.fingerprint, job.look.size_px, repr(job.look.movement)
 
 
 def _on_pool(jobs: Sequence[ClipJob], order: list[int], workers: int) -> Iterator[tuple[int, bytes]]:

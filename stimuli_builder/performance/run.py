@@ -15,6 +15,8 @@ from stimuli_builder.blinks.export.curve import AnimationCurve
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
 from stimuli_builder.performance.subtitles import SUFFIXES, speech_in_subtitles
 
+MAX_FRAMES = 6_000_000
+"""A day at 60 frames a second; more is a slip of the keyboard, and would fill the memory."""
 LOWER_UP_MM, LOWER_IN_MM = 0.75, 2.6
 """The lower lid's full travel: the middle of the ranges of `stimuli_builder.blinks.lower_lid`."""
 
@@ -42,6 +44,10 @@ def write_performance(job: PerformanceJob) -> None:
     duration_s = job.duration_s or length_s
     if duration_s <= 0:
         raise InputError("expected a recording, subtitles, or --duration in seconds; got none")
+    if duration_s * job.fps > MAX_FRAMES:
+        raise InputError(
+            f"expected at most {MAX_FRAMES} frames, got {duration_s * job.fps:.0f}; lower --duration or --fps"
+        )
     parameters = default_parameters()
     if job.rate is not None:
         parameters = parameters.with_rate(state, job.rate)
@@ -58,9 +64,10 @@ def write_performance(job: PerformanceJob) -> None:
     with whole_text(job.out) as stream:
         stream.write(text)
     spoken_s = sum(one.end_s - one.start_s for one in stretches)
+    heard = f"{spoken_s:.1f} s of speech in {len(stretches)} stretches; " if stretches else ""
     Console().print(
-        f"{spoken_s:.1f} s of speech in {len(stretches)} stretches; {len(done.blinks)} blinks in "
-        f"{duration_s:.1f} s, {done.left.size} frames at {job.fps:g} fps; wrote {job.out}"
+        f"{heard}{len(done.blinks)} blinks in {duration_s:.1f} s, {done.left.size} frames at "
+        f"{job.fps:g} fps; wrote {job.out}"
     )
     if job.source is not None and not stretches:
         Console(stderr=True).print(f"{job.source}: nobody speaks; the blinks are those of '{job.state}'")
@@ -88,9 +95,7 @@ def _checked(job: PerformanceJob) -> StateName:
         raise InputError(f"expected --duration from 0 to 86400 seconds, got {job.duration_s:g}")
     if job.state not in get_args(StateName):
         states = list(get_args(StateName))
-        raise InputError(
-            f"unknown --state '{job.state}'{did_you_mean(job.state, states)}; one of {', '.join(states)}"
-        )
+        raise InputError(f"unknown --state '{job.state}'{did_you_mean(job.state, states)}")
     check_targets([job.out], [job.source])
     return cast(StateName, job.state)
 

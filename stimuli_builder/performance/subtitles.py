@@ -41,7 +41,11 @@ def _captions(path: Path) -> list[Caption]:
     read = webvtt.read if path.suffix.lower() == ".vtt" else webvtt.from_srt
     try:
         captions = list(read(str(path)).captions)
-    except (OSError, UnicodeDecodeError, webvtt.errors.MalformedFileError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: expected subtitles in UTF-8 ({error.reason}); save them as UTF-8"
+        ) from error
+    except (OSError, webvtt.errors.MalformedFileError) as error:
         raise InputError(f"{path}: expected subtitles ({' or '.join(SUFFIXES)}): {error}") from error
     if not captions:
         raise InputError(f"{path}: expected subtitles with times, found none")

@@ -63,8 +63,8 @@ def _of_film(path: Path, camera_fps: float | None, fps: float | None, frames: in
     from stimuli_builder.sync_patch.onsets import plays
 
     read = read_film(path, camera_fps, lambda line: typer.echo(line, err=True))
-    found = plays(read.times_ms, read.numbers, fps, frames)
-    return report.of_film(found, read.pictures_per_s), report.rows_of_film(found)
+    shown = plays(read.times_ms, read.numbers, fps, frames)
+    return report.of_film(shown, read.pictures_per_s), report.rows_of_film(shown)
 
 
 def _of_trace(path: Path, fps: float | None) -> Said:
@@ -73,8 +73,8 @@ def _of_trace(path: Path, fps: float | None) -> Said:
 
     if fps is None:
         raise InputError("a photodiode's trace needs the clip's rate: --fps 30")
-    found = photodiode.changes(photodiode.read_trace(path), fps)
-    return report.of_trace(found), report.rows_of_trace(found)
+    changes = photodiode.changes(photodiode.read_trace(path), fps)
+    return report.of_trace(changes), report.rows_of_trace(changes)
 
 
 def register(app: typer.Typer) -> None:

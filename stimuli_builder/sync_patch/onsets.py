@@ -34,7 +34,12 @@ class Onset:
 class PlayOnScreen:
     """One showing of a clip.
 
-    missing: frames never seen, of those up to `frames` - 1. Times in ms; late_ms by frame, equation (2).
+    Times are in ms; `late_ms` is by frame, equation (2).
+
+    Attributes
+    ----------
+    missing : list of int
+        Frames never seen, of those up to `frames` - 1.
     """
 
     onsets: tuple[Onset, ...]

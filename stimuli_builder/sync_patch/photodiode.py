@@ -94,10 +94,10 @@ def changes(trace: Trace, fps: float) -> Changes:
 
 def _crossings(times_ms: NDArray[np.float64], share: NDArray[np.float64]) -> list[tuple[float, bool]]:
     """Each change with its direction, half way between samples; what stays between the levels is noise."""
-    found: list[tuple[float, bool]] = []
+    changes: list[tuple[float, bool]] = []
     light = bool(share[0] > (UP + DOWN) / 2)
-    for place in range(1, len(share)):
-        if (light and share[place] < DOWN) or (not light and share[place] > UP):
+    for sample in range(1, len(share)):
+        if (light and share[sample] < DOWN) or (not light and share[sample] > UP):
             light = not light
-            found.append((float(times_ms[place - 1] + times_ms[place]) / 2, light))
-    return found
+            changes.append((float(times_ms[sample - 1] + times_ms[sample]) / 2, light))
+    return changes

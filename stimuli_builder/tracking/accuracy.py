@@ -26,10 +26,14 @@ class HeldOut:
 
     Attributes
     ----------
-    rms_px : root mean square distance of the landmarks from the labels; None if the frame was not found.
-    distance_errors_px : (eyes,) inter-eyelid distance minus the label's.
-    residuals : (eyes,) root mean square grey levels.
-    point_errors_px : (9 * eyes,) distance of each landmark from its label.
+    rms_px : float or None
+        Root mean square distance of the landmarks from the labels; None if the frame was not found.
+    distance_errors_px : float64 array (eyes,) or None
+        Inter-eyelid distance minus the label's.
+    residuals : float64 array (eyes,) or None
+        Root mean square grey levels.
+    point_errors_px : float64 array (9 * eyes,) or None
+        Distance of each landmark from its label.
     """
 
     frame: int
@@ -53,15 +57,18 @@ def cross_validate(
 
     Parameters
     ----------
-    pictures, points : by frame number; points (9 * eyes, 2).
-    folds : frame k of the ascending labelled frames is in fold k modulo `folds`.
-    refine : refine the labels of the training frames of each fold, without sight of the frames left out.
+    pictures, points : dict of int to Picture, dict of int to float64 array
+        By frame number; points (9 * eyes, 2).
+    folds : int
+        Frame k of the ascending labelled frames is in fold k modulo `folds`.
+    refine : bool, optional
+        Refine the labels of the training frames of each fold, without sight of the frames left out.
     """
     frames = sorted(points)
     folds = min(folds, len(frames))
     results = []
     for fold in range(folds):
-        out = [frame for place, frame in enumerate(frames) if place % folds == fold]
+        out = [frame for index, frame in enumerate(frames) if index % folds == fold]
         kept = [frame for frame in frames if frame not in out]
         labels = {frame: points[frame] for frame in kept}
         if refine:
@@ -81,11 +88,11 @@ def _held_out(
     fits = [fit for fit in (finder.anywhere(small), finder.near(small, middle)) if fit is not None]
     if not fits:
         return HeldOut(frame, fold, None, None, None)
-    fit: Fit = min(fits, key=lambda found: float(found.residuals.max()))
-    found = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
-    errors = inter_eyelid_distances(found, model.markers) - inter_eyelid_distances(label, model.markers)
-    away = np.hypot(*(found - label).T)
-    return HeldOut(frame, fold, _rms(found - label), errors, fit.residuals, away)
+    fit: Fit = min(fits, key=lambda restored: float(restored.residuals.max()))
+    restored = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
+    errors = inter_eyelid_distances(restored, model.markers) - inter_eyelid_distances(label, model.markers)
+    away = np.hypot(*(restored - label).T)
+    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away)
 
 
 def _rms(differences: Points) -> float:
@@ -118,9 +125,9 @@ def refined_labels(
     for _ in range(rounds):
         model = train([pictures[f] for f in frames], np.array([refined[f] for f in frames]), markers, plain)
         fitter = Fitter(model)
-        for place, frame in enumerate(frames):
+        for index, frame in enumerate(frames):
             small = reduced(pictures[frame], model.reduction)
-            fit = fitter.fit(small, model.examples[place], model.poses[place])
+            fit = fitter.fit(small, model.examples[index], model.poses[index])
             if fit.iterations:
                 moved = fit.vertices[: EYE_POINTS * markers.eyes].astype(np.float64)
                 refined[frame] = restored_points(moved, model.reduction)

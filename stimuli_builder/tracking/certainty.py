@@ -70,8 +70,10 @@ def doubt(
 
     Parameters
     ----------
-    difference : mean distance of the lids from a detector's, as part of the eye's width; None if not asked.
-    before : points of the frame before, where that was tracked.
+    difference : float or None
+        Mean distance of the lids from a detector's, as part of the eye's width; None if not asked.
+    before : float64 array or None
+        Points of the frame before, where that was tracked.
     """
     width = widths(points)
     if difference is not None and difference > DIFFERING_SHARE:
@@ -104,12 +106,17 @@ def lid_difference(points: Points, other: Points) -> float:
 
     Detectors place points differently along a lid, so only the distance from the curve counts.
     """
-    worst = 0.0
+    return float(lid_offsets(points, other).mean(1).max())
+
+
+def lid_offsets(points: Points, other: Points) -> Values:
+    """Distance of each lid point from another's lid curve, as part of the other eye's width (eyes, 7)."""
+    offsets = []
     for start in range(0, len(points), EYE_POINTS):
         one, two = points[start : start + EYE_POINTS], other[start : start + EYE_POINTS]
         away = np.concatenate([from_curve(one[1:5], two[:6]), from_curve(one[6:9], two[[5, 6, 7, 8, 0]])])
-        worst = max(worst, float(away.mean()) / max(eye_axis(two)[2], 1e-6))
-    return worst
+        offsets.append(away / max(eye_axis(two)[2], 1e-6))
+    return np.array(offsets)
 
 
 def from_curve(points: Points, curve: Points) -> Values:

@@ -39,6 +39,13 @@ Folds = Annotated[int, typer.Option(help="Folds of the accuracy report.", min=2,
 VariableRate = Annotated[
     bool, typer.Option("--accept-variable-rate", help="Take a variable frame rate, with its own time stamps.")
 ]
+DamagedEnd = Annotated[
+    bool,
+    typer.Option(
+        "--accept-damaged-end",
+        help="Track a file that is cut off or damaged up to the first frame that cannot be read.",
+    ),
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -72,6 +79,7 @@ def track(
     refine: Refine = None,
     folds: Folds = 5,
     accept_variable_rate: VariableRate = False,
+    accept_damaged_end: DamagedEnd = False,
     relabel: Annotated[
         Path | None,
         typer.Option(
@@ -121,6 +129,7 @@ def track(
         refine=refine,
         folds=folds,
         accept_variable_rate=accept_variable_rate,
+        accept_damaged_end=accept_damaged_end,
     )
     if video.is_dir():
         track_folder(job)

@@ -18,7 +18,8 @@ from stimuli_builder.tracking.preview import write_preview
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.track import TrackSummary, track_video
-from stimuli_builder.video import VideoInfo
+from stimuli_builder.video import VideoInfo, declared_frames
+from stimuli_builder.video_clock import DamagedFileError
 from stimuli_builder.video_writer import check_video_name
 
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".mpg", ".wmv"}
@@ -40,12 +41,19 @@ class TrackJob:
     refine: bool | None = None
     folds: int = 5
     accept_variable_rate: bool = False
+    accept_damaged_end: bool = False
 
 
 def run_track(job: TrackJob) -> None:
     """Track one video and write what is asked for; all checks come first."""
     _check(job)
-    info = open_video(job.video, job.accept_variable_rate)
+    try:
+        _track(job, open_video(job.video, job.accept_variable_rate, job.accept_damaged_end))
+    except DamagedFileError as error:
+        raise InputError(f"{error}, or track what can be read with --accept-damaged-end") from error
+
+
+def _track(job: TrackJob, info: VideoInfo) -> None:
     model, hints = _model(job, info)
     with frame_progress() as progress:
         task = progress.add_task("tracking", total=info.frame_count)
@@ -57,6 +65,8 @@ def run_track(job: TrackJob) -> None:
             hints,
         )
     _report(job.out, summary)
+    if job.accept_damaged_end:
+        _say_how_far(info)
     if job.relabel is not None:
         _relabel(job.relabel, info, model, job.out, hints)
     _pictures(job, info, model)
@@ -95,6 +105,16 @@ def track_folder(job: TrackJob) -> None:
         raise InputError(
             f"{refused} of {len(videos)} videos could not be tracked; the others are in {job.out}"
         )
+
+
+def _say_how_far(info: VideoInfo) -> None:
+    """Print where a recording ends that was taken up to its damage."""
+    more = "read"
+    if info.damaged:
+        declared = declared_frames(info)
+        of = f"of about {declared:,} declared" if declared > info.frame_count else "before the damage"
+        more = f"{of}; the rest could not be read"
+    print(f"{info.path}: {info.frame_count:,} frames ({info.times_s[-1]:.2f} s) {more}")
 
 
 def _check(job: TrackJob) -> None:

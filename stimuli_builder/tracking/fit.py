@@ -24,10 +24,14 @@ class Fit:
 
     Attributes
     ----------
-    c, pose : coupled parameters (l,) and similarity (4,) in the reduced picture.
-    vertices : float32 (V, 2) in the reduced picture.
-    residuals : (eyes,) root mean square grey levels.
-    iterations : 0 if the fit broke down.
+    c, pose : float64 array
+        Coupled parameters (l,) and similarity (4,) in the reduced picture.
+    vertices : float32 array (V, 2)
+        In the reduced picture.
+    residuals : float64 array (eyes,)
+        Root mean square grey levels.
+    iterations : int
+        0 if the fit broke down.
     """
 
     c: Values
@@ -43,9 +47,12 @@ class Algebra:
 
     Attributes
     ----------
-    directions : float64 (K, V, 2); movement of the vertices per parameter, the 4 of the similarity last.
-    scales, centre : the similarity directions' norms (4,) and the centroid they turn about (2,).
-    hessian_forms : float64 (pairs, K, K); H(c) = sum over pairs i <= j of c_i c_j forms, with c_0 = 1.
+    directions : float64 array (K, V, 2)
+        Movement of the vertices per parameter, the 4 of the similarity last.
+    scales, centre : float64 array
+        The similarity directions' norms (4,) and the centroid they turn about (2,).
+    hessian_forms : float64 array (pairs, K, K)
+        H(c) = sum over pairs i <= j of c_i c_j forms, with c_0 = 1.
     """
 
     directions: Values

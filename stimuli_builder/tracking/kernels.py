@@ -16,7 +16,7 @@ BLOCK = 512
 
 
 @compiled
-def place(base, modes, c, pose, out):
+def posed_vertices(base, modes, c, pose, out):
     """Vertices of parameters c under a similarity: base (V, 2), modes (l, V, 2), out float32 (V, 2)."""
     for v in range(base.shape[0]):
         x = base[v, 0]
@@ -242,10 +242,17 @@ class MeshArrays(NamedTuple):
 
     Attributes
     ----------
-    vertices : float64 (V, 2); triangles : int (T, 3); starts : int (T + 1,), first pixel of each triangle.
-    forms : float32 (T, 3, 3), barycentric coordinates as linear forms in (x, y, 1).
-    x, y : float32 (N,) pixel positions; eye_of : int (T,).
-    left, right, above, below : uint32 (N,) neighbours of each pixel.
+    vertices : float64 array (V, 2)
+    triangles : int array (T, 3)
+    starts : int array (T + 1,)
+        First pixel of each triangle.
+    forms : float32 array (T, 3, 3)
+        Barycentric coordinates as linear forms in (x, y, 1).
+    x, y : float32 array (N,)
+        Pixel positions.
+    eye_of : int array (T,)
+    left, right, above, below : uint32 array (N,)
+        Neighbours of each pixel.
     """
 
     vertices: Any
@@ -266,9 +273,14 @@ class ModelArrays(NamedTuple):
 
     Attributes
     ----------
-    shape_modes : float64 (l, V, 2); appearance : float32 (l + 1, N); weights : float32 (N,).
-    hessian_forms : float64 (pairs, K, K); directions : float64 (K, V, 2).
-    prior, limits : float64 (l,); scales : float64 (4,); centre : float64 (2,).
+    shape_modes : float64 array (l, V, 2)
+    appearance : float32 array (l + 1, N)
+    weights : float32 array (N,)
+    hessian_forms : float64 array (pairs, K, K)
+    directions : float64 array (K, V, 2)
+    prior, limits : float64 array (l,)
+    scales : float64 array (4,)
+    centre : float64 array (2,)
     """
 
     shape_modes: Any
@@ -309,7 +321,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
     sums = np.empty_like(vertices)
     change = np.empty(size)
     matrix = np.empty((size, size))
-    place(mesh.vertices, model.shape_modes, c, pose, vertices)
+    posed_vertices(mesh.vertices, model.shape_modes, c, pose, vertices)
     iteration = 0
     while iteration < max_iterations:
         iteration += 1
@@ -332,7 +344,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
             return 0
         step(c, pose, change, model.limits, model.scales, model.centre)
         before[:] = vertices
-        place(mesh.vertices, model.shape_modes, c, pose, vertices)
+        posed_vertices(mesh.vertices, model.shape_modes, c, pose, vertices)
         furthest = np.float32(0)
         for v in range(vertices.shape[0]):
             furthest = max(furthest, abs(vertices[v, 0] - before[v, 0]), abs(vertices[v, 1] - before[v, 1]))

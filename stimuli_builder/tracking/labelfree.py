@@ -37,7 +37,7 @@ LEAST_SEEN = 0.3
 """Share of the frames looked at that must show a face: below it, what was found is hardly one."""
 DETECTOR_SHARE = 0.02
 """What the detector's lids may be off that no held-out frame tells, as part of the eye's width. Against
-labels they are 2.9% off where those are good to 1%, 3.6% where good to 3%; a part is in held-out frames."""
+labels they are 2.9% off where those are good to 1%, 2.6% where good to 3%; a part is in held-out frames."""
 MODES = 6
 SPREADS = 8.0
 UNLIKE_SHARE = 0.02
@@ -52,9 +52,12 @@ class Survey:
 
     Attributes
     ----------
-    points : frame -> (9 * eyes, 2) points in pixels.
-    looked_at : frames looked at.
-    several_faces : frames among them with more than one face; the largest was taken.
+    points : dict of int to float64 array
+        Frame -> (9 * eyes, 2) points in pixels.
+    looked_at : int
+        Frames looked at.
+    several_faces : int
+        Frames among them with more than one face; the largest was taken.
     """
 
     points: dict[int, Points]
@@ -71,7 +74,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
         Too few frames show a face, or what was found is no face.
     """
     step = max(1, -(-info.frame_count // LOOKED_AT))
-    found: dict[int, Points] = {}
+    labels: dict[int, Points] = {}
     several = looked = 0
     first = _first(info, step) if one_eye else ()
     with open_detector(one_eye=one_eye, first=first) as detector:
@@ -80,11 +83,11 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
             if not picture.size:
                 continue
             looked += 1
-            several += _look(detector, number, picture, info, found)
+            several += _look(detector, number, picture, info, labels)
             if advance is not None:
                 advance(number)
-    _require_face(info, found, looked, one_eye)
-    return Survey(found, looked, several)
+    _require_face(info, labels, looked, one_eye)
+    return Survey(labels, looked, several)
 
 
 def _first(info: VideoInfo, step: int) -> list[Picture]:
@@ -105,25 +108,25 @@ def _every(step: int) -> Callable[[Any], Picture]:
 
 
 def _look(
-    detector: LidDetector, number: int, picture: Picture, info: VideoInfo, found: dict[int, Points]
+    detector: LidDetector, number: int, picture: Picture, info: VideoInfo, labels: dict[int, Points]
 ) -> bool:
     """Add what one frame shows; return whether it shows several faces."""
     seen = detector.detect(picture)
     if seen is None:
         return False
     if (seen.points >= 0).all() and (seen.points <= np.array(info.size_px) - 1).all():
-        found[number] = seen.points
+        labels[number] = seen.points
     return seen.faces > 1
 
 
-def _require_face(info: VideoInfo, found: dict[int, Points], looked: int, one_eye: bool) -> None:
+def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_eye: bool) -> None:
     more = "" if one_eye else "; for a close-up of one eye add --one-eye"
-    if len(found) < max(FEWEST, LEAST_SEEN * looked):
+    if len(labels) < max(FEWEST, LEAST_SEEN * looked):
         raise InputError(
-            f"{info.path}: a face was found on {len(found)} of {looked} frames looked at, too few to track "
+            f"{info.path}: a face was found on {len(labels)} of {looked} frames looked at, too few to track "
             f"without labels{more}; or label frames by hand (--labels)"
         )
-    wide = np.array([np.hypot(*(points[5] - points[0])) for points in found.values()])
+    wide = np.array([np.hypot(*(points[5] - points[0])) for points in labels.values()])
     low, high = np.percentile(wide, [5, 95])
     if not one_eye and high > STEADY * max(low, 1e-6):
         raise InputError(
@@ -132,10 +135,10 @@ def _require_face(info: VideoInfo, found: dict[int, Points], looked: int, one_ey
         )
 
 
-def plausible(found: dict[int, Points]) -> dict[int, Points]:
+def plausible(labels: dict[int, Points]) -> dict[int, Points]:
     """Leave out detections that the shapes of all the others (six components) explain badly."""
-    numbers = sorted(found)
-    shapes = np.array([found[n] for n in numbers])
+    numbers = sorted(labels)
+    shapes = np.array([labels[n] for n in numbers])
     mean = mean_shape(shapes)
     rows = np.array([moved(shape, similarity_between(shape, mean)) for shape in shapes])
     rows = rows.reshape(len(rows), -1)
@@ -144,7 +147,7 @@ def plausible(found: dict[int, Points]) -> dict[int, Points]:
         float(np.median(rest) + SPREADS * 1.4826 * np.median(np.abs(rest - np.median(rest)))),
         UNLIKE_SHARE * widths(mean),
     )
-    return {n: found[n] for n, far in zip(numbers, rest, strict=True) if far <= limit}
+    return {n: labels[n] for n, far in zip(numbers, rest, strict=True) if far <= limit}
 
 
 def _unexplained(others: Values, row: Values) -> float:
@@ -165,7 +168,7 @@ def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
     while len(chosen) < min(count, len(numbers)):
         distance = np.minimum(distance, ((rows - rows[chosen[-1]]) ** 2).sum(1))
         chosen.append(int(distance.argmax()))
-    return sorted(numbers[place] for place in chosen)
+    return sorted(numbers[index] for index in chosen)
 
 
 def proposed_labels(info: VideoInfo, seen: Survey, out: Path, wanted_frames: int) -> Labels:

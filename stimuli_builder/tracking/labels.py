@@ -27,8 +27,10 @@ class Labels:
 
     Attributes
     ----------
-    size_px : (width, height) of the video they belong to.
-    frames : frame number -> (18, 2) or, for one eye, (9, 2) points in pixels, x right, y down.
+    size_px : (int, int)
+        (width, height) of the video they belong to.
+    frames : dict of int to float64 array
+        Frame number -> (18, 2) or, for one eye, (9, 2) points in pixels, x right, y down.
     """
 
     path: Path
@@ -47,7 +49,8 @@ def load_labels(path: Path, size_px: tuple[int, int] | None = None, frame_count:
 
     Parameters
     ----------
-    size_px, frame_count : of the video the labels are to be used with; checked where given.
+    size_px, frame_count : (int, int), int
+        Of the video the labels are to be used with; checked where given.
 
     Raises
     ------
@@ -99,15 +102,15 @@ def _size(path: Path, document: dict[str, Any]) -> tuple[int, int]:
     return size[0], size[1]  # type: ignore[index]
 
 
-def _frames(path: Path, found: object) -> dict[int, Points]:
-    if not isinstance(found, dict):
-        raise InputError(f"{path}: expected 'frames': {{frame number: points}}, found {type(found).__name__}")
-    if len(found) < FEWEST_FRAMES:
+def _frames(path: Path, data: object) -> dict[int, Points]:
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: expected 'frames': {{frame number: points}}, found {type(data).__name__}")
+    if len(data) < FEWEST_FRAMES:
         raise InputError(
-            f"{path}: {len(found)} labelled frames, at least {FEWEST_FRAMES} are needed and about 20 are good"
+            f"{path}: {len(data)} labelled frames, at least {FEWEST_FRAMES} are needed and about 20 are good"
         )
     frames: dict[int, Points] = {}
-    for key, points in found.items():
+    for key, points in data.items():
         if not str(key).strip().isdecimal():
             raise InputError(f"{path}: expected a frame number from 0, found '{key}'")
         number = int(key)
@@ -122,15 +125,15 @@ def _frames(path: Path, found: object) -> dict[int, Points]:
     return dict(sorted(frames.items()))
 
 
-def _points(where: str, found: object) -> Points:
-    if not isinstance(found, list) or len(found) not in (EYE_POINTS, 2 * EYE_POINTS):
-        count = len(found) if isinstance(found, list) else "no list of"
+def _points(where: str, data: object) -> Points:
+    if not isinstance(data, list) or len(data) not in (EYE_POINTS, 2 * EYE_POINTS):
+        count = len(data) if isinstance(data, list) else "no list of"
         raise InputError(f"{where}: expected 18 points (or 9 for one eye), found {count}")
-    for place, point in enumerate(found):
+    for index, point in enumerate(data):
         pair = isinstance(point, list) and len(point) == 2
         if not pair or not all(type(v) in (int, float) and math.isfinite(v) for v in point):
-            raise InputError(f"{where}: point {place + 1} is {point!r}, expected [x, y] in pixels")
-    return np.asarray(found, np.float64)
+            raise InputError(f"{where}: point {index + 1} is {point!r}, expected [x, y] in pixels")
+    return np.asarray(data, np.float64)
 
 
 def _check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) -> None:

@@ -10,7 +10,7 @@ from stimuli_builder.tracking.accuracy import HeldOut, cross_validate, refined_l
 from stimuli_builder.tracking.certainty import with_errors
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
-from stimuli_builder.video import VideoInfo, read_frames, scan_video
+from stimuli_builder.video import VideoInfo, read_frames, scan_before_damage, scan_video
 
 WORTH_REFINING = 0.96
 
@@ -25,9 +25,9 @@ class Lesson:
     refined: bool
 
 
-def open_video(path: Path, accept_variable_rate: bool = False) -> VideoInfo:
-    """Scan a video and refuse a variable frame rate unless it is accepted."""
-    info = scan_video(path)
+def open_video(path: Path, accept_variable_rate: bool = False, accept_damaged_end: bool = False) -> VideoInfo:
+    """Scan a video and refuse a variable frame rate or a damaged end unless it is accepted."""
+    info = scan_before_damage(path) if accept_damaged_end else scan_video(path)
     if info.variable and not accept_variable_rate:
         steps = np.diff(info.times_s) * 1000
         raise InputError(
@@ -50,8 +50,9 @@ def learn(
 
     Parameters
     ----------
-    refine : make labels consistent with the pictures first; None does so where frames left out of training
-        then come clearly nearer to their labels. Accuracy is always reported against the labels as given.
+    refine : bool, optional
+        Make labels consistent with the pictures first; None does so where frames left out of training then
+        come clearly nearer to their labels. Accuracy is always reported against the labels as given.
     """
     labels = load_labels(labels_path, info.size_px, info.frame_count)
     _check_eyes(labels, one_eye)

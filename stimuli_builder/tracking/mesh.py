@@ -18,13 +18,20 @@ class BaseMesh:
 
     Attributes
     ----------
-    vertices : float64 (V, 2); vertex positions of the mean shape, base pixels.
-    triangles : int64 (T, 3); vertex numbers.
-    starts : int64 (T + 1,); pixels of triangle t are starts[t] to starts[t + 1] - 1.
-    eye_of : int64 (T,); the eye a triangle belongs to.
-    x, y : float32 (N,); pixel coordinates.
-    barycentric : float32 (T, 3, 3); barycentric coordinate k = b[k, 0] x + b[k, 1] y + b[k, 2].
-    shape : (height, width) of the base frame.
+    vertices : float64 array (V, 2)
+        Vertex positions of the mean shape, base pixels.
+    triangles : int64 array (T, 3)
+        Vertex numbers.
+    starts : int64 array (T + 1,)
+        Pixels of triangle t are starts[t] to starts[t + 1] - 1.
+    eye_of : int64 array (T,)
+        The eye a triangle belongs to.
+    x, y : float32 array (N,)
+        Pixel coordinates.
+    barycentric : float32 array (T, 3, 3)
+        Barycentric coordinate k = b[k, 0] x + b[k, 1] y + b[k, 2].
+    shape : (int, int)
+        (height, width) of the base frame.
     """
 
     vertices: Points
@@ -72,13 +79,13 @@ class BaseMesh:
         number = np.full((height, width), -1)
         number.reshape(-1)[self.flat_index] = np.arange(self.pixel_count)
         column, row = self.x.astype(np.int64), self.y.astype(np.int64)
-        found = []
+        edges = []
         for dx, dy in ((1, 0), (0, 1)):
             before, after = number[row - dy, column - dx], number[row + dy, column + dx]
             missing = (before < 0) | (after < 0)
             own = np.arange(self.pixel_count)
-            found += [np.where(missing, own, before), np.where(missing, own, after)]
-        left, right, above, below = (part.astype(np.uint32) for part in found)
+            edges += [np.where(missing, own, before), np.where(missing, own, after)]
+        left, right, above, below = (part.astype(np.uint32) for part in edges)
         return left, right, above, below
 
     def gradient(self, appearance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -95,7 +102,8 @@ def build_mesh(mean: Points, base_pixels: int) -> BaseMesh:
 
     Parameters
     ----------
-    mean : (42, 2), or (21, 2) for one eye; template points first, then the border.
+    mean : float64 array
+        (42, 2), or (21, 2) for one eye; template points first, then the border.
     """
     eyes = len(mean) // (EYE_POINTS + BORDER_POINTS)
     groups = [_eye_vertices(eye, eyes) for eye in range(eyes)]

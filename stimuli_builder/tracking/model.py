@@ -52,20 +52,34 @@ class CoupledModel:
 
     Attributes
     ----------
-    mesh : the base mesh, with the mean shape s0 as vertices.
-    shape_modes : float64 (l, V, 2); movement of the vertices per coupled parameter.
-    appearance : float32 (l + 1, N); A0, then the appearance modes of the coupled parameters, in grey levels.
-    weights : float32 (N,), mean 1; how much a pixel counts, low where left-out frames are badly explained.
-    sd : float64 (l,); standard deviation of each coupled parameter over the labelled frames.
-    examples, poses : (F, l) and (F, 4); parameters and similarity of each labelled frame.
-    patches : uint8 (P, h, w); eye regions of a few labelled frames, for the search over a whole picture.
-    patch_frames : (P,), the labelled frame each patch shows, and patch_corners (P, 2), its top left corner.
-    reduction : whole factor by which pictures are reduced before fitting.
-    residual_limits : (eyes,) root mean square grey levels above which a fit is not believed.
-    usual_residuals : (eyes,) of frames left out of training; a fit's error is stated against them.
-    point_errors : (9 * eyes,) root mean square distance in px of the video of each point on those frames.
-    error_slope : (1,) by which power of its residual over the usual one a frame's error grows.
-    variance_kept : share of the variance in shape, appearance and coupled parameters.
+    mesh : BaseMesh
+        The base mesh, with the mean shape s0 as vertices.
+    shape_modes : float64 array (l, V, 2)
+        Movement of the vertices per coupled parameter.
+    appearance : float32 array (l + 1, N)
+        A0, then the appearance modes of the coupled parameters, in grey levels.
+    weights : float32 array (N,)
+        Mean 1; how much a pixel counts, low where left-out frames are badly explained.
+    sd : float64 array (l,)
+        Standard deviation of each coupled parameter over the labelled frames.
+    examples, poses : float64 array
+        (F, l) and (F, 4); parameters and similarity of each labelled frame.
+    patches : uint8 array (P, h, w)
+        Eye regions of a few labelled frames, for the search over a whole picture.
+    patch_frames : int64 array (P,)
+        The labelled frame each patch shows, and patch_corners (P, 2), its top left corner.
+    reduction : int
+        Whole factor by which pictures are reduced before fitting.
+    residual_limits : float64 array (eyes,)
+        Root mean square grey levels above which a fit is not believed.
+    usual_residuals : float64 array (eyes,)
+        Of frames left out of training; a fit's error is stated against them.
+    point_errors : float64 array (9 * eyes,)
+        Root mean square distance in px of the video of each point on those frames.
+    error_slope : float64 array (1,)
+        By which power of its residual over the usual one a frame's error grows.
+    variance_kept : (float, float, float)
+        Share of the variance in shape, appearance and coupled parameters.
     """
 
     mesh: BaseMesh
@@ -101,8 +115,10 @@ def train(
 
     Parameters
     ----------
-    pictures : F grey pictures, all of one size.
-    points : (F, 9 * eyes, 2) landmarks in their pixels.
+    pictures : list of Picture
+        F grey pictures, all of one size.
+    points : float64 array (F, 9 * eyes, 2)
+        Landmarks in their pixels.
 
     Returns
     -------
@@ -170,8 +186,8 @@ def principal(rows: Values, variance: float, fewest: int) -> tuple[Values, Value
     _, values, basis = np.linalg.svd(rows, full_matrices=False)
     rank = max(1, int((values > 1e-9 * max(values[0], 1e-300)).sum()))
     shares = np.cumsum(values**2) / max((values**2).sum(), 1e-300)
-    wanted = int(np.searchsorted(shares, variance - 1e-12) + 1)
-    count = min(rank, max(wanted, fewest))
+    modes = int(np.searchsorted(shares, variance - 1e-12) + 1)
+    count = min(rank, max(modes, fewest))
     return basis[:count], values[:count], float(shares[count - 1])
 
 
@@ -182,7 +198,8 @@ def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
 
     Parameters
     ----------
-    textures : (F, N) grey levels; frame by frame is left out and rebuilt from `modes` modes of the others.
+    textures : float64 array (F, N)
+        Grey levels; frame by frame is left out and rebuilt from `modes` modes of the others.
     """
     squares = np.zeros(textures.shape[1])
     for frame in range(len(textures)):

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -34,7 +35,8 @@ def write_preview(
     history: deque[NDArray[np.float64]] = deque(maxlen=span)
     top = 1.0
     with VideoWriter(out, info.fps, (width, height + PANEL_PX)) as writer:
-        for picture, row in zip(frames(info.path, read=rgb), track_rows(track), strict=True):
+        pictures = islice(frames(info.path, read=rgb), info.frame_count)
+        for picture, row in zip(pictures, track_rows(track), strict=True):
             points = numbers(row, names, str(track)).reshape(-1, 2)
             history.append(numbers(row, gaps, str(track)))
             if np.isfinite(history[-1]).all():

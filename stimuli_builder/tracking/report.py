@@ -19,12 +19,12 @@ def fold_lines(results: Sequence[HeldOut]) -> Iterator[str]:
 
 
 def _line(name: str, results: Sequence[HeldOut]) -> str:
-    found = [r.rms_px for r in results if r.rms_px is not None]
+    rms_px = [r.rms_px for r in results if r.rms_px is not None]
     errors = [r.distance_errors_px for r in results if r.distance_errors_px is not None]
-    missing = len(results) - len(found)
-    if not found:
+    missing = len(results) - len(rms_px)
+    if not rms_px:
         return f"{name:>6} {len(results):>7} {'none of them found':>40}  {missing}"
-    rms, gaps = np.array(found), np.concatenate(errors)
+    rms, gaps = np.array(rms_px), np.concatenate(errors)
     total = float(np.sqrt((rms**2).mean()))
     return (
         f"{name:>6} {len(results):>7} {total:>8.2f} {np.median(rms):>8.2f} {rms.max():>8.2f} "

@@ -51,17 +51,17 @@ class Finder:
 
     def _starts(self, picture: Picture) -> Iterator[tuple[Values, Values]]:
         small = reduced(picture, self._factor)
-        found = []
+        matches = []
         for number, scale, template in self._templates:
             if template.shape[0] > small.shape[0] or template.shape[1] > small.shape[1]:
                 continue
-            _, match, _, place = cv2.minMaxLoc(cv2.matchTemplate(small, template, cv2.TM_CCOEFF_NORMED))
+            _, match, _, corner_px = cv2.minMaxLoc(cv2.matchTemplate(small, template, cv2.TM_CCOEFF_NORMED))
             if np.isfinite(match) and match > LEAST_MATCH:
-                found.append((match, number, scale, place))
-        found.sort(key=lambda entry: -entry[0])
-        for _, number, scale, place in found[:CANDIDATES]:
+                matches.append((match, number, scale, corner_px))
+        matches.sort(key=lambda entry: -entry[0])
+        for _, number, scale, corner_px in matches[:CANDIDATES]:
             frame = int(self._model.patch_frames[number])
-            corner = (np.array(place) + 0.5) * self._factor - 0.5
+            corner = (np.array(corner_px) + 0.5) * self._factor - 0.5
             yield (
                 self._model.examples[frame],
                 _carried(self._model.poses[frame], self._model.patch_corners[number], corner, scale),
@@ -94,4 +94,4 @@ def _spread_closures(fitter: Fitter) -> list[Values]:
     openings = [inter_eyelid_distances(shape, model.markers).mean() for shape in shapes]
     order = np.argsort(openings)
     chosen = np.unique(np.linspace(0, len(order) - 1, min(CLOSURES, len(order))).astype(int))
-    return [model.examples[order[place]] for place in chosen]
+    return [model.examples[order[index]] for index in chosen]

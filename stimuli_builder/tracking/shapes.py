@@ -44,7 +44,8 @@ def eye_axis(eye: Points) -> tuple[Points, Points, float]:
 
     Parameters
     ----------
-    eye : (9, 2) array in pixels.
+    eye : (9, 2) array
+        In pixels.
     """
     span = eye[CANTHI[1]] - eye[CANTHI[0]]
     if span[0] < 0:
@@ -59,7 +60,8 @@ def inter_eyelid_distances(points: Points, markers: LidMarkers) -> NDArray[np.fl
 
     Parameters
     ----------
-    points : (9 * eyes, 2) array in pixels.
+    points : (9 * eyes, 2) array
+        In pixels.
 
     Returns
     -------

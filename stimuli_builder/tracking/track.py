@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
@@ -26,6 +27,7 @@ from stimuli_builder.tracking.shapes import (
 )
 from stimuli_builder.tracking.table import TrackWriter
 from stimuli_builder.video import Picture, VideoInfo, frames
+from stimuli_builder.video_clock import DamagedFileError
 
 Status = Literal["tracked", "reinitialised", "doubtful", "lost"]
 
@@ -46,10 +48,14 @@ class TrackedFrame:
 
     Attributes
     ----------
-    points : (9 * eyes, 2) in pixels of the video.
-    distances : (eyes,) in pixels, image-left eye first.
-    residual : root mean square grey levels over all base pixels; None if no fit came to an end.
-    errors : (9 * eyes,) stated error of each point in pixels.
+    points : float64 array (9 * eyes, 2) or None
+        In pixels of the video.
+    distances : float64 array (eyes,) or None
+        In pixels, image-left eye first.
+    residual : float or None
+        Root mean square grey levels over all base pixels; None if no fit came to an end.
+    errors : float64 array (9 * eyes,) or None
+        Stated error of each point in pixels.
     """
 
     status: Status
@@ -106,8 +112,9 @@ class Tracker:
 
         Parameters
         ----------
-        hint : (9 * eyes, 2) points of a detector in pixels of the video: a second start where the fit from
-            the frame before fails or lies elsewhere, and a witness.
+        hint : float64 array (9 * eyes, 2), optional
+            Points of a detector in pixels of the video: a second start where the fit from the frame before
+            fails or lies elsewhere, and a witness.
         """
         blank = self._blank(picture)
         if blank:
@@ -121,14 +128,14 @@ class Tracker:
             fault = self._fault(fit, picture)
             fit, fault = self._with_hint(picture, fit, fault, hint)
             if not fault:
-                return self._found(fit, "tracked", FROZEN if frozen else "", hint)
+                return self._accepted(fit, "tracked", FROZEN if frozen else "", hint)
             self._loss = fault
         elif hint is not None:
             fit = self._from(picture, hint)
             if not self._fault(fit, picture):
                 started, loss = self._started, self._loss
                 again = f"found again after {loss}" if started else ""
-                return self._found(fit, "reinitialised" if started else "tracked", again, hint)
+                return self._accepted(fit, "reinitialised" if started else "tracked", again, hint)
         return self._search(picture)
 
     def _blank(self, picture: Picture) -> str:
@@ -173,8 +180,8 @@ class Tracker:
             fault = self._fault(attempt, picture)
             if not fault:
                 if self._started:
-                    return self._found(attempt, "reinitialised", f"found again after {self._loss}")
-                return self._found(attempt, "tracked", "")
+                    return self._accepted(attempt, "reinitialised", f"found again after {self._loss}")
+                return self._accepted(attempt, "tracked", "")
             best = attempt
         self._lost_frames += 1
         self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
@@ -193,7 +200,7 @@ class Tracker:
             if anywhere is not None:
                 yield anywhere
 
-    def _found(self, fit: Fit, status: Status, reason: str, hint: Points | None = None) -> TrackedFrame:
+    def _accepted(self, fit: Fit, status: Status, reason: str, hint: Points | None = None) -> TrackedFrame:
         before = self._before if status == "tracked" else None
         self._last, self._lost_frames, self._started, self._loss = fit, 0, True, ""
         points = self._points(fit)
@@ -239,8 +246,10 @@ def track_video(
 
     Parameters
     ----------
-    advance : called after each frame with the counts so far, for a progress bar.
-    hints : frame -> points of a detector, see `Tracker.step`.
+    advance : callable, optional
+        Called after each frame with the counts so far, for a progress bar.
+    hints : mapping of int to float64 array, optional
+        Frame -> points of a detector, see `Tracker.step`.
 
     Raises
     ------
@@ -256,9 +265,8 @@ def track_video(
     tracker, summary = Tracker(model), TrackSummary()
     begun = time.perf_counter()
     with TrackWriter(out, model.eyes) as writer:
-        for picture in frames(info.path, lambda full: reduced(full, model.reduction)):
-            if summary.frames >= info.frame_count:
-                break
+        pictures = frames(info.path, lambda full: reduced(full, model.reduction))
+        for picture in islice(pictures, info.frame_count):
             before = time.thread_time()
             frame = tracker.step(picture, hints.get(summary.frames))
             summary.fit_s += time.thread_time() - before
@@ -281,7 +289,7 @@ def _count(summary: TrackSummary, frame: TrackedFrame) -> None:
 
 def _refuse_nothing(info: VideoInfo, summary: TrackSummary) -> None:
     if summary.frames < info.frame_count:
-        raise InputError(
+        raise DamagedFileError(
             f"{info.path}: truncated or damaged, {summary.frames} of {info.frame_count} frames can be decoded"
         )
     if summary.tracked == 0:

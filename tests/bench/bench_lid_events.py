@@ -3,7 +3,8 @@
     python tests/bench/bench_lid_events.py [FOLDER]
 
 Prints precision, recall and F1 on generated series that trained nothing, at several rates, and how many
-squints and closed eyes were called blinks. FOLDER, where given, holds hand-labelled series: CSV files with
+squints and closed eyes were called blinks: those held for 0.25 s or more, and brief ones.
+FOLDER, where given, holds hand-labelled series: CSV files with
 the columns frame, ear and tag ('0' where no blink is), 30 frames a second, as made from the eyeblink8 videos.
 
 The peaks are in the style of JeFaPaTo: prominence 0.05 of an eye aspect ratio of 0.3, widths of 20 to 100 and
@@ -18,7 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import find_peaks
 
-from stimuli_builder.blinks.events.generated import generate
+from stimuli_builder.blinks.events.generated import CLOSED_EYE_S, generate
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.labelling import label_blinks
 from stimuli_builder.blinks.profile import Array
@@ -27,6 +28,9 @@ from stimuli_builder.blinks.series import BlinkSeries, bridge_gaps, runs
 SEED = 909
 SERIES = 20
 SLACK_S = 0.1
+HELD_S = 0.25
+"""A squint that stays for less is a partial blink in its course; it is counted apart."""
+TOTALS: dict[str, Array] = {}
 Method = Callable[[Sequence[Array], float], list[float]]
 
 
@@ -72,8 +76,7 @@ def counts(found: Sequence[float], true: Sequence[tuple[float, float]]) -> Array
 def tell(name: str, total: Array, more: str = "") -> None:
     hits, alarms, misses = total
     precision, recall = hits / max(hits + alarms, 1), hits / max(hits + misses, 1)
-    f1 = 2 * hits / max(2 * hits + alarms + misses, 1)
-    line = f"  {name:16} precision {precision:.3f}  recall {recall:.3f}  F1 {f1:.3f}"
+    line = f"  {name:16} precision {precision:.3f}  recall {recall:.3f}  F1 {f1(total):.3f}"
     sys.stdout.write(f"{line}  ({hits:.0f} hits, {alarms:.0f} false, {misses:.0f} missed){more}\n")
 
 
@@ -81,34 +84,72 @@ def generated(fps: float) -> None:
     sys.stdout.write(f"generated series, {fps:g} frames/s\n")
     series = [generate(np.random.default_rng([SEED, n, int(fps)]), 40, fps) for n in range(SERIES)]
     for name, method in METHODS.items():
-        total, called, flat = np.zeros(3), 0, 0
+        total, called, shut = np.zeros(3), np.zeros(2, int), np.zeros(2, int)
         for one in series:
             found = method(one.distances, fps)
             total += counts(found, [(m.onset_s, m.end_s) for m in one.motions if m.kind == "blink"])
-            shut = [m for m in one.motions if m.kind in ("squint", "closed_eye")]
-            flat += len(shut)
-            called += sum(any(m.onset_s <= time <= m.end_s for time in found) for m in shut)
-        tell(name, total, f", {called} of {flat} squints and closed eyes called blinks")
+            for m in one.motions:
+                if m.kind in ("squint", "closed_eye"):
+                    brief = int(m.hold_s < HELD_S)
+                    shut[brief] += 1
+                    called[brief] += any(m.onset_s <= time <= m.end_s for time in found)
+        TOTALS[name] = TOTALS.get(name, 0) + np.array([*called, *shut])
+        tell(name, total, f", called blinks: {called[0]} of {shut[0]} held, {called[1]} of {shut[1]} brief")
 
 
 def recorded(folder: Path) -> None:
     files = sorted(folder.glob("*.csv"))
     sys.stdout.write(f"{len(files)} hand-labelled series, 30 frames/s, one column, {folder}\n")
+    series = [hand_labelled(file) for file in files]
     for name, method in METHODS.items():
-        total = np.zeros(3)
-        for file in files:
-            table = pd.read_csv(file, dtype={"tag": str})
-            ear = pd.to_numeric(table["ear"], errors="coerce").to_numpy(np.float64).copy()
-            ear[ear <= 0] = np.nan
-            ear, _ = bridge_gaps(ear, 1)
-            true = runs((table["tag"].fillna("0") != "0").to_numpy())
-            total += counts(method([ear], 30.0), [(start / 30, end / 30) for start, end in true])
-        tell(name, total)
+        as_labelled, as_defined = [], []
+        for ear, blinks, closed in series:
+            found = method([ear], 30.0)
+            as_labelled.append(counts(found, blinks + closed))
+            elsewhere = [t for t in found if not any(a - SLACK_S <= t <= b + SLACK_S for a, b in closed)]
+            as_defined.append(counts(elsewhere, blinks))
+        tell(
+            name,
+            np.sum(as_labelled, axis=0),
+            f", standard error over recordings {jackknife(as_labelled):.3f}",
+        )
+        tell("  no closed eyes", np.sum(as_defined, axis=0))
+
+
+def hand_labelled(file: Path) -> tuple[Array, list[tuple[float, float]], list[tuple[float, float]]]:
+    """Eye aspect ratio, the labelled blinks, and those shut for half a second: closed eyes."""
+    table = pd.read_csv(file, dtype={"tag": str})
+    ear = pd.to_numeric(table["ear"], errors="coerce").to_numpy(np.float64).copy()
+    ear[ear <= 0] = np.nan
+    ear, _ = bridge_gaps(ear, 1)
+    tags = table["tag"].fillna("0")
+    blinks, closed = [], []
+    for start, end in runs((tags != "0").to_numpy()):
+        shut = runs(tags[start:end].str.startswith("close").to_numpy())
+        longest = max((stop - first for first, stop in shut), default=0) / 30
+        (closed if longest >= CLOSED_EYE_S else blinks).append((start / 30, end / 30))
+    return ear, blinks, closed
+
+
+def jackknife(totals: Sequence[Array]) -> float:
+    """Standard error of F1 from leaving out one recording at a time."""
+    whole = np.sum(totals, axis=0)
+    left_out = np.array([f1(whole - one) for one in totals])
+    count = len(totals)
+    return float(np.sqrt((count - 1) / count * ((left_out - left_out.mean()) ** 2).sum()))
+
+
+def f1(total: Array) -> float:
+    hits, alarms, misses = total
+    return float(2 * hits / max(2 * hits + alarms + misses, 1))
 
 
 def main() -> None:
     for fps in (15.0, 30.0, 60.0, 120.0, 500.0):
         generated(fps)
+    sys.stdout.write("called blinks, all rates: (held, brief) of (held, brief)\n")
+    for name, (held, brief, all_held, all_brief) in TOTALS.items():
+        sys.stdout.write(f"  {name:16} {held} of {all_held} held, {brief} of {all_brief} brief\n")
     if len(sys.argv) > 1:
         recorded(Path(sys.argv[1]))
 

@@ -45,7 +45,7 @@ def on_dask(jobs: list[ClipJob]) -> tuple[dict[int, bytes], float] | None:
     except ImportError:
         return None
     with LocalCluster(
-        n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=":0"
     ) as cluster:
         return timed(lambda: run_jobs(jobs, 1, cluster.scheduler_address))
 

@@ -36,7 +36,9 @@ def main(zip_path, folder):
     speech(face, scene, folder)
     bones(scene)
     other_rigs(face)
+    half_locked(face, scene)
     RESULTS["removed"] = removing(face)
+    RESULTS["undone"] = undoing(face.name, scene)
     palpebra_blinks.unregister()
     sys.stdout.write(f"RESULT {json.dumps(RESULTS)}\n")
 
@@ -70,6 +72,22 @@ def filling(face, scene):
     frames = np.arange(1, 36001)
     RESULTS["left"] = [round(left.evaluate(int(frame)), 6) for frame in frames[:6000]]
     RESULTS["keys"] = len(left.keyframe_points)
+    RESULTS["baseline_s"] = plain_keys_s(500)
+
+
+def plain_keys_s(count):
+    """Processor time of so many keys on two channels, put in one by one as scripts do."""
+    bpy.ops.object.empty_add()
+    empty = bpy.context.object
+    begun = time.process_time()
+    for index in (0, 1):
+        for frame in range(count):
+            empty.location[index] = frame % 7
+            empty.keyframe_insert("location", index=index, frame=frame)
+    taken = time.process_time() - begun
+    bpy.data.objects.remove(empty)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    return taken
 
 
 def own_keys(face, scene):
@@ -183,6 +201,58 @@ def removing(face):
     bpy.context.view_layer.objects.active = face
     bpy.ops.palpebra.clear()
     return [(p.co[0], round(p.co[1], 3)) for p in curve(face.data.shape_keys, "eyeBlinkLeft").keyframe_points]
+
+
+def half_locked(face, scene):
+    """One channel can be written, the other not: neither is."""
+    keys = face.data.shape_keys
+    bpy.context.view_layer.objects.active = face
+    scene.frame_end = 1200
+    right, animation = curve(keys, "eyeBlinkRight"), keys.animation_data
+    bag = animation.action.layers[0].strips[0].channelbag(animation.action_slot)
+    right.group = bag.groups.new("eyes")
+    for name, switch in (("locked_curve", right), ("locked_group", right.group)):
+        before, switch.lock = points(keys), True
+        face.palpebra.seed += 1
+        RESULTS[name] = [called(bpy.ops.palpebra.fill), before == points(keys)]
+        switch.lock = False
+
+
+def everything(name):
+    """All keys of an object's eyes and the settings that the buttons change, fetched anew."""
+    face = bpy.data.objects[name]
+    keys = face.data.shape_keys
+    made = [
+        [[*p.co, *p.handle_left, *p.handle_right, p.type, p.interpolation] for p in one.keyframe_points]
+        for one in (curve(keys, "eyeBlinkLeft"), curve(keys, "eyeBlinkRight"))
+    ]
+    return [made, face.palpebra.seed, face.palpebra.left, face.palpebra.right]
+
+
+def undoing(name, scene):
+    """Each button and one undo: is all as before? Undo makes every reference stale, so names are used."""
+    face = bpy.data.objects[name]
+    bpy.context.view_layer.objects.active = face
+    face.palpebra.sound, face.palpebra.replace = str(Path(sys.argv[2]) / "voice.wav"), True
+    for frame, value in ((300, 0.4), (340, 0.1)):
+        face.data.shape_keys.key_blocks["eyeBlinkLeft"].value = value
+        face.data.shape_keys.key_blocks["eyeBlinkLeft"].keyframe_insert("value", frame=frame)
+    kept, filled = everything(name), None
+    outcome = {}
+    for button in ("fill", "blink", "from_speech", "guess", "reroll", "clear"):
+        if button == "reroll":
+            bpy.ops.palpebra.fill()
+            filled = everything(name)
+            scene = bpy.context.scene
+            shut = [round(key[0]) for key in filled[0][0] if key[1] > 0.5 and key[6] == "GENERATED"]
+            scene.frame_set(shut[0])
+        before = filled if filled is not None else kept
+        bpy.ops.ed.undo_push(message="before")
+        done = list(getattr(bpy.ops.palpebra, button)("EXEC_DEFAULT", True))
+        changed = everything(name) != before
+        bpy.ops.ed.undo()
+        outcome[button] = [done, changed, everything(name) == before]
+    return outcome
 
 
 main(Path(sys.argv[1]), Path(sys.argv[2]))

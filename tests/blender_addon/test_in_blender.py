@@ -97,6 +97,21 @@ def test_what_cannot_be_is_refused_in_one_line(used: dict[str, Any], case: str, 
     assert "\n" not in used[case].removeprefix("Error: ")
 
 
+@pytest.mark.parametrize("case", ["locked_curve", "locked_group"])
+def test_where_one_channel_is_locked_neither_is_written(used: dict[str, Any], case: str) -> None:
+    said, untouched = used[case]
+    assert "the channel of shape key 'eyeBlinkRight' is locked" in said
+    assert untouched
+
+
+def test_one_undo_takes_back_what_a_button_did(used: dict[str, Any]) -> None:
+    assert set(used["undone"]) == {"fill", "blink", "from_speech", "guess", "reroll", "clear"}
+    for button, (done, changed, as_before) in used["undone"].items():
+        assert done == ["FINISHED"], button
+        assert changed or button == "guess", button
+        assert as_before, button
+
+
 def test_speech_is_answered(used: dict[str, Any]) -> None:
     assert used["speech"] == ["FINISHED"]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from tests.browser.server_process import ServerProcess
 
@@ -21,6 +21,9 @@ CHROMIUM_FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
+
+# As long as Playwright waits for everything else; 5 s by itself, which a busy machine takes for a page.
+expect.set_options(timeout=30_000)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Coroutine
 from typing import Any
 
-from tests.browser.server_process import free_port
+from tests.helpers.ports import free_port
 
 HEAD_END = b"\r\n\r\n"
 FAULTS = ("drop_request", "drop_answer", "double", "delay", "reorder")

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -20,17 +19,10 @@ from server.cli_common import migrated_services
 from server.settings import Settings
 from server.studies.importing import add_version, create_study, store_clips
 from server.studies.links import LinkKind, create_link
+from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase, add_study, link_token
 
 START_LIMIT_S = 240.0
-
-
-def free_port() -> int:
-    """A port nobody listens on at the moment."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 class ServerProcess:

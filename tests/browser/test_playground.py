@@ -82,3 +82,17 @@ def test_an_avatar_is_given_the_engines_lids(context: BrowserContext, pages: Pat
     for time_s, left, right in opened.evaluate("window.seen"):
         frame = engine.frame(time_s)
         assert (left, right) == pytest.approx((frame.left, frame.right), abs=1e-4)
+
+
+def test_a_file_that_is_no_avatar_is_refused_and_the_one_that_is_there_blinks_on(
+    context: BrowserContext, pages: Path, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "notes.vrm"
+    wrong.write_text("no model")
+    opened = context.new_page()
+    opened.goto((pages / "vrm.html").as_uri())
+    opened.wait_for_selector("#said:not(:empty)")
+    opened.get_by_label("Your avatar").set_input_files(wrong)
+    opened.wait_for_selector("text=This model cannot be used")
+    before = opened.evaluate("document.querySelector('canvas').dataset.time")
+    opened.wait_for_function(f"Number(document.querySelector('canvas').dataset.time) > {before}")

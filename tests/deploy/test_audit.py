@@ -21,31 +21,31 @@ def python_report(*packages: object) -> str:
 
 def test_a_known_weakness_is_named_with_the_version_that_mends_it() -> None:
     outcome = python_outcome(python_report(FINE, WEAK, UNKNOWN))
-    assert outcome.found
+    assert outcome.weak
     assert "pillow 9.0.0: PYSEC-2023-175, mended in 10.0.1" in outcome.said
 
 
 def test_none_known() -> None:
     outcome = python_outcome(python_report(FINE, UNKNOWN))
-    assert not outcome.found
+    assert not outcome.weak
     assert outcome.said == "Python: 1 packages asked about, 1 unknown to it, no weakness known"
 
 
 @pytest.mark.parametrize("answer", ["", "[]", python_report(), python_report(UNKNOWN, UNKNOWN)])
 def test_a_database_that_knows_no_package_has_not_answered(answer: str) -> None:
     outcome = python_outcome(answer)
-    assert not outcome.found
+    assert not outcome.weak
     assert "skipped" in outcome.said
 
 
 def test_an_accepted_advisory_is_no_weakness(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tools.audit.ACCEPTED", {"CVE-2023-4863": "we read no WebP from strangers"})
-    assert not python_outcome(python_report(WEAK)).found
+    assert not python_outcome(python_report(WEAK)).weak
 
 
 def test_npm() -> None:
     weak = npm_outcome(json.dumps({"vulnerabilities": {"minimist": {"severity": "critical"}}}))
-    assert (weak.found, "minimist: critical" in weak.said) == (True, True)
+    assert (weak.weak, "minimist: critical" in weak.said) == (True, True)
     assert npm_outcome(json.dumps({"vulnerabilities": {}})).said == "npm: no weakness known"
     refused = npm_outcome(json.dumps({"message": "405 Method Not Allowed", "error": {"summary": ""}}))
-    assert (refused.found, "skipped" in refused.said) == (False, True)
+    assert (refused.weak, "skipped" in refused.said) == (False, True)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.assignment.order import block_orders
+from experiments.assignment.block_orders import block_orders
 from experiments.definition import Experiment
 from experiments.load import load_experiment, parse_experiment
 from experiments.trials.clip_rating.plan import assign

@@ -140,7 +140,9 @@ def test_a_file_that_is_not_text_is_told_in_one_line(tmp_path) -> None:
         load_experiment(str(file))
 
 
-@pytest.mark.parametrize("name", ["pairs-demo", "sliders_demo", "threshold-demo", "faces-demo"])
+@pytest.mark.parametrize(
+    "name", ["pairs-demo", "sliders_demo", "dcr-demo", "threshold-demo", "plane-demo", "faces-demo"]
+)
 def test_demos_are_found_by_the_names_of_their_file_and_of_the_experiment(name: str) -> None:
     by_name, file = load_experiment(name), name.replace("_", "-")
     assert load_experiment(by_name.name) == by_name == load_experiment(str(FOLDER / f"{file}.toml"))

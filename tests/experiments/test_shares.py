@@ -1,5 +1,7 @@
 """Who sees which clips: groups, balanced samples and lists, over any number of participants."""
 
+import hashlib
+import random
 from collections import Counter
 
 import pytest
@@ -7,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.assignment.groups import clips_of, groups, place_of
+from experiments.assignment.groups import clips_of, groups, seat_of
+from experiments.assignment.lists import label
+from experiments.assignment.order import ordered_blocks
 from experiments.assignment.shares import expected_counts, share
 from experiments.definition import Experiment
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
@@ -42,11 +46,11 @@ def test_over_any_number_of_people_clip_counts_differ_by_one_at_most(per_cell: i
 @relaxed
 @given(people)
 def test_groups_are_of_one_size_and_each_sees_its_clips_equally_often(people: int) -> None:
-    sizes = Counter(place_of(BETWEEN, slot).levels for slot in range(people))
+    sizes = Counter(seat_of(BETWEEN, slot).levels for slot in range(people))
     assert max(sizes.values()) - min(sizes[group] for group in groups(BETWEEN)) <= 1
     counts = expected_counts(BETWEEN, range(people))
     for slot in range(4):
-        own = [counts[clip] for clip in clips_of(BETWEEN, place_of(BETWEEN, slot))]
+        own = [counts[clip] for clip in clips_of(BETWEEN, seat_of(BETWEEN, slot))]
         assert max(own) - min(own) <= 1
 
 
@@ -55,17 +59,17 @@ def test_groups_are_of_one_size_and_each_sees_its_clips_equally_often(people: in
 def test_a_participant_meets_their_share_in_trials_and_practice(seed: int, slot: int) -> None:
     trials = CLIP_RATING.assign(BETWEEN, seed, slot)
     main = [trial.clip for trial in trials if trial.kind == "main"]
-    mine = share(BETWEEN, place_of(BETWEEN, slot))
+    mine = share(BETWEEN, seat_of(BETWEEN, slot))
     assert len(main) == len(set(main)) == trials_per_participant(BETWEEN) == 28
     assert set(main) == mine
-    assert {clip.level("character") for clip in mine} == {dict(place_of(BETWEEN, slot).levels)["character"]}
+    assert {clip.level("character") for clip in mine} == {dict(seat_of(BETWEEN, slot).levels)["character"]}
     practised = {trial.clip.cell for trial in trials if trial.kind == "practice" and trial.clip}
     assert practised <= {clip.cell for clip in mine}
 
 
 def test_a_sample_shows_the_same_exemplars_in_every_cell() -> None:
     for slot in range(8):
-        mine = share(BETWEEN, place_of(BETWEEN, slot))
+        mine = share(BETWEEN, seat_of(BETWEEN, slot))
         by_cell = {cell: {c.exemplar for c in mine if c.cell == cell} for cell in {c.cell for c in mine}}
         assert len({frozenset(numbers) for numbers in by_cell.values()}) == 1
 
@@ -73,7 +77,7 @@ def test_a_sample_shows_the_same_exemplars_in_every_cell() -> None:
 def test_lists_are_dealt_in_turn() -> None:
     lists = [["cartoon/real/MB/FC/1", "cartoon/model/MB/FC/1"], ["cartoon/real/MB/FC/2"]]
     experiment = exp1(f"lists = {lists}")
-    shown = [len(share(experiment, place_of(experiment, slot))) for slot in range(4)]
+    shown = [len(share(experiment, seat_of(experiment, slot))) for slot in range(4)]
     assert shown == [2, 1, 2, 1]
     assert "317 clips are seen by nobody" in CLIP_RATING.plan(experiment)[-1]
 
@@ -119,3 +123,38 @@ def test_both_are_measured_and_leave_other_hashes_alone() -> None:
         assert definition_sha256(other) != definition_sha256(plain)
         assert {change.effect for change in difference(plain, other)} == {"measured"}
     assert design.clips(exp1("clips_per_cell = 5")) == design.clips(plain)
+
+
+SHARES = {
+    "exp1": "f92b990d6dd25482",
+    "exp2": "9b20b60374644f2c",
+    "exp3": "cd24344362be47f6",
+    "a sample": "f7df58bb07afaac3",
+    "a sample in blocks": "844efc31a2cbd8f5",
+    "lists": "2d4523e709726255",
+}
+"""SHA-256 of who sees what in which blocks; written by `digest` of the first deal of samples."""
+
+STUDIES = {
+    **{name: load_experiment(name) for name in ("exp1", "exp2", "exp3")},
+    "a sample": BETWEEN,
+    "a sample in blocks": parse_experiment(
+        EXP1.replace('order = "random"', 'order = "alternating"', 1) + "\n[assignment]\nclips_per_cell = 7\n"
+    ),
+    "lists": exp1("lists = [['cartoon/real/MB/FC/1'], ['cartoon/real/MB/FC/2']]"),
+}
+
+
+def digest(experiment: Experiment) -> str:
+    """Hash of the shares and orders of blocks of 40 slots."""
+    sha = hashlib.sha256()
+    for slot in range(40):
+        seat = seat_of(experiment, slot)
+        blocks = [block.label for block in ordered_blocks(experiment, random.Random(slot), seat.number)]
+        sha.update(repr((sorted(map(label, share(experiment, seat))), blocks)).encode())
+    return sha.hexdigest()[:16]
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_who_sees_what_stays_where_no_factor_is_dealt(name: str) -> None:
+    assert digest(STUDIES[name]) == SHARES[name]

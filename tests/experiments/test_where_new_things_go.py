@@ -17,7 +17,17 @@ from tests.conftest import REPOSITORY
 from tests.experiments.additions.added import FIELD, LANGUAGE, SCALE, Edit
 
 FRONTEND = REPOSITORY / "frontend"
-COPIED = ("experiments", "server", "analysis", "migrations", "tests", "tools", "docs", "blink_engine")
+COPIED = (
+    "experiments",
+    "server",
+    "video_conversion",
+    "analysis",
+    "migrations",
+    "tests",
+    "tools",
+    "docs",
+    "blink_engine",
+)
 NOT_COPIED = ("node_modules", "dist", "__pycache__", "backups", "databases", "browser", "decisions", "*.png")
 
 pytestmark = [

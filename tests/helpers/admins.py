@@ -1,8 +1,10 @@
 """Signed-in experimenters for tests of the admin API."""
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
+import pyotp
 import pytest
 from fastapi.testclient import TestClient
 from starlette.testclient import TestClient as StarletteClient
@@ -44,6 +46,13 @@ def signed_in(client: TestClient, services: Services, role: Role, name: str = ""
     made = client.post(f"/api/admin/invitations/{token}/account", json={"name": name, "password": PASSWORD})
     assert made.status_code == 201, made.text
     return Admin(client, name)
+
+
+def wrong_code(secret: str) -> str:
+    """Six digits that are no code of this second factor within the next minutes."""
+    moment, totp = int(time.time()), pyotp.TOTP(secret)
+    right = {totp.at(moment + seconds) for seconds in range(-60, 300, 30)}
+    return next(code for code in map("{:06}".format, range(1000)) if code not in right)
 
 
 @pytest.fixture

@@ -16,8 +16,9 @@ from server.models import ApiToken
 from server.settings import Settings
 from server.tokens import hash_token, new_token
 from tests.helpers.admins import PASSWORD
+from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase
-from tests.server.test_durability import free_port, start
+from tests.server.test_durability import start
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from server.clock import now
 from server.context import SIMULATED_TIME, Services, open_services
 from server.evidence.clip_bytes import clip_digest, clip_hash
 from server.settings import Settings
-from tests.helpers.studies import Participant
+from tests.helpers.studies import Participant, clip_url
 
 
 @pytest.fixture
@@ -33,10 +33,10 @@ class Watcher(Participant):
         headers = {"authorization": f"Bearer {self.token}", SIMULATED_TIME: self.moment.isoformat()}
         return self.client.request(method, f"/api/run{path}", json=body, headers=headers)
 
-    def begin(self) -> "Watcher":
-        """Begin, agree and take the tickets."""
+    def begin(self, **told: Any) -> "Watcher":
+        """Begin, agree and take the tickets; `told` is said of the page."""
         self.moment = now()
-        assert self.start(evidence=True).status_code == 201
+        assert self.start(evidence=True, **told).status_code == 201
         assert self.request("PUT", "/consent", {"agreed": True}).status_code == 200
         self.state()
         return self
@@ -55,8 +55,8 @@ class Watcher(Participant):
         """What the page sends with this rating; `changes` replace parts."""
         ticket = self.tickets["by_trial"][trial["trial_index"]][play - 1]
         digest = (
-            clip_digest(ticket, clip_hash(self.client.get(trial["clip_url"]).content))
-            if trial["clip_url"]
+            clip_digest(ticket, clip_hash(self.client.get(clip_url(trial)).content))
+            if trial["clip_sha256"]
             else None
         )
         interaction = {"presses": 2, "trusted": 2, "press_ms": 90.0, "moves": 5}

@@ -1,4 +1,4 @@
-"""The databases that commit c84c2e8 wrote (tests/golden/databases), loaded into either kind of database."""
+"""The databases of version 0.1.0 (tests/golden/databases), loaded into either kind of database."""
 
 import gzip
 import json
@@ -8,7 +8,7 @@ from typing import Any
 import psycopg
 from sqlalchemy.engine import make_url
 
-from server.db import Database
+from server.db import SIGNING_KEY, Database
 from tests.conftest import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "golden" / "databases"
@@ -25,7 +25,12 @@ def load_older_database(url: str) -> Database:
         plain = parts.set(drivername="postgresql").render_as_string(hide_password=False)
         with psycopg.connect(plain) as connection:
             connection.execute(_golden("0001.postgresql.sql.gz"))
-    return Database(url)
+    return opened(url)
+
+
+def opened(url: str) -> Database:
+    """With the installation's key, as the upgrade needs it."""
+    return Database(url, carried={SIGNING_KEY: lambda: SECRET_KEY.encode()})
 
 
 def older_ratings_csv(study: str) -> bytes:

@@ -16,6 +16,7 @@ from experiments.load import parse_experiment
 from server.app import create_app
 from server.context import Services
 from server.models import Link, Study
+from server.simulation.http import ACCEPTED
 from server.studies.importing import add_version, create_study, store_clips
 from server.studies.links import PURPOSE, LinkKind, create_link
 from server.tokens import derived_token
@@ -147,6 +148,7 @@ class Participant:
     def __init__(self, client: StarletteClient, link: str) -> None:
         self.client, self.link = client, link
         self.client_id = str(uuid.uuid4())
+        self.accepted = ACCEPTED
         self.token = ""
         self.run_id = ""
 
@@ -159,8 +161,8 @@ class Participant:
         return response
 
     def request(self, method: str, path: str, body: Any = None) -> Any:
-        """A request with the run token."""
-        headers = {"authorization": f"Bearer {self.token}"}
+        """A request with the run token, which says as the page does what it reads."""
+        headers = {"authorization": f"Bearer {self.token}", "accept": self.accepted}
         return self.client.request(method, f"/api/run{path}", json=body, headers=headers)
 
     def state(self) -> Any:
@@ -199,6 +201,11 @@ class Participant:
                     int(word) for word in (trial["prompt"] or "").replace("*", " ").split() if word.isdigit()
                 ]
                 assert self.rate(trial, *asked[:1]).status_code == 201
+
+
+def clip_url(trial: Any) -> str:
+    """Where the clip of a trial is."""
+    return f"/clips/{trial['clip_sha256']}.mp4"
 
 
 def good_playback(trial: Any) -> dict[str, Any]:

@@ -11,4 +11,5 @@ from tests.helpers.databases import (  # noqa: F401 - fixtures
     settings,
     sqlite_template,
 )
+from tests.helpers.seeds import one_seed, seeds_by_name  # noqa: F401 - fixtures
 from tests.helpers.studies import client, participant, study  # noqa: F401 - fixtures

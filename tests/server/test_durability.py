@@ -4,7 +4,6 @@ import json
 import os
 import random
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -18,15 +17,10 @@ from server.settings import Settings
 from server.simulation.http import JsonClient
 from server.simulation.person import Person, Rater
 from tests.helpers.databases import server_environment
+from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase
 
 KILLS = 3
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def start(settings: Settings, port: int) -> subprocess.Popen[bytes]:

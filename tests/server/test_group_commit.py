@@ -92,14 +92,18 @@ def test_closing_finishes_what_waits(writers, services) -> None:
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_light_work_passes_heavy_work_however_long_that_has_waited(writers, services) -> None:
     """The first piece occupies the one writer until everything else waits (PostgreSQL has two kinds)."""
-    occupied, order = threading.Event(), []
+    began, occupied, order = threading.Event(), threading.Event(), []
+
+    def occupy(_: Any) -> None:
+        began.set()
+        occupied.wait(60)
 
     def note(name: str):
-        return lambda connection: order.append((name, connection))
+        return lambda connection: order.append((name, connection.get_transaction()))
 
     async def main() -> None:
-        first = asyncio.create_task(writers.run("k", lambda _: occupied.wait(10)))
-        await asyncio.sleep(0.05)
+        first = asyncio.create_task(writers.run("k", occupy))
+        assert await asyncio.to_thread(began.wait, 60)
         tasks = [asyncio.create_task(writers.run("k", note("heavy"), MAX_HEAVY // 2)) for _ in range(6)]
         await asyncio.sleep(0.4)
         tasks += [asyncio.create_task(writers.run("k", note("light"))) for _ in range(3)]

@@ -14,7 +14,7 @@ from server.operations.rows import Content
 from server.operations.rows_repository import content_of, snapshot, tables_of
 from tests.conftest import REPOSITORY
 from tests.helpers.databases import BACKENDS
-from tests.helpers.older_databases import load_older_database
+from tests.helpers.older_databases import load_older_database, opened
 
 # Dies by its own kill -9 once so many revisions are written, before the transaction ends.
 KILLED = """
@@ -70,7 +70,7 @@ def test_a_migration_that_is_killed_changes_nothing_and_starts_again(
         timeout=240,
     )
     assert killed.returncode == -signal.SIGKILL, killed.stderr
-    database = Database(empty_database_url)
+    database = opened(empty_database_url)
     assert current_revision(database) == "0001"
     assert (stored(database), schema(database)) == (before, tables)
     assert upgrade(database) == ("0001", newest_revision())

@@ -10,7 +10,7 @@ from sqlalchemy import text
 from server.context import Services
 from server.migrate import current_revision, downgrade, newest_revision
 from server.simulation.person import Person, Rater
-from tests.experiments.trials.toy.api import Api
+from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, add_study
 from tests.helpers.thresholds import YES_NO, text_with
 from tests.server.trials.test_comparisons import PAIRS
@@ -30,7 +30,7 @@ def test_it_says_so_in_one_line_and_nothing_is_changed(
     services: Services, client: TestClient, tmp_path: Path, declared: Callable[[], str], revision: str
 ) -> None:
     study = add_study(services, tmp_path / "clips", declared())
-    person = Person(Api(client), Rater(1, 1, {}))  # type: ignore[arg-type]
+    person = Person(Api(client), Rater(1, 1, {}))
     assert person.take_part(study.link(synthetic=True), stop_after=3) is None
     with services.database.read() as session:
         before = session.execute(text("SELECT rating_id, kind FROM trial_ratings ORDER BY 1")).all()

@@ -1,3 +1,4 @@
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -105,3 +106,27 @@ def test_a_link_answers_who_asks_for_its_head(client: TestClient, study: StudyIn
     """Messengers and checkers of links ask so."""
     asked, got = (client.request(method, f"/run/{study.link_token}") for method in ("HEAD", "GET"))
     assert asked.status_code == got.status_code
+
+
+def test_security_txt_names_who_to_tell_until_when(settings: Settings) -> None:
+    named = settings.model_copy(update={"security_contact": "mailto:safe@lab.example"})
+    with TestClient(create_app(named)) as client:
+        answer = client.get("/.well-known/security.txt")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "text/plain; charset=utf-8")
+    fields = dict(line.split(": ", 1) for line in answer.text.splitlines())
+    assert fields["Contact"] == "mailto:safe@lab.example"
+    assert fields["Canonical"] == f"{settings.public_url}/.well-known/security.txt"
+    until = datetime.fromisoformat(fields["Expires"]) - datetime.now(UTC)
+    assert timedelta(days=80) < until < timedelta(days=365)  # RFC 9116: less than a year
+
+
+def test_without_a_contact_there_is_no_security_txt(client: TestClient) -> None:
+    assert client.get("/.well-known/security.txt").status_code == 404
+
+
+@pytest.mark.parametrize(
+    "contact", ["safe@lab.example", "http://lab.example", "mailto:a@b.c\nExpires: never"]
+)
+def test_other_contacts_are_refused(contact: str) -> None:
+    with pytest.raises(ValueError, match=r"expected mailto:name@example\.org or https://"):
+        Settings(security_contact=contact)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from server.cli import main
 from server.settings import Settings
 
 
@@ -37,4 +38,48 @@ def test_every_setting_is_described() -> None:
     for name, field in Settings.model_fields.items():
         assert field.description, name
         variable = "DATABASE_URL" if name == "database_url" else f"PALPEBRA_{name.upper()}"
-        assert f"`{variable}`" in described, variable
+        assert f"`{variable}`" in described or f"`{variable}__NAME__KEY`" in described, variable
+
+
+def test_a_provider_of_sign_in_is_declared_key_by_key(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("of the client\n")
+    declared = {
+        "LABEL": "Example University",
+        "ISSUER": "https://login.uni.example",
+        "CLIENT_ID": "palpebra",
+        "CLIENT_SECRET_FILE": str(secret),
+        "ROLES": '[{"claim": "groups", "value": "lab", "workspace": "lab", "role": "viewer"}]',
+    }
+    for key, value in declared.items():
+        monkeypatch.setenv(f"PALPEBRA_OIDC__UNI__{key}", value)
+    uni = Settings().oidc["uni"]
+    assert (uni.client_secret(), uni.roles[0].workspace) == ("of the client", "lab")
+    assert uni.second_factor_amr == uni.second_factor_acr == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("ISSUER", "http://login.uni.example", "expected https"),
+        ("CLIENT_SECRET_FILE", "/nowhere/secret", "expected a readable file"),
+        ("SCOPES", "profile", "expected 'openid'"),
+        ("ROLES", '[{"claim": "groups", "workspace": "lab", "role": "viewer"}]', "claim and value together"),
+        ("ROLES", '[{"workspace": "lab", "role": "emperor"}]', "'viewer', 'experimenter' or 'owner'"),
+        ("SECRET", "in the environment", "Extra inputs"),
+    ],
+)
+def test_a_provider_that_is_declared_wrongly_is_told_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], key: str, value: str, said: str
+) -> None:
+    known = {"LABEL": "Uni", "ISSUER": "https://login.uni.example", "CLIENT_ID": "palpebra", key: value}
+    for name, told in known.items():
+        monkeypatch.setenv(f"PALPEBRA_OIDC__UNI__{name}", told)
+    monkeypatch.setattr("sys.argv", ["server", "audit", "verify"])
+    with pytest.raises(SystemExit):
+        main()
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"error: PALPEBRA_OIDC__UNI__{key}")
+    assert said in line

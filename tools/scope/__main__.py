@@ -5,6 +5,7 @@ python -m tools.scope short                  rows of 20 plays idle and busy, 10 
 python -m tools.scope rows --plays 20 --conditions idle hogs --rates 30 60 --browsers chromium
 python -m tools.scope views --tries 100      reload, kill -9, another device: views stored against seen
 python -m tools.scope pairs --pairs 50       two clips on one canvas: are they ever a frame apart?
+python -m tools.scope long --rates 30        clips of a minute: every frame there, and memory as before?
 
 Each result is stored as it ends (--results), and what is there is not measured again: a run that was stopped
 goes on where it was. --before-others: on a machine that others use too the browser goes before other programs
@@ -23,6 +24,7 @@ from tools.scope.browser import PROGRAMS, program
 from tools.scope.compare import REFRESH_MS
 from tools.scope.conditions import CONDITIONS
 from tools.scope.display import Display, missing_here
+from tools.scope.long import LONG_S, measure_long
 from tools.scope.measure import measure
 from tools.scope.pairs import measure_pairs
 from tools.scope.results import Results
@@ -31,6 +33,7 @@ from tools.scope.views import count_views
 
 RATES = (24, 25, 30, 50, 60)
 PAIR_RATES = (30, 60)
+LONG_PLAYS = 3
 SHORT = {"plays": 20, "tries": 10, "pairs": 10, "rates": [30, 60], "conditions": ["idle", "hogs"]}
 
 
@@ -38,7 +41,9 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="make scope", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", nargs="?", choices=("all", "short", "rows", "views", "pairs"), default="all")
+    parser.add_argument(
+        "what", nargs="?", choices=("all", "short", "rows", "views", "pairs", "long"), default="all"
+    )
     parser.add_argument("--plays", type=int, help="plays a row (200)")
     parser.add_argument("--tries", type=int, help="views to which something happens (100)")
     parser.add_argument("--pairs", type=int, help="pairs shown at each rate (50)")
@@ -129,6 +134,9 @@ def _tasks(options: argparse.Namespace) -> list[Task]:
             tasks.append(_view_task(browser, options.tries))
         if every or options.what == "pairs":
             tasks += [_pair_task(browser, fps, options.pairs) for fps in PAIR_RATES]
+        if options.what in ("all", "long"):
+            rates = [fps for fps in options.rates if fps in PAIR_RATES]
+            tasks += [_long_task(browser, fps) for fps in rates]
         if every or options.what == "rows":
             names = [name for name in options.conditions if browser in CONDITIONS[name].browsers]
             tasks += [_row_task(browser, fps, name, options.plays) for name in names for fps in options.rates]
@@ -182,12 +190,31 @@ def _pair_task(browser: str, fps: int, pairs: int) -> Task:
     return Task(key, pairs, f"{browser}, {fps} fps, two clips on one canvas", take)
 
 
+def _long_task(browser: str, fps: int) -> Task:
+    key = ("long", browser, str(fps))
+
+    def take(bench: Bench) -> None:
+        row = measure_long(
+            bench.display,
+            bench.server,
+            bench.folder,
+            browser,
+            fps,
+            LONG_PLAYS,
+            bench.options.before_others,
+        )
+        bench.results.add(key, LONG_PLAYS, [row.line()], asdict(row))
+        print(f"    {row.line()}", flush=True)
+
+    return Task(key, LONG_PLAYS, f"{browser}, {fps} fps, clips of {LONG_S:g} s", take)
+
+
 def _print(results: Results) -> None:
     print(f"\nOne refresh is {REFRESH_MS:.1f} ms. Figures hold up to the frame buffer, not to the monitor.\n")
     rows = results.of("row")
     if rows:
         print(markdown([result.cells for result in rows]))
-    for kind in ("views", "pairs"):
+    for kind in ("views", "pairs", "long"):
         for result in results.of(kind):
             print(f"\n{kind} ({result.at}): {result.cells[0]}")
 

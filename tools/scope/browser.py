@@ -27,7 +27,10 @@ def program(browser: str) -> str | None:
 class Browser:
     """One browser with a profile of its own, for the time of a `with`.
 
-    before_others: give it real-time priority, so that the machine's other programs do not slow it down.
+    Attributes
+    ----------
+    before_others : bool, optional
+        Give it real-time priority, so that the machine's other programs do not slow it down.
     """
 
     def __init__(self, name: str, display: str, before_others: bool = False) -> None:
@@ -48,6 +51,11 @@ class Browser:
         )
         self.version = self._read()
         return self
+
+    @property
+    def pid(self) -> int:
+        """Of the driver, whose children the browser's processes are."""
+        return self._process.pid
 
     def ask(self, command: str, **values: object) -> Any:
         """The driver's answer to a command."""

@@ -52,7 +52,7 @@ debrief = "Thanks."
 
 def frames_at(fps: int, seconds: float = CLIP_S) -> int:
     """How many frames a clip of that rate has."""
-    return min(bars.MAX_FRAMES, round(seconds * fps))
+    return round(seconds * fps)
 
 
 def declaration(name: str, fps: int, plays: int) -> str:
@@ -103,6 +103,7 @@ def _clip(folder: Path, spec: design.ClipSpec, fps: int, height_px: int, seconds
 
 @cache
 def bar_video(fps: int, height_px: int, seconds: float) -> bytes:
-    """The bars as H.264 in MP4."""
-    pictures = (bars.planes(number, height_px) for number in range(frames_at(fps, seconds)))
+    """The bars as H.264 in MP4; their numbers begin anew every 64 frames."""
+    numbers = (number % bars.MAX_FRAMES for number in range(frames_at(fps, seconds)))
+    pictures = (bars.planes(number, height_px) for number in numbers)
     return encode_clip(pictures, (bars.WIDTH_PX, height_px), fps)

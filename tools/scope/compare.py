@@ -40,9 +40,15 @@ class Record:
 class Play:
     """A play seen from both sides.
 
-    missing: frames never on the screen. worst_off_ms: how far an onset was from its recorded time, and
-    worst_late_ms from the clip's own schedule; both after taking away the play's median, which is the delay
-    of the way to the screen. blind_ms: the poller's longest hold-up meanwhile.
+    Attributes
+    ----------
+    missing : int
+        Frames never on the screen.
+    worst_off_ms, worst_late_ms : float
+        How far an onset was from its recorded time, and from the clip's own schedule; both after taking away
+        the play's median, which is the delay of the way to the screen.
+    blind_ms : float
+        The poller's longest hold-up meanwhile.
     """
 
     record: Record

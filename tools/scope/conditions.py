@@ -28,7 +28,13 @@ WRITERS = 2
 
 @dataclass(frozen=True)
 class Condition:
-    """busy: the machine is made busy, so that ordinary priority belongs to the condition."""
+    """Circumstances under which plays are measured.
+
+    Attributes
+    ----------
+    busy : bool
+        The machine is made busy, so that ordinary priority belongs to the condition.
+    """
 
     name: str
     sentence: str

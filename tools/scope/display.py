@@ -25,7 +25,10 @@ def missing_here() -> str:
 class Display:
     """Xvfb, for the time of a `with`.
 
-    scan_out: give it real-time priority, as hardware that reads out a frame buffer waits for no program.
+    Attributes
+    ----------
+    scan_out : bool, optional
+        Give it real-time priority, as hardware that reads out a frame buffer waits for no program.
     """
 
     def __init__(self, folder: Path, scan_out: bool = True) -> None:

@@ -27,9 +27,16 @@ AFTER_CLIP_S = 0.25
 
 @dataclass(frozen=True)
 class Row:
-    """lost: plays whose clip was never seen on the screen. load: the machine's, over the last minute.
+    """The plays of one browser, frame rate and condition.
 
-    blind_ms, blind_share: the poller's own longest hold-up, and the share of its time that hold-ups took.
+    Attributes
+    ----------
+    lost : int
+        Plays whose clip was never seen on the screen.
+    load : float
+        The machine's, over the last minute.
+    blind_ms, blind_share : float
+        The poller's own longest hold-up, and the share of its time that hold-ups took.
     """
 
     browser: str

@@ -33,10 +33,22 @@ APART_MS = REFRESH_MS / 2
 
 @dataclass(frozen=True)
 class PairRow:
-    """seen: pairs on the frame buffer. apart_ms: the longest time for which the two showed different frames.
+    """The pairs of one browser and frame rate.
 
-    apart: pairs for which that was longer than half a refresh. differing_records: pairs whose two stored logs
-    differ. missing: frames never on the screen, over all pairs. blind_ms: the poller's longest hold-up.
+    Attributes
+    ----------
+    seen : int
+        Pairs on the frame buffer.
+    apart_ms : float
+        The longest time for which the two showed different frames.
+    apart : int
+        Pairs for which that was longer than half a refresh.
+    differing_records : int
+        Pairs whose two stored logs differ.
+    missing : int
+        Frames never on the screen, over all pairs.
+    blind_ms : float
+        The poller's longest hold-up.
     """
 
     browser: str

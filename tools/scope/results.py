@@ -10,7 +10,17 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Result:
-    """key: what was measured. count: of how many plays. cells: a line of the table, or one sentence."""
+    """One thing measured, once.
+
+    Attributes
+    ----------
+    key : tuple of str
+        What was measured.
+    count : int
+        Of how many plays.
+    cells : tuple of str
+        A line of the table, or one sentence.
+    """
 
     key: tuple[str, ...]
     count: int

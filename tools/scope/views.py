@@ -52,7 +52,17 @@ WAYS = (
 
 @dataclass(frozen=True)
 class ViewCount:
-    """seen: clips on the frame buffer. stored: rows of the ledger by outcome. tries: how many of each way."""
+    """What a browser showed and what the server stored of it.
+
+    Attributes
+    ----------
+    seen : int
+        Clips on the frame buffer.
+    stored : dict of str to int
+        Rows of the ledger by outcome.
+    tries : dict of str to int
+        How many of each way.
+    """
 
     browser: str
     tries: dict[str, int]

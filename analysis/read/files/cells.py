@@ -16,11 +16,16 @@ class Cells:
 
     Attributes
     ----------
-    rows : columns of text, named; the index counts rows from 0.
-    header : names of all columns of the file.
-    lines : line (or row of the sheet) on which each row stands, (rows,).
-    labels : of a column, the word for each coded value, where the file has such words (SPSS).
-    decisions : what was understood, for the reader of the tables.
+    rows : DataFrame
+        Columns of text, named; the index counts rows from 0.
+    header : tuple of str
+        Names of all columns of the file.
+    lines : int64 array
+        Line (or row of the sheet) on which each row stands, (rows,).
+    labels : mapping of str to mapping of str to str
+        Of a column, the word for each coded value, where the file has such words (SPSS).
+    decisions : tuple of str
+        What was understood, for the reader of the tables.
     """
 
     rows: pd.DataFrame

@@ -49,7 +49,12 @@ class Question(Declaration):
     def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
         """The columns of its answers: one, for None, or one an option where several may be chosen.
 
-        name: of the column, and how those of options begin. asked: the question in `language`.
+        Parameters
+        ----------
+        name : str
+            Of the column, and how those of options begin.
+        asked : str
+            The question in `language`.
         """
 
 

@@ -14,6 +14,8 @@ EFFECTS: dict[str, Effect] = {
     "scales": "measured",
     "arrangement": "measured",
     "views": "measured",
+    "reference": "measured",
+    "reference.label": "wording",
     "start": "measured",
     "fixation_ms": "measured",
     "pointer_delay_ms": "wording",
@@ -69,6 +71,35 @@ show_value = true
 reverse = true
 not_applicable = { en = "I cannot say" }
 """,
+    """\
+[trial]
+kind = "clip_rating"
+
+[trial.scale]
+minimum = 1
+maximum = 5
+question = { en = "How impaired is the second clip, compared with the first?" }
+labels = [
+    { en = "Very annoying" },
+    { en = "Annoying" },
+    { en = "Slightly annoying" },
+    { en = "Perceptible, but not annoying" },
+    { en = "Imperceptible" },
+]
+
+[trial.reference]
+factor = "compression"
+level = "none"
+label = { en = "Reference" }
+gap_ms = 2000
+rate_itself = true
+""",
+    """\
+[trial]
+kind = "clip_rating"
+scale = { type = "slider", question = { en = "Alike?" }, low = { en = "no" }, high = { en = "yes" } }
+reference = { cell = "none/natural", label = { en = "Reference" } }
+""",
 )
 
 CLIP_RATING = Kind(
@@ -84,6 +115,7 @@ CLIP_RATING = Kind(
     plan=plan,
     shares_clips=True,
     groups=True,
+    random_factors=True,
     example=EXAMPLE,
     further_examples=FURTHER_EXAMPLES,
     check_response=check_response,

@@ -42,6 +42,8 @@ class RatingAnswer(Answer):
 
     kind: Literal["clip_rating"]
     answers: Annotated[dict[Name, ScaleAnswer], Field(min_length=1, max_length=MAX_SCALES)]
+    reference_gap_ms: Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)] | None = None
+    """From the reference's last frame to the rated clip's first as they were drawn, where there is one."""
 
     @property
     def given(self) -> bool:
@@ -50,11 +52,11 @@ class RatingAnswer(Answer):
 
     def stored(self) -> dict[str, Any]:
         """One number for the one scale of a [trial.scale]; else an object a scale."""
+        gap = {} if self.reference_gap_ms is None else {"reference_gap_ms": self.reference_gap_ms}
         if self.answers.keys() == {SCALE_NAME}:
-            return self.answers[SCALE_NAME].model_dump(exclude_defaults=True, exclude={"rt"})
-        return {
-            "answers": {name: one.model_dump(exclude_defaults=True) for name, one in self.answers.items()}
-        }
+            return self.answers[SCALE_NAME].model_dump(exclude_defaults=True, exclude={"rt"}) | gap
+        answers = {name: one.model_dump(exclude_defaults=True) for name, one in self.answers.items()}
+        return {"answers": answers, **gap}
 
 
 def check_response(payload: Mapping[str, Any]) -> int | None:

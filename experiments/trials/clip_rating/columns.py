@@ -59,8 +59,27 @@ _EACH: dict[Dialect, str] = {
 }
 
 
+REFERENCE: tuple[Column, ...] = (
+    Column(
+        "reference",
+        "text",
+        "Cell of the reference clip shown before; empty where the study has none.",
+        source="xc.cell",
+    ),
+    Column(
+        "reference_gap_ms",
+        "number",
+        "From the last frame of the reference to the first of the rated clip, as they were drawn.",
+        unit="ms",
+        minimum=0,
+        source="t.payload",
+        member="reference_gap_ms",
+    ),
+)
+
+
 def _rows(dialect: Dialect) -> str:
-    return rows_of("clip_rating", {"shown": "c"}, _EACH[dialect])
+    return rows_of("clip_rating", {"shown": "c", "reference": "xc"}, _EACH[dialect])
 
 
 RATINGS = View(
@@ -84,6 +103,7 @@ RATINGS = View(
         *base.EVIDENCE,
         *base.CHECK,
         *base.PRESENTATION,
+        *REFERENCE,
     ),
     rows=_rows,
 )

@@ -4,7 +4,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from experiments.design import ClipSpec
 from experiments.errors import InputError
+from experiments.trials.clip_rating.reference import RatingReference
 from experiments.trials.clip_rating.scales import SCALE_NAME, AnyScale, Points, Slider
 from experiments.trials.kind import TrialDeclaration
 from experiments.trials.scales import RatedScale
@@ -33,6 +35,8 @@ class ClipRating(TrialDeclaration):
     """Several scales below one another on one screen, or a screen each in their order."""
     views: Annotated[int, Field(ge=1, le=10)] = 1
     """How often the clip is shown before it is rated."""
+    reference: RatingReference | None = None
+    """A clip shown before each rated one, in degradation category rating: [trial.reference]."""
     start: Literal["key", "fixation"] = "key"
     """A clip begins on a key press, or by itself after a fixation cross."""
     fixation_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
@@ -62,10 +66,31 @@ class ClipRating(TrialDeclaration):
             raise ValueError(missing)
         return self
 
+    @model_validator(mode="after")
+    def _reference_fits(self) -> Self:
+        if self.reference is None:
+            return self
+        if self.views > 1:
+            raise ValueError(
+                f"views: a trial with a reference shows both clips once; leave it out, got {self.views}"
+            )
+        missing = sorted(set(self.asked_scales[0].question) - set(self.reference.label))
+        if missing:
+            raise ValueError(f"reference.label has no text in '{missing[0]}', which the question has")
+        return self
+
+    def rates(self, experiment: "Experiment", clip: ClipSpec) -> bool:
+        """Every clip, but references that are not rated themselves."""
+        return self.reference is None or self.reference.rates(experiment, clip)
+
     def fault(self, experiment: "Experiment") -> str | None:
-        """More views of a long performance than the log of a trial may hold."""
+        """More views of a long performance than a trial may log; a reference that does not fit."""
         levels = [level.render for factor in experiment.factors for level in factor.levels]
         settings = [experiment.render, *(level.applied_to(experiment.render) for level in levels)]
+        if self.reference and any(one.performance for one in settings):
+            return "trial.reference: performances have no reference; leave it out, or show single blinks"
+        if self.reference and (wrong := self.reference.fault(experiment)):
+            return wrong
         longest = max((round(one.seconds * one.fps) for one in settings if one.performance), default=0)
         if longest * self.views <= MAX_FRAMES_LOGGED:
             return None

@@ -1,14 +1,16 @@
 """Who rates which clips in what order: everyone every clip, in blocks as declared."""
 
 import random
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from experiments.assignment.groups import place_of
+from experiments.assignment.groups import seat_of
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines, share
-from experiments.assignment.trial import Trial
+from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec
 from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.clip_rating.reference import RatingReference
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -21,16 +23,26 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
     def asked(rng: random.Random) -> int:
         return rng.randint(scale.minimum, scale.maximum)
 
-    return single_clips(experiment, seed, slot, asked)
+    trials = single_clips(experiment, seed, slot, asked)
+    reference = clip_rating_of(experiment).reference
+    return trials if reference is None else [_after(reference, experiment, trial) for trial in trials]
+
+
+def _after(reference: RatingReference, experiment: "Experiment", trial: Trial) -> Trial:
+    """The trial with its reference; checks have none."""
+    if trial.clip is None or trial.check is not None:
+        return trial
+    return replace(trial, shown=(*trial.shown, Shown("reference", reference.of(experiment, trial.clip))))
 
 
 def plan(experiment: "Experiment") -> tuple[str, ...]:
-    """Groups, and how often each clip is seen."""
-    return lines(experiment)
+    """Groups, how often each clip is seen, and which clip comes before it."""
+    reference = clip_rating_of(experiment).reference
+    return lines(experiment) if reference is None else (*lines(experiment), reference.said())
 
 
 def block_size(experiment: "Experiment", block: BlockSpec) -> int:
     """One trial a clip of the participant's share, the largest where they differ."""
     laps = len(experiment.assignment.lists) or 1
-    places = (place_of(experiment, slot) for slot in range(laps))
-    return max(len(share(experiment, place).intersection(block.clips)) for place in places)
+    seats = (seat_of(experiment, slot) for slot in range(laps))
+    return max(len(share(experiment, seat).intersection(block.clips)) for seat in seats)

@@ -1,8 +1,8 @@
 """Clips rated while they are shown: a slider's place, sampled at their frames."""
 
+from experiments.assignment.shares import lines as planned
 from experiments.schema.effects import Effect
 from experiments.trials.clip_rating.plan import block_size
-from experiments.trials.clip_rating.plan import plan as planned
 from experiments.trials.continuous_rating.answer import ContinuousAnswer, check_response
 from experiments.trials.continuous_rating.columns import TRACES
 from experiments.trials.continuous_rating.declaration import ContinuousRating

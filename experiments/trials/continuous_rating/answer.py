@@ -13,17 +13,16 @@ Sample = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class ContinuousAnswer(Answer):
-    """The answer; no values where the clip could not be shown.
-
-    values: the slider's place at frames 0, `step_frames`, 2 `step_frames` and so on. moves: how often it
-    began to move. chosen: the number given to an attention check, which has no clip.
-    """
+    """The answer; no values where the clip could not be shown."""
 
     kind: Literal["continuous_rating"]
     values: Annotated[tuple[Sample, ...], Field(min_length=1, max_length=MAX_SAMPLES)] | None = None
+    """The slider's place at frames 0, `step_frames`, 2 `step_frames` and so on."""
     step_frames: Annotated[StrictInt, Field(ge=1, le=1000)] | None = None
     moves: Annotated[StrictInt, Field(ge=0, le=100_000)] = 0
+    """How often the slider began to move."""
     chosen: Annotated[StrictInt, Field(ge=1, le=CHECK_POINTS)] | None = None
+    """The number given to an attention check, which has no clip."""
 
     @property
     def given(self) -> bool:

@@ -12,13 +12,13 @@ CODES = {"left": 1, "right": 2, "tie": 3}
 class ComparisonAnswer(Answer):
     """The clip chosen, or a tie; None where the pair could not be shown.
 
-    `left` is the first of two clips in turn, and the upper of two stacked ones. arrangement: how the two were
-    in fact shown, which differs from the declaration where two clips beside one another did not fit.
+    `left` is the first of two clips in turn, and the upper of two stacked ones.
     """
 
     kind: Literal["paired_comparison"]
     winner: Literal["left", "right", "tie"] | None
     arrangement: Literal["side_by_side", "stacked", "one_after_the_other"] | None = None
+    """How the two were in fact shown, not as declared where two clips beside one another did not fit."""
 
     @property
     def given(self) -> bool:

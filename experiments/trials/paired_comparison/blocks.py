@@ -46,10 +46,10 @@ class BlockDeal(Deal):
     def of_slot(self, slot: int) -> list[Pair]:
         """The pairs of one slot, repeats of the blocks not counted."""
         places = range(slot * self._per_person, (slot + 1) * self._per_person)
-        return [pair for place in places for pair in self._of_block(place)]
+        return [pair for turn in places for pair in self._of_block(turn)]
 
-    def _of_block(self, place: int) -> list[Pair]:
-        rounds, at = divmod(place, self.round)
+    def _of_block(self, turn: int) -> list[Pair]:
+        rounds, at = divmod(turn, self.round)
         index, of_set = divmod(at, len(self._sets))
         dealt = []
         for two in combinations(self.blocks[index], 2):

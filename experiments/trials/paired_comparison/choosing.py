@@ -23,7 +23,10 @@ def chosen_pairs(experiment: "Experiment", seed: int, compared: Iterable[Compare
 
     Parameters
     ----------
-    seed: of the run; it breaks ties and draws the random share. compared: everything that is stored.
+    seed : int
+        Of the run; it breaks ties and draws the random share.
+    compared : iterable of Compared
+        Everything that is stored.
     """
     rng, trial = random.Random(f"active/{seed}"), paired_comparison_of(experiment)
     share = trial.dealing.random_share if isinstance(trial.dealing, Active) else 0.0

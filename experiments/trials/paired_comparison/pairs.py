@@ -83,10 +83,10 @@ def _across_groups(experiment: "Experiment", trial: PairedComparison) -> str | N
     """A declared pair whose cells no participant sees both of; None where there is none."""
     if not isinstance(trial.pairs, DeclaredPairs):
         return None
-    between = [place for place, factor in enumerate(experiment.factors) if factor.between]
+    between = [index for index, factor in enumerate(experiment.factors) if factor.between]
     for pair in trial.pairs.cells:
         one, other = pair.cell.split("/"), pair.other.split("/")
-        if any(one[place] != other[place] for place in between):
+        if any(one[index] != other[index] for index in between):
             return (
                 f"trial.pairs.cells: '{pair.cell}' and '{pair.other}' are seen by different groups, so "
                 "nobody can compare them; pair cells of one group"
@@ -198,8 +198,8 @@ class Deal:
         """The pairs of one slot, repeats of the blocks not counted."""
         places = range(slot * self.each, (slot + 1) * self.each)
         dealt = []
-        for place in places:
-            times, at = divmod(place, len(self.pairs))
+        for turn in places:
+            times, at = divmod(turn, len(self.pairs))
             pair = self.pairs[self._order[at]]
             dealt.append(pair.swapped if times % 2 else pair)
         return dealt
@@ -233,11 +233,11 @@ def check_connected(experiment: "Experiment", pairs: Sequence[Pair]) -> None:
     """InputError where these pairs leave items on two scales, or clips out, naming them."""
     items = {item_of(experiment, clip) for clip in design.clips(experiment)}
     edges = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
-    found = groups(edges, items)
-    if len(found) > 1:
+    apart = groups(edges, items)
+    if len(apart) > 1:
         raise InputError(
-            f"'{experiment.name}': expected pairs that connect all items, got {len(found)} groups never "
-            f"compared with one another: {_named(found)}; declare a pair between them, or more participants "
+            f"'{experiment.name}': expected pairs that connect all items, got {len(apart)} groups never "
+            f"compared with one another: {_named(apart)}; declare a pair between them, or more participants "
             "or pairs_per_person"
         )
     compared = {clip for pair in pairs for clip in pair}
@@ -249,8 +249,8 @@ def check_connected(experiment: "Experiment", pairs: Sequence[Pair]) -> None:
         )
 
 
-def _named(found: list[list[str]]) -> str:
-    return _short(["{" + _short(group, ", ") + "}" for group in found], " and ")
+def _named(apart: list[list[str]]) -> str:
+    return _short(["{" + _short(group, ", ") + "}" for group in apart], " and ")
 
 
 def _short(names: list[str], joint: str, limit: int = 6) -> str:

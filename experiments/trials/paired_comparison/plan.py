@@ -7,7 +7,7 @@ from math import gcd
 from typing import TYPE_CHECKING, Literal
 
 from experiments.assignment.compared import Compared
-from experiments.assignment.groups import groups, name_of, of_group, place_of
+from experiments.assignment.groups import groups, name_of, of_group, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.shares import expected_slots, said_of_groups
 from experiments.assignment.trial import Shown, Trial
@@ -27,11 +27,15 @@ def assign(experiment: "Experiment", seed: int, slot: int, compared: Iterable[Co
 
     Parameters
     ----------
-    seed: of the order of trials and of practice. slot: place in the counterbalancing, which deals the group,
-    the pairs and their sides. compared: what is stored, where pairs are chosen by it.
+    seed : int
+        Of the order of trials and of practice.
+    slot : int
+        Place in the counterbalancing, which deals the group, the pairs and their sides.
+    compared : iterable of Compared, optional
+        What is stored, where pairs are chosen by it.
     """
-    place = place_of(experiment, slot)
-    return _of_group(of_group(experiment, place.levels), seed, place.number, compared)
+    seat = seat_of(experiment, slot)
+    return _of_group(of_group(experiment, seat.levels), seed, seat.number, compared)
 
 
 def _of_group(
@@ -109,7 +113,7 @@ def plan(experiment: "Experiment") -> tuple[str, ...]:
     every = groups(experiment)
     if len(every) == 1:
         return _plan_of_group(experiment)
-    sizes = Counter(place_of(experiment, slot).levels for slot in expected_slots(experiment))
+    sizes = Counter(seat_of(experiment, slot).levels for slot in expected_slots(experiment))
     said = [said_of_groups(experiment)]
     for levels in every:
         if not sizes[levels]:

@@ -12,14 +12,12 @@ CODES = {"yes": 1, "no": 2, "first": 1, "second": 2}
 
 
 class ThresholdAnswer(Answer):
-    """The answer; None where the clips could not be shown.
-
-    known: how many answers of the series the server's choice of this stimulus rested on, as it said.
-    """
+    """The answer; None where the clips could not be shown."""
 
     kind: Literal["threshold"]
     chosen: Literal["yes", "no", "first", "second"] | None
     known: Annotated[StrictInt, Field(ge=0, le=100_000)] = 0
+    """How many answers of the series the server's choice of this stimulus rested on, as it said."""
 
     @property
     def given(self) -> bool:

@@ -1,7 +1,7 @@
 """What in a declared threshold does not fit the rest of the experiment, in one line with what to do."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from experiments.assignment.groups import groups, name_of
@@ -43,15 +43,18 @@ def _faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
 def _stimulus_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
     factor = trial.stimulus.factor
     levels = [level.name for level in experiment.factor(factor).levels]
-    for name in trial.stimulus.values:
-        if name not in levels:
-            yield f"trial.stimulus.values: '{factor}' has no level '{name}'{did_you_mean(name, levels)}"
-    if isinstance(trial.task, TwoInterval) and trial.task.standard not in levels:
-        near = did_you_mean(trial.task.standard, levels)
-        yield f"trial.task.standard: '{factor}' has no level '{trial.task.standard}'{near}"
+    yield from _level_faults("trial.stimulus.values", factor, trial.stimulus.values, levels)
+    if isinstance(trial.task, TwoInterval):
+        yield from _level_faults("trial.task.standard", factor, [trial.task.standard], levels)
     yield from _number_faults("trial.stimulus", factor, trial.stimulus.values, tested(trial, levels))
     numbers = [number_of(trial.stimulus.values, name) for name in tested(trial, levels)]
     yield from _function_faults(trial, min((one for one in numbers if one is not None), default=0.0))
+
+
+def _level_faults(path: str, factor: str, named: Iterable[str], levels: Sequence[str]) -> Iterator[str]:
+    for name in named:
+        if name not in levels:
+            yield f"{path}: '{factor}' has no level '{name}'{did_you_mean(name, levels)}"
 
 
 def _number_faults(
@@ -86,14 +89,10 @@ def _second_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
     levels = [level.name for level in experiment.factor(second.factor).levels]
     if second.factor == trial.stimulus.factor:
         yield f"trial.stimulus.second.factor: '{second.factor}' is the first already; name another factor"
-    for name in second.values:
-        if name not in levels:
-            near = did_you_mean(name, levels)
-            yield f"trial.stimulus.second.values: '{second.factor}' has no level '{name}'{near}"
+    yield from _level_faults("trial.stimulus.second.values", second.factor, second.values, levels)
     yield from _number_faults("trial.stimulus.second", second.factor, second.values, levels)
-    if beside is not None and beside not in levels:
-        near = did_you_mean(beside, levels)
-        yield f"trial.task.standard_second: '{second.factor}' has no level '{beside}'{near}"
+    if beside is not None:
+        yield from _level_faults("trial.task.standard_second", second.factor, [beside], levels)
     if trial.function != "normal":
         yield (
             "trial.function: expected normal with a second factor, whose thresholds may pass 0, "
@@ -107,9 +106,10 @@ def _table_faults(experiment: "Experiment") -> Iterator[str]:
 
     assumed = model(experiment)
     parameters = len(assumed.thresholds) * len(assumed.spreads) * max(1, len(assumed.tilts))
-    if (size := len(points(experiment)) * parameters) > MAX_TABLE:
+    stimuli = len(points(experiment))
+    if (size := stimuli * parameters) > MAX_TABLE:
         yield (
-            f"trial.thresholds: {len(points(experiment))} stimuli times {parameters} sets of thresholds, "
+            f"trial.thresholds: {stimuli} stimuli times {parameters} sets of thresholds, "
             f"spreads and tilts are {size}, more than {MAX_TABLE}; give them fewer steps"
         )
 
@@ -171,9 +171,9 @@ def _series_faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:
         if factor.name not in trial.stimulus.factors
     }
     names = [series.name for series in trial.series]
-    for place, one in enumerate(trial.series):
+    for position, one in enumerate(trial.series):
         here = f"trial.series: '{one.name}'"
-        if one.name in names[:place]:
+        if one.name in names[:position]:
             yield f"{here} is declared twice"
         for factor, level in one.levels.items():
             if factor in trial.stimulus.factors:

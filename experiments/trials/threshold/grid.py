@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import product
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
 from experiments.design import ClipSpec
 from experiments.trials.threshold.declaration import Range, Series, Threshold, TwoInterval, threshold_of
@@ -10,6 +10,8 @@ from experiments.trials.threshold.faults import number_of, tested
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
+
+Key = TypeVar("Key")
 
 
 class Point(NamedTuple):
@@ -47,8 +49,7 @@ def stimuli(experiment: "Experiment") -> dict[float, str]:
     """Level of the stimulus factor by its number, ascending."""
     trial = threshold_of(experiment)
     levels = [level.name for level in experiment.factor(trial.stimulus.factor).levels]
-    numbers = {number_of(trial.stimulus.values, level): level for level in tested(trial, levels)}
-    return dict(sorted((number, level) for number, level in numbers.items() if number is not None))
+    return _by_number(trial.stimulus.values, tested(trial, levels))
 
 
 def seconds(experiment: "Experiment") -> dict[float, str]:
@@ -56,8 +57,11 @@ def seconds(experiment: "Experiment") -> dict[float, str]:
     second = threshold_of(experiment).stimulus.second
     if second is None:
         return {}
-    levels = (level.name for level in experiment.factor(second.factor).levels)
-    numbers = {number_of(second.values, level): level for level in levels}
+    return _by_number(second.values, (level.name for level in experiment.factor(second.factor).levels))
+
+
+def _by_number(values: Mapping[str, float], levels: Iterable[str]) -> dict[float, str]:
+    numbers = {number_of(values, level): level for level in levels}
     return dict(sorted((number, level) for number, level in numbers.items() if number is not None))
 
 
@@ -74,11 +78,14 @@ def points(experiment: "Experiment") -> dict[Point, dict[str, str]]:
     }
 
 
-def point_at(experiment: "Experiment", levels: Mapping[str, str]) -> Point | None:
-    """The stimulus that a clip of these levels is; None for a standard."""
+def points_of(experiment: "Experiment", clips: Mapping[Key, Mapping[str, str]]) -> dict[Key, Point]:
+    """The stimulus that each clip is, by the clip's levels; standards are left out."""
     factors = threshold_of(experiment).stimulus.factors
-    mine = {factor: levels[factor] for factor in factors}
-    return next((point for point, named in points(experiment).items() if named == mine), None)
+    by_levels = {
+        tuple(levels[name] for name in factors): point for point, levels in points(experiment).items()
+    }
+    named = {clip: tuple(levels[name] for name in factors) for clip, levels in clips.items()}
+    return {clip: by_levels[levels] for clip, levels in named.items() if levels in by_levels}
 
 
 def model(experiment: "Experiment") -> Model:

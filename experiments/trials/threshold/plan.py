@@ -4,7 +4,7 @@ import random
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from experiments.assignment.groups import groups, name_of, place_of
+from experiments.assignment.groups import groups, name_of, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.trial import Shown, Trial
 from experiments.design import BlockSpec
@@ -32,24 +32,26 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
 
     Parameters
     ----------
-    seed: of practice, order of series and intervals. slot: place in the counterbalancing, for the group of
-    participants and the blocks.
+    seed : int
+        Of practice, order of series and intervals.
+    slot : int
+        Place in the counterbalancing, for the group of participants and the blocks.
     """
-    rng, place_in_study = random.Random(seed), place_of(experiment, slot)
-    mine, levels = list(series_in_group(experiment, place_in_study.levels)), list(points(experiment).values())
+    rng, seat = random.Random(seed), seat_of(experiment, slot)
+    mine, levels = list(series_in_group(experiment, seat.levels)), list(points(experiment).values())
     trials = [_practice(experiment, mine, rng) for _ in range(experiment.practice.trials)]
     done = dict.fromkeys((one.name for one in mine), 0)
-    for number, block in enumerate(ordered_blocks(experiment, rng, place_in_study.number), start=1):
+    for number, block in enumerate(ordered_blocks(experiment, rng, seat.number), start=1):
         main: list[Trial] = []
         here = _series_in(experiment, block, mine)
         for _ in range(_trials_a_block(experiment)):
             if experiment.blocks.trial_order == "random":
                 rng.shuffle(here)
             for one in here:
-                place = done[one.name]
+                position = done[one.name]
                 done[one.name] += 1
                 shown = _shown(
-                    experiment, one, _spread(levels, place), exemplar_at(experiment, place + 1), rng
+                    experiment, one, _spread(levels, position), exemplar_at(experiment, position + 1), rng
                 )
                 main.append(Trial("main", number, block.label, shown, series=one.name))
         if main:
@@ -77,10 +79,10 @@ def _shown(
     return tuple(Shown(role, clip) for role, clip in zip(trial.roles, clips, strict=True))
 
 
-def _spread(levels: list[dict[str, str]], place: int) -> dict[str, str]:
+def _spread(levels: list[dict[str, str]], position: int) -> dict[str, str]:
     """The stimuli in van der Corput's order of base 2: any run of places covers the grid evenly."""
     share, weight = 0.0, 0.5
-    number = place + 1
+    number = position + 1
     while number:
         share += weight * (number & 1)
         number >>= 1
@@ -134,13 +136,13 @@ def plan(experiment: "Experiment") -> tuple[str, ...]:
 
 
 def _length(stop: Stop, series: int) -> str:
-    most = stop.trials or 0
+    longest = stop.trials or 0
     rules = [f"SD {stop.sd:g}"] if stop.sd is not None else []
     rules += [f"entropy {stop.entropy:g} bit"] if stop.entropy is not None else []
     if not rules:
-        return f"{most} trials a series, {most * series} a participant"
-    least = min(stop.at_least, most)
+        return f"{longest} trials a series, {longest * series} a participant"
+    shortest = min(stop.at_least, longest)
     return (
-        f"{least} to {most} trials a series, {least * series} to {most * series} a participant: it ends at "
-        f"{' and '.join(rules)}"
+        f"{shortest} to {longest} trials a series, {shortest * series} to {longest * series} a participant: "
+        f"it ends at {' and '.join(rules)}"
     )

@@ -35,8 +35,15 @@ export async function unwrap<T>(asked: Promise<Outcome<T>>): Promise<T> {
   }
   if (outcome.response.ok) return outcome.data as T;
   const detail = errorDetail(outcome.error);
+  if (detail?.code === "sign_in_again") signInAgain();
   const message = detail?.message ?? `The server answered ${outcome.response.status}.`;
   throw new Refused(outcome.response.status, detail?.code ?? "unknown", message);
+}
+
+/** Once signed in afresh, the person comes back to this page and asks again. */
+function signInAgain(): void {
+  const here = window.location.pathname.replace(/^\/admin/, "");
+  window.location.assign(`/admin/sign-in?refused=sign_in_again&next=${encodeURIComponent(here)}`);
 }
 
 function errorDetail(body: unknown): { code: string; message: string } | null {

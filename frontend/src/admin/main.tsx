@@ -1,19 +1,21 @@
 /** The admin site: providers, then the router. */
 
-import "@mantine/core/styles.css";
+import "./mantine.css";
 import "@mantine/notifications/styles.css";
 import "./admin.css";
 import { MantineProvider } from "@mantine/core";
-import { Notifications } from "@mantine/notifications";
 import { MutationCache, QueryCache, QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { RouterProvider } from "@tanstack/react-router";
-import { StrictMode } from "react";
+import { lazy, StrictMode, Suspense } from "react";
 import { createRoot } from "react-dom/client";
 import { Refused } from "./api";
 import { styleNonce } from "./nonce";
 import { sessionQuery } from "./queries";
 import { router } from "./router";
 import { readable, theme } from "./theme";
+import { loadNotifications } from "./ui/notify";
+
+const Notifications = lazy(async () => ({ default: (await loadNotifications()).Notifications }));
 
 /** Where the session has ended meanwhile, asking for it again shows the page to sign in. */
 function onRefusal(error: Error): void {
@@ -32,7 +34,9 @@ if (root !== null) {
     <StrictMode>
       <MantineProvider theme={theme} cssVariablesResolver={readable} defaultColorScheme="auto" getStyleNonce={styleNonce}>
         <QueryClientProvider client={queries}>
-          <Notifications position="top-right" />
+          <Suspense fallback={null}>
+            <Notifications position="top-right" />
+          </Suspense>
           <RouterProvider router={router} />
         </QueryClientProvider>
       </MantineProvider>

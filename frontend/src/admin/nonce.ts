@@ -2,6 +2,9 @@
 
 const nonce = document.querySelector('meta[name="csp-nonce"]')?.getAttribute("content") ?? "";
 
+// Where the library that holds the page still behind a dialog looks for it (get-nonce).
+Object.assign(globalThis, { __webpack_nonce__: nonce });
+
 export function styleNonce(): string {
   return nonce;
 }

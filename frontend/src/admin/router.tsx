@@ -17,6 +17,11 @@ const invitation = createRoute({
   path: "/invitation",
   component: lazyRouteComponent(() => import("./account/InvitationPage"), "InvitationPage"),
 });
+const letter = createRoute({
+  getParentRoute: () => root,
+  path: "/letter/$about",
+  component: lazyRouteComponent(() => import("./account/LetterPage"), "LetterPage"),
+});
 
 const inside = createRoute({ getParentRoute: () => root, id: "inside", component: Shell });
 const page = { getParentRoute: () => inside };
@@ -38,6 +43,11 @@ const workspaces = createRoute({
   component: lazyRouteComponent(() => import("./people/WorkspacesPage"), "WorkspacesPage"),
 });
 const audit = createRoute({ ...page, path: "/audit", component: lazyRouteComponent(() => import("./people/AuditPage"), "AuditPage") });
+const backups = createRoute({
+  ...page,
+  path: "/backups",
+  component: lazyRouteComponent(() => import("./people/BackupsPage"), "BackupsPage"),
+});
 const figures = createRoute({
   ...page,
   path: "/blinks",
@@ -66,6 +76,7 @@ const tabs = [
   createRoute({ ...tab, path: "/build", component: lazyRouteComponent(() => import("./builder/BuilderTab"), "BuilderTab") }),
   createRoute({ ...tab, path: "/clips", component: lazyRouteComponent(() => import("./studies/ClipsTab"), "ClipsTab") }),
   createRoute({ ...tab, path: "/links", component: lazyRouteComponent(() => import("./studies/LinksTab"), "LinksTab") }),
+  createRoute({ ...tab, path: "/rehearsal", component: lazyRouteComponent(() => import("./rehearsal/RehearsalTab"), "RehearsalTab") }),
   createRoute({ ...tab, path: "/monitor", component: lazyRouteComponent(() => import("./monitor/MonitorTab"), "MonitorTab") }),
   createRoute({ ...tab, path: "/results", component: lazyRouteComponent(() => import("./results/ResultsTab"), "ResultsTab") }),
   createRoute({ ...tab, path: "/data", component: lazyRouteComponent(() => import("./data/DataTab"), "DataTab") }),
@@ -79,13 +90,31 @@ const tabs = [
     path: "/participants/$run",
     component: lazyRouteComponent(() => import("./participants/TimelinePage"), "TimelinePage"),
   }),
+  createRoute({
+    ...tab,
+    path: "/participants/$run/replay",
+    component: lazyRouteComponent(() => import("./replay/ReplayPage"), "ReplayPage"),
+  }),
   createRoute({ ...tab, path: "/settings", component: lazyRouteComponent(() => import("./studies/SettingsTab"), "SettingsTab") }),
 ];
 
 const tree = root.addChildren([
   signIn,
   invitation,
-  inside.addChildren([studies, create, account, people, workspaces, audit, figures, labelling, blinkReview, study.addChildren(tabs)]),
+  letter,
+  inside.addChildren([
+    studies,
+    create,
+    account,
+    people,
+    workspaces,
+    backups,
+    audit,
+    figures,
+    labelling,
+    blinkReview,
+    study.addChildren(tabs),
+  ]),
 ]);
 
 export const router = createRouter({

@@ -38,9 +38,9 @@ export const theme = createTheme({
   },
 });
 
-/** Dimmed and placeholder text dark enough (or light enough) for WCAG's 4.5 : 1. */
+/** Links, dimmed and placeholder text dark enough (or light enough) for WCAG's 4.5 : 1. */
 export const readable: CSSVariablesResolver = () => ({
   variables: {},
   light: { "--mantine-color-dimmed": "#545b62", "--mantine-color-placeholder": "#646b72", "--mantine-color-error": "#c2255c" },
-  dark: { "--mantine-color-dimmed": "#a6a7ab", "--mantine-color-placeholder": "#9a9ca1" },
+  dark: { "--mantine-color-dimmed": "#a6a7ab", "--mantine-color-placeholder": "#9a9ca1", "--mantine-color-anchor": "#7badb9" },
 });

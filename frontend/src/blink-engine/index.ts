@@ -4,7 +4,9 @@ export type { Law } from "./laws";
 export {
   type BlinkEvent,
   DEFAULT_PARAMETERS,
+  type Drift,
   type EventKind,
+  meanInterval_s,
   type Parameters,
   type ProfileModel,
   type Response,

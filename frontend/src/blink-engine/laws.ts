@@ -14,6 +14,14 @@ export function draw({ kind, median, spread = 0 }: Law, numbers: RandomNumbers):
   return kind === "fixed" ? median : median * Math.exp(spread * z);
 }
 
+/** The interval that a random moment falls into: the longer one is, the likelier it is met. */
+export function drawUnderWay(law: Law, numbers: RandomNumbers): number {
+  const { kind, median, spread = 0 } = law;
+  if (kind === "gamma") return gammaScale(median, spread) * drawGamma(spread + 1, numbers);
+  const drawn = draw(law, numbers);
+  return kind === "fixed" ? drawn : drawn * Math.exp(spread * spread);
+}
+
 export function mean({ kind, median, spread = 0 }: Law): number {
   if (kind === "gamma") return gammaScale(median, spread) * spread;
   return kind === "lognormal" ? median * Math.exp((spread * spread) / 2) : median;

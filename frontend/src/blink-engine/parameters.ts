@@ -1,6 +1,6 @@
 /** What the engine needs to know; the defaults are those of the Python package, each with its source. */
 import shipped from "../../../blink_engine/defaults.json";
-import { type Law, withMean } from "./laws";
+import { type Law, mean, withMean } from "./laws";
 
 export type StateName = "rest" | "reading" | "screen" | "speaking" | "listening";
 type ReactingKind = "utterance_start" | "utterance_end" | "pause" | "turn_end" | "gaze_shift" | "head_turn";
@@ -42,8 +42,19 @@ export interface ProfileModel {
   lower_in: number;
 }
 
+/** How somebody's rate wanders: each interval is the law's draw times e to the power of d, an autoregressive number. */
+export interface Drift {
+  /** Standard deviation of d. */
+  spread: number;
+  /** What is kept of d from one blink to the next. */
+  kept: number;
+}
+
 export interface Parameters {
   intervals: Record<StateName, Law>;
+  /** Over some blinks, and over minutes; both apply, but to laws of the kind `fixed`. */
+  drift: Drift;
+  slow_drift: Drift;
   responses: Record<EventKind, Response>;
   profile: ProfileModel;
   least_interval_s: number;
@@ -56,10 +67,22 @@ const { sources, ...values } = shipped;
 export const DEFAULT_PARAMETERS = values as Parameters;
 export const SOURCES: Readonly<Record<string, string>> = sources;
 
+const driftMean = ({ spread }: Drift): number => Math.exp((spread * spread) / 2);
+
+export const drifted = ({ spread, kept }: Drift, before: number, z: number): number =>
+  kept * before + Math.sqrt(1 - kept * kept) * spread * z;
+
+/** Mean time from onset to onset in a state, the drifts included. */
+export function meanInterval_s({ intervals, drift, slow_drift }: Parameters, state: StateName): number {
+  const law = intervals[state];
+  return law.kind === "fixed" ? mean(law) : mean(law) * driftMean(drift) * driftMean(slow_drift);
+}
+
 /** The same with another mean blink rate in one state. */
 export function withRate(parameters: Parameters, state: StateName, perMinute: number): Parameters {
   if (!(perMinute >= 0.1 && perMinute <= 60)) throw new RangeError(`expected a blink rate of 0.1 to 60 a minute, got ${perMinute}`);
-  const law = withMean(parameters.intervals[state], 60 / perMinute);
+  const before = parameters.intervals[state];
+  const law = withMean(before, (mean(before) * 60) / perMinute / meanInterval_s(parameters, state));
   return { ...parameters, intervals: { ...parameters.intervals, [state]: law } };
 }
 

@@ -1,12 +1,13 @@
 /** When the next blink comes and what it looks like, as in blink_engine/plan.py: same draws, in the same order. */
-import { draw, mean } from "./laws";
-import { type BlinkEvent, type Parameters, responseChance, type StateName } from "./parameters";
+import { draw, drawUnderWay } from "./laws";
+import { type BlinkEvent, drifted, meanInterval_s, type Parameters, responseChance, type StateName } from "./parameters";
 import { type BlinkShape, duration } from "./profile";
 import { RandomNumbers } from "./random-numbers";
 
 const INTERVALS = 1;
 const SHAPES = 2;
 const RESPONSES = 3;
+const DRIFTS = 4;
 const ANTICIPATED_MAX = 2;
 
 export interface Blink {
@@ -26,6 +27,9 @@ export class BlinkPlan {
   private readonly intervals: RandomNumbers;
   private readonly shapes: RandomNumbers;
   private readonly responses: RandomNumbers;
+  private readonly drifts: RandomNumbers;
+  private drift: number;
+  private slow: number;
   private lastOnset_s = -Infinity;
   private spontaneous_s: number;
   private answer_s = Infinity;
@@ -40,12 +44,15 @@ export class BlinkPlan {
     this.intervals = new RandomNumbers(seed, INTERVALS);
     this.shapes = new RandomNumbers(seed, SHAPES);
     this.responses = new RandomNumbers(seed, RESPONSES);
-    const interval = this.interval();
-    this.spontaneous_s = interval * this.intervals.uniform();
+    this.drifts = new RandomNumbers(seed, DRIFTS);
+    this.drift = this.underWay(parameters.drift.spread);
+    this.slow = this.underWay(parameters.slow_drift.spread);
+    const met = this.drifted(drawUnderWay(parameters.intervals[state], this.intervals));
+    this.spontaneous_s = met * this.intervals.uniform();
   }
 
   setState(state: StateName, time_s: number): void {
-    const ratio = mean(this.parameters.intervals[state]) / mean(this.parameters.intervals[this.state]);
+    const ratio = meanInterval_s(this.parameters, state) / meanInterval_s(this.parameters, this.state);
     this.spontaneous_s = time_s + Math.max(0, this.spontaneous_s - time_s) * ratio;
     this.state = state;
   }
@@ -90,7 +97,21 @@ export class BlinkPlan {
   }
 
   private interval(): number {
-    return Math.max(draw(this.parameters.intervals[this.state], this.intervals), this.parameters.least_interval_s);
+    return this.drifted(draw(this.parameters.intervals[this.state], this.intervals));
+  }
+
+  /** A drift at a random moment, which falls into long intervals. */
+  private underWay(spread: number): number {
+    return spread * spread + spread * this.drifts.normal();
+  }
+
+  /** Applies the drifts to an interval, and takes them to the next one. */
+  private drifted(drawn_s: number): number {
+    const { intervals, drift, slow_drift, least_interval_s } = this.parameters;
+    const interval_s = intervals[this.state].kind === "fixed" ? drawn_s : drawn_s * Math.exp(this.drift + this.slow);
+    this.drift = drifted(drift, this.drift, this.drifts.normal());
+    this.slow = drifted(slow_drift, this.slow, this.drifts.normal());
+    return Math.max(interval_s, least_interval_s);
   }
 
   private blink(onset_s: number, cause: string): Blink {

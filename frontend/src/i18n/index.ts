@@ -62,7 +62,7 @@ export function pick(text: Record<string, string>, language: string): string {
 }
 
 /** The language to start with: the browser's first that the study has, else the study's first. */
-export function preferred(offered: string[], wanted: readonly string[]): string {
-  const found = wanted.map((tag) => offered.find((one) => one === tag || one === tag.slice(0, 2))).find(Boolean);
-  return found ?? offered[0] ?? "en";
+export function preferred(offered: string[], acceptedLanguages: readonly string[]): string {
+  const match = acceptedLanguages.map((tag) => offered.find((one) => one === tag || one === tag.slice(0, 2))).find(Boolean);
+  return match ?? offered[0] ?? "en";
 }

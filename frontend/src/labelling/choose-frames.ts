@@ -2,21 +2,21 @@
 
 import type { Grey } from "./grey";
 
-export const FRAMES_WANTED = 20;
+export const FRAMES_TO_LABEL = 20;
 const MAX_CANDIDATES = 120;
 
 /** Frame numbers spread evenly over a video, first and last among them. */
 export function candidateFrames(frameCount: number, most = MAX_CANDIDATES): number[] {
   const count = Math.min(frameCount, most);
   if (count < 2) return frameCount > 0 ? [0] : [];
-  return Array.from({ length: count }, (_, place) => Math.round((place * (frameCount - 1)) / (count - 1)));
+  return Array.from({ length: count }, (_, index) => Math.round((index * (frameCount - 1)) / (count - 1)));
 }
 
 /** Sum of squared differences of two pictures of one size. */
 function difference(a: Grey, b: Grey): number {
   let sum = 0;
-  for (let place = 0; place < a.values.length; place += 1) {
-    sum += ((a.values[place] ?? 0) - (b.values[place] ?? 0)) ** 2;
+  for (let pixel = 0; pixel < a.values.length; pixel += 1) {
+    sum += ((a.values[pixel] ?? 0) - (b.values[pixel] ?? 0)) ** 2;
   }
   return sum;
 }
@@ -30,8 +30,8 @@ function difference(a: Grey, b: Grey): number {
 export function farthestPictures(pictures: readonly Grey[], count: number, taken: readonly number[] = []): number[] {
   const chosen = taken.length > 0 ? [...new Set(taken)] : pictures.length > 0 ? [0] : [];
   const nearest = pictures.map(() => Number.POSITIVE_INFINITY);
-  const approach = (place: number): void => {
-    const picture = pictures[place];
+  const approach = (pictureIndex: number): void => {
+    const picture = pictures[pictureIndex];
     if (picture === undefined) return;
     pictures.forEach((other, index) => {
       nearest[index] = Math.min(nearest[index] ?? 0, difference(picture, other));
@@ -41,9 +41,9 @@ export function farthestPictures(pictures: readonly Grey[], count: number, taken
   while (chosen.length < count) {
     const farthest = Math.max(...nearest);
     if (!(farthest > 0)) break;
-    const place = nearest.indexOf(farthest);
-    chosen.push(place);
-    approach(place);
+    const pictureIndex = nearest.indexOf(farthest);
+    chosen.push(pictureIndex);
+    approach(pictureIndex);
   }
   return chosen.sort((a, b) => a - b);
 }

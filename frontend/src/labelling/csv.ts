@@ -37,19 +37,19 @@ export function parseTable(name: string, text: string): Table {
   };
 }
 
-/** Place of a column; a TableProblem that lists the columns where it is not there. */
-export function columnPlace(table: Table, column: string): number {
-  const place = table.header.indexOf(column);
-  if (place >= 0) return place;
+/** Index of a column; a TableProblem that lists the columns where it is not there. */
+export function requiredColumn(table: Table, column: string): number {
+  const index = table.header.indexOf(column);
+  if (index >= 0) return index;
   throw new TableProblem(`${table.name}: expected a column '${column}', found ${table.header.join(", ")}`);
 }
 
 /** A whole number from 0 in a row (counted from 0); a TableProblem that names the row otherwise. */
-export function wholeAt(table: Table, row: number, place: number): number {
-  const text = table.rows[row]?.[place] ?? "";
+export function wholeAt(table: Table, row: number, index: number): number {
+  const text = table.rows[row]?.[index] ?? "";
   const value = Number(text);
   if (text !== "" && Number.isInteger(value) && value >= 0) return value;
-  throw new TableProblem(`${table.name} row ${row + 2}: ${table.header[place] ?? "value"} must be a whole number, got '${text}'`);
+  throw new TableProblem(`${table.name} row ${row + 2}: ${table.header[index] ?? "value"} must be a whole number, got '${text}'`);
 }
 
 /** A field as CSV writes it. */

@@ -8,13 +8,22 @@ export interface Grey {
 }
 
 /** Luminance (BT.601) of RGBA pixels. */
-export function greyOf(pixels: { width: number; height: number; data: Uint8ClampedArray }): Grey {
+function greyOf(pixels: { width: number; height: number; data: Uint8ClampedArray }): Grey {
   const values = new Uint8ClampedArray(pixels.width * pixels.height);
-  for (let place = 0; place < values.length; place += 1) {
-    const [red, green, blue] = [pixels.data[4 * place], pixels.data[4 * place + 1], pixels.data[4 * place + 2]];
-    values[place] = 0.299 * (red ?? 0) + 0.587 * (green ?? 0) + 0.114 * (blue ?? 0);
+  for (let pixel = 0; pixel < values.length; pixel += 1) {
+    const [red, green, blue] = [pixels.data[4 * pixel], pixels.data[4 * pixel + 1], pixels.data[4 * pixel + 2]];
+    values[pixel] = 0.299 * (red ?? 0) + 0.587 * (green ?? 0) + 0.114 * (blue ?? 0);
   }
   return { width: pixels.width, height: pixels.height, values };
+}
+
+/** Grey values of a whole canvas. */
+export function greyOfCanvas(canvas: HTMLCanvasElement | OffscreenCanvas): Grey {
+  const context: CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D | null = canvas.getContext("2d", {
+    willReadFrequently: true,
+  });
+  if (context === null) throw new Error("this browser gives no canvas to draw in");
+  return greyOf(context.getImageData(0, 0, canvas.width, canvas.height));
 }
 
 /** Luminance between pixels; the border's beyond it. */
@@ -32,8 +41,8 @@ export function sample({ width, height, values }: Grey, x: number, y: number): n
 /** Normalised cross-correlation of two samples of equal length: 1 alike up to light and contrast, 0 unrelated. */
 export function correlation(a: Float64Array, b: Float64Array): number {
   let [sumA, sumB, aa, bb, ab] = [0, 0, 0, 0, 0];
-  for (let place = 0; place < a.length; place += 1) {
-    const [u, v] = [a[place] ?? 0, b[place] ?? 0];
+  for (let pixel = 0; pixel < a.length; pixel += 1) {
+    const [u, v] = [a[pixel] ?? 0, b[pixel] ?? 0];
     sumA += u;
     sumB += v;
     aa += u * u;

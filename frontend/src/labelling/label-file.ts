@@ -52,35 +52,35 @@ export function parseLabels(name: string, text: string): LabelFile {
 }
 
 function objectOf(name: string, text: string): Record<string, unknown> {
-  let found: unknown;
+  let parsed: unknown;
   try {
-    found = JSON.parse(text);
+    parsed = JSON.parse(text);
   } catch (error) {
     throw new LabelProblem(`${name}: not a label file in JSON (${error instanceof Error ? error.message : String(error)})`);
   }
-  if (typeof found !== "object" || found === null || Array.isArray(found)) {
+  if (typeof parsed !== "object" || parsed === null || Array.isArray(parsed)) {
     throw new LabelProblem(`${name}: expected a JSON object with 'image_size_px' and 'frames'`);
   }
-  return Object.fromEntries(Object.entries(found));
+  return Object.fromEntries(Object.entries(parsed));
 }
 
-function sizeOf(name: string, found: unknown): Size {
-  const sides: unknown[] = Array.isArray(found) ? found : [];
+function sizeOf(name: string, sizeValue: unknown): Size {
+  const sides: unknown[] = Array.isArray(sizeValue) ? sizeValue : [];
   const [width, height] = sides;
   if (sides.length === 2 && isWhole(width) && isWhole(height) && width > 0 && height > 0) return [width, height];
-  throw new LabelProblem(`${name}: expected 'image_size_px': [width, height], found ${JSON.stringify(found)}`);
+  throw new LabelProblem(`${name}: expected 'image_size_px': [width, height], found ${JSON.stringify(sizeValue)}`);
 }
 
 function isWhole(value: unknown): value is number {
   return typeof value === "number" && Number.isInteger(value);
 }
 
-function framesOf(name: string, found: unknown): Map<number, Shape> {
-  if (typeof found !== "object" || found === null || Array.isArray(found)) {
+function framesOf(name: string, frameTable: unknown): Map<number, Shape> {
+  if (typeof frameTable !== "object" || frameTable === null || Array.isArray(frameTable)) {
     throw new LabelProblem(`${name}: expected 'frames': {frame number: points}`);
   }
   const frames = new Map<number, Shape>();
-  for (const [key, points] of Object.entries(found)) {
+  for (const [key, points] of Object.entries(frameTable)) {
     if (!/^\s*\d+\s*$/.test(key)) throw new LabelProblem(`${name}: expected a frame number from 0, found '${key}'`);
     const number = Number(key);
     if (frames.has(number)) {
@@ -91,17 +91,17 @@ function framesOf(name: string, found: unknown): Map<number, Shape> {
   return new Map([...frames].sort(([a], [b]) => a - b));
 }
 
-function shapeOf(where: string, found: unknown): Shape {
-  const points: unknown[] = Array.isArray(found) ? found : [];
+function shapeOf(where: string, pointList: unknown): Shape {
+  const points: unknown[] = Array.isArray(pointList) ? pointList : [];
   if (points.length !== EYE_POINTS && points.length !== 2 * EYE_POINTS) {
-    const count = Array.isArray(found) ? points.length : "no list of";
+    const count = Array.isArray(pointList) ? points.length : "no list of";
     throw new LabelProblem(`${where}: expected 18 points (or 9 for one eye), found ${count}`);
   }
-  return points.map((point, place): Point => {
+  return points.map((point, index): Point => {
     const pair: unknown[] = Array.isArray(point) ? point : [];
     const [x, y] = pair;
     if (pair.length === 2 && typeof x === "number" && typeof y === "number") return [x, y];
-    throw new LabelProblem(`${where}: point ${place + 1} is ${JSON.stringify(point)}, expected [x, y] in pixels`);
+    throw new LabelProblem(`${where}: point ${index + 1} is ${JSON.stringify(point)}, expected [x, y] in pixels`);
   });
 }
 
@@ -155,9 +155,9 @@ function checkEye(where: string, eye: Shape, first: number): void {
   }
   const flat = straightened(eye);
   const outline = [0, 1, 2, 3, 4, 5, 6, 7, 8, 0];
-  outline.slice(1).forEach((to, place) => {
-    const from = outline[place] ?? 0;
-    const step = (at(flat, to)[0] - at(flat, from)[0]) * (place < 5 ? 1 : -1);
+  outline.slice(1).forEach((to, index) => {
+    const from = outline[index] ?? 0;
+    const step = (at(flat, to)[0] - at(flat, from)[0]) * (index < 5 ? 1 : -1);
     if (step < -ORDER_TOLERANCE) {
       throw new LabelProblem(`${where}: points ${first + from + 1} and ${first + to + 1} cross; check the point order`);
     }

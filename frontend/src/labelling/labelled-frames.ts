@@ -1,6 +1,6 @@
 /** Labelled frames of one video: which to label, and whether labels fit the video. */
 
-import { farthestPictures, FRAMES_WANTED } from "./choose-frames";
+import { farthestPictures, FRAMES_TO_LABEL } from "./choose-frames";
 import type { Grey } from "./grey";
 import { checkShape, type LabelFile, LabelProblem } from "./label-file";
 import type { Shape } from "./points";
@@ -26,12 +26,12 @@ export function acceptedOf(frames: Frames): [number, Shape][] {
 export function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
   const taken = labelled.map((number) =>
     candidates.reduce(
-      (best, candidate, place) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best),
+      (best, candidate, index) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? index : best),
       0,
     ),
   );
-  const places = farthestPictures(pictures, FRAMES_WANTED, taken).filter((place) => !taken.includes(place));
-  const added = places.map((place) => candidates[place] ?? 0);
+  const indices = farthestPictures(pictures, FRAMES_TO_LABEL, taken).filter((index) => !taken.includes(index));
+  const added = indices.map((index) => candidates[index] ?? 0);
   return [...new Set([...labelled, ...added])].sort((a, b) => a - b);
 }
 

@@ -70,21 +70,32 @@ export function pointName(index: number, eyes: 1 | 2): string {
   return `${index < EYE_POINTS ? "left" : "right"} eye in the picture, ${name}`;
 }
 
+/** The point nearest to a position, no farther away than `reach`; null where none is. */
+export function nearestPoint(points: readonly Point[], [x, y]: Point, reach: number): number | null {
+  let nearest: number | null = null;
+  let least = reach;
+  points.forEach(([px, py], index) => {
+    const distance = Math.hypot(px - x, py - y);
+    if (distance <= least) [nearest, least] = [index, distance];
+  });
+  return nearest;
+}
+
 function inside([x, y]: Point, [width, height]: Size): Point {
   return [Math.min(width - 0.5, Math.max(-0.5, x)), Math.min(height - 0.5, Math.max(-0.5, y))];
 }
 
 /** A point moved to a place, held inside the picture. */
 export function withPoint(shape: Shape, index: number, to: Point, size: Size): Shape {
-  return shape.map((point, place) => (place === index ? inside(to, size) : point));
+  return shape.map((point, pointIndex) => (pointIndex === index ? inside(to, size) : point));
 }
 
 /** The whole eye of a point moved by as much as that point. */
 export function withEyeMoved(shape: Shape, index: number, to: Point, size: Size): Shape {
   const [x, y] = at(shape, index);
   const eye = Math.floor(index / EYE_POINTS);
-  return shape.map((point, place) =>
-    Math.floor(place / EYE_POINTS) === eye ? inside([point[0] + to[0] - x, point[1] + to[1] - y], size) : point,
+  return shape.map((point, pointIndex) =>
+    Math.floor(pointIndex / EYE_POINTS) === eye ? inside([point[0] + to[0] - x, point[1] + to[1] - y], size) : point,
   );
 }
 
@@ -98,8 +109,8 @@ export function withEyeStretched(shape: Shape, index: number, to: Point, size: S
   const norm = ax * ax + ay * ay;
   if (norm === 0 || bx * bx + by * by < 16) return shape;
   const [cosine, sine] = [(ax * bx + ay * by) / norm, (ax * by - ay * bx) / norm];
-  return shape.map((point, place) => {
-    if (place < first || place >= first + EYE_POINTS) return point;
+  return shape.map((point, pointIndex) => {
+    if (pointIndex < first || pointIndex >= first + EYE_POINTS) return point;
     const [x, y] = [point[0] - px, point[1] - py];
     return inside([px + cosine * x - sine * y, py + sine * x + cosine * y], size);
   });

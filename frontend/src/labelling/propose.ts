@@ -31,9 +31,9 @@ interface Match {
 
 function cut(picture: Grey, [x, y]: Point, { columns, rows, step }: Patch): Float64Array {
   const values = new Float64Array(columns * rows);
-  for (let place = 0; place < values.length; place += 1) {
-    const [column, row] = [place % columns, Math.floor(place / columns)];
-    values[place] = sample(picture, x + (column - (columns - 1) / 2) * step, y + (row - (rows - 1) / 2) * step);
+  for (let cell = 0; cell < values.length; cell += 1) {
+    const [column, row] = [cell % columns, Math.floor(cell / columns)];
+    values[cell] = sample(picture, x + (column - (columns - 1) / 2) * step, y + (row - (rows - 1) / 2) * step);
   }
   return values;
 }
@@ -46,10 +46,10 @@ const PLANE: Directions = [
   [0, 1],
 ];
 
-/** The place within `reach` steps of `from` that looks most like `wanted`. */
+/** The place within `reach` steps of `from` that looks most like `template`. */
 function search(
   picture: Grey,
-  wanted: Float64Array,
+  template: Float64Array,
   from: Point,
   patch: Patch,
   reach: number,
@@ -57,13 +57,13 @@ function search(
   [first, second]: Directions,
 ): Match {
   // Where nothing looks more like it, as in an even surface, it stays.
-  let best: Match = { dx: 0, dy: 0, likeness: correlation(wanted, cut(picture, from, patch)) };
+  let best: Match = { dx: 0, dy: 0, likeness: correlation(template, cut(picture, from, patch)) };
   const across = second === undefined ? 0 : reach;
   for (let row = -across; row <= across; row += 1) {
     for (let column = -reach; column <= reach; column += 1) {
       const dx = step * (column * first[0] + row * (second?.[0] ?? 0));
       const dy = step * (column * first[1] + row * (second?.[1] ?? 0));
-      const likeness = correlation(wanted, cut(picture, [from[0] + dx, from[1] + dy], patch));
+      const likeness = correlation(template, cut(picture, [from[0] + dx, from[1] + dy], patch));
       if (likeness > best.likeness) best = { dx, dy, likeness };
     }
   }
@@ -73,15 +73,15 @@ function search(
 /** Coarse to fine: steps of the patch, then half as much down to a fifth of a pixel. */
 function searchFinely(
   picture: Grey,
-  wanted: Float64Array,
+  template: Float64Array,
   from: Point,
   patch: Patch,
   reach: number,
   directions: Directions = PLANE,
 ): Match {
-  let best = search(picture, wanted, from, patch, reach, patch.step, directions);
+  let best = search(picture, template, from, patch, reach, patch.step, directions);
   for (let step = patch.step / 2; step > 0.2; step /= 2) {
-    const next = search(picture, wanted, [from[0] + best.dx, from[1] + best.dy], patch, 1, step, directions);
+    const next = search(picture, template, [from[0] + best.dx, from[1] + best.dy], patch, 1, step, directions);
     best = { dx: best.dx + next.dx, dy: best.dy + next.dy, likeness: next.likeness };
   }
   return best;
@@ -107,13 +107,13 @@ export function proposeShape(picture: Grey, labelled: readonly Labelled[]): Shap
 }
 
 function proposeEye(picture: Grey, labelled: readonly Labelled[], number: number): Shape {
-  const found = labelled.map((source) => {
+  const matches = labelled.map((source) => {
     const eye = eyeOf(source.shape, number);
     const patch = { columns: EYE_COLUMNS, rows: EYE_ROWS, step: (1.4 * eyeWidth(eye)) / EYE_COLUMNS };
     const centre = centreOf(eye);
     return { source, eye, match: searchFinely(picture, cut(source.picture, centre, patch), centre, patch, EYE_REACH) };
   });
-  const best = found.reduce((a, b) => (b.match.likeness > a.match.likeness ? b : a));
+  const best = matches.reduce((a, b) => (b.match.likeness > a.match.likeness ? b : a));
   const laid = best.eye.map(([x, y]): Point => [x + best.match.dx, y + best.match.dy]);
   return refined(picture, best.source.picture, best.eye, laid);
 }
@@ -125,8 +125,8 @@ function proposeEye(picture: Grey, labelled: readonly Labelled[], number: number
 function refined(picture: Grey, before: Grey, labelled: Shape, laid: Shape): Shape {
   const width = eyeWidth(labelled);
   const patch = { columns: POINT_SIDE, rows: POINT_SIDE, step: Math.max(1, 0.018 * width) };
-  const follow = (place: number, from: Point, directions: Directions): Point => {
-    const match = searchFinely(picture, cut(before, at(labelled, place), patch), from, patch, POINT_REACH, directions);
+  const follow = (pointIndex: number, from: Point, directions: Directions): Point => {
+    const match = searchFinely(picture, cut(before, at(labelled, pointIndex), patch), from, patch, POINT_REACH, directions);
     return match.likeness >= POINT_LEAST ? [match.dx, match.dy] : [0, 0];
   };
   const [first, last] = [at(laid, 0), at(laid, 5)];
@@ -137,11 +137,11 @@ function refined(picture: Grey, before: Grey, labelled: Shape, laid: Shape): Sha
     return [x + start[0] * (1 - share) + end[0] * share, y + start[1] * (1 - share) + end[1] * share];
   });
   const across: Point = [-along[1], along[0]];
-  const moves = carried.map((point, place) => (place % 5 === 0 ? ([0, 0] as const) : follow(place, point, [across])));
-  return carried.map(([x, y], place): Point => {
-    if (place % 5 === 0) return [x, y];
-    const [least, most] = place < 5 ? [1, 4] : [6, 8];
-    const around = [-1, 0, 1].map((side) => at(moves, Math.min(most, Math.max(least, place + side))));
+  const moves = carried.map((point, index) => (index % 5 === 0 ? ([0, 0] as const) : follow(index, point, [across])));
+  return carried.map(([x, y], index): Point => {
+    if (index % 5 === 0) return [x, y];
+    const [least, most] = index < 5 ? [1, 4] : [6, 8];
+    const around = [-1, 0, 1].map((side) => at(moves, Math.min(most, Math.max(least, index + side))));
     return [x + middle(around.map(([dx]) => dx)), y + middle(around.map(([, dy]) => dy))];
   });
 }

@@ -1,6 +1,6 @@
 /** Blinks as `stimuli blinks` writes them, and the review file that `stimuli blinks --review` reads. */
 
-import { columnPlace, csvField, parseTable, type Table, TableProblem, wholeAt } from "./csv";
+import { requiredColumn, csvField, parseTable, type Table, TableProblem, wholeAt } from "./csv";
 
 const MATCH_FRAMES = 10;
 const PAPER_FPS = 300;
@@ -50,35 +50,35 @@ export function decisionOn(decisions: Decisions, blink: Blink): Decision {
 /** Read a blinks table; its rate follows from frames and seconds. */
 export function parseBlinks(name: string, text: string): BlinkTable {
   const table = parseTable(name, text);
-  const places = Object.fromEntries(
+  const columns = Object.fromEntries(
     ["number", "column", "onset_frame", "minimum_frame", "end_frame", "end_s", "closure"].map((column) => [
       column,
-      columnPlace(table, column),
+      requiredColumn(table, column),
     ]),
   );
-  const place = (column: string): number => places[column] ?? 0;
+  const columnIndex = (column: string): number => columns[column] ?? 0;
   const [accepted, reason] = [table.header.indexOf("accepted"), table.header.indexOf("reason")];
   const decisions = new Map<string, Decision>();
   const blinks = table.rows.map((cells, row): Blink => {
-    const whole = (column: string): number => wholeAt(table, row, place(column));
+    const whole = (column: string): number => wholeAt(table, row, columnIndex(column));
     const [onset, minimum, end] = [whole("onset_frame"), whole("minimum_frame"), whole("end_frame")];
     if (!(onset < minimum && minimum < end)) {
       throw new TableProblem(`${name} row ${row + 2}: expected onset_frame < minimum_frame < end_frame`);
     }
     const blink: Blink = {
       number: whole("number"),
-      column: cells[place("column")] ?? "",
+      column: cells[columnIndex("column")] ?? "",
       onset,
       minimum,
       end,
-      closure: Number(cells[place("closure")]),
+      closure: Number(cells[columnIndex("closure")]),
     };
     if (cells[accepted]?.toLowerCase() === "false") {
       decisions.set(blinkKey(blink), { ...UNDECIDED, decision: "reject", reason: cells[reason] ?? "" });
     }
     return blink;
   });
-  return { blinks, decisions, fps: rateOf(table, blinks, place("end_s")) };
+  return { blinks, decisions, fps: rateOf(table, blinks, columnIndex("end_s")) };
 }
 
 function rateOf(table: Table, blinks: readonly Blink[], endSeconds: number): number {
@@ -91,11 +91,11 @@ function rateOf(table: Table, blinks: readonly Blink[], endSeconds: number): num
 /** Read a review file, with or without the columns of moved starts and ends. */
 export function parseReview(name: string, text: string): ReviewRow[] {
   const table = parseTable(name, text);
-  const [column, minimum] = [columnPlace(table, "column"), columnPlace(table, "minimum_frame")];
-  const [decision, reason] = [columnPlace(table, "decision"), columnPlace(table, "reason")];
+  const [column, minimum] = [requiredColumn(table, "column"), requiredColumn(table, "minimum_frame")];
+  const [decision, reason] = [requiredColumn(table, "decision"), requiredColumn(table, "reason")];
   const [onset, end] = [table.header.indexOf("onset_frame"), table.header.indexOf("end_frame")];
-  const moved = (row: number, place: number): number | null =>
-    place < 0 || (table.rows[row]?.[place] ?? "") === "" ? null : wholeAt(table, row, place);
+  const moved = (row: number, cell: number): number | null =>
+    cell < 0 || (table.rows[row]?.[cell] ?? "") === "" ? null : wholeAt(table, row, cell);
   return table.rows.map((cells, row) => {
     const word = cells[decision] ?? "";
     if (word !== "accept" && word !== "reject") {
@@ -170,10 +170,10 @@ export function withEdge(
   lastFrame: number,
 ): Decisions {
   const [least, most] = edgeLimits(blink, edge, blinks, decisions, lastFrame);
-  const place = Math.round(Math.min(most, Math.max(least, frame)));
+  const edgeFrame = Math.round(Math.min(most, Math.max(least, frame)));
   const before = decisionOn(decisions, blink);
-  if (edgesOf(blink, decisions)[edge] === place) return decisions;
-  return withDecision(decisions, blink, { ...before, [edge]: place === blink[edge] ? null : place });
+  if (edgesOf(blink, decisions)[edge] === edgeFrame) return decisions;
+  return withDecision(decisions, blink, { ...before, [edge]: edgeFrame === blink[edge] ? null : edgeFrame });
 }
 
 /** Decisions with one in place; a blink left as labelled without a word is no longer in them. */

@@ -1,9 +1,9 @@
 /** The shape a new frame begins with: the template, the nearest labelled frame's, or a proposal from all of them. */
 
-import type { Grey } from "./grey";
+import { type Grey, greyOfCanvas } from "./grey";
 import { type Shape, templateShape } from "./points";
 import { FRAMES_BEFORE_PROPOSALS, proposeShape } from "./propose";
-import { greyOfCanvas, type OpenedVideo } from "./video";
+import type { OpenedVideo } from "./video";
 
 const MAX_SOURCES = 24;
 

@@ -1,12 +1,12 @@
 /** A distance over time, and its line in a window of a figure. */
 
-import { columnPlace, type Table } from "./csv";
+import { requiredColumn, type Table } from "./csv";
 
 /** Values of one column, NaN where a cell is empty or no number. */
 export function traceOf(table: Table, column: string): Float64Array {
-  const place = columnPlace(table, column);
+  const index = requiredColumn(table, column);
   return Float64Array.from(table.rows, (row) => {
-    const text = row[place] ?? "";
+    const text = row[index] ?? "";
     return text === "" ? Number.NaN : Number(text);
   });
 }

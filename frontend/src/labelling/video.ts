@@ -1,7 +1,7 @@
 /** A video opened in the page, frame by frame: nothing of it leaves the browser. */
 
 import { BlobSource, CanvasSink, EncodedPacketSink, Input, MATROSKA, MP4, QTFF, WEBM } from "mediabunny";
-import { type Grey, greyOf } from "./grey";
+import { type Grey, greyOfCanvas } from "./grey";
 import type { Size } from "./points";
 
 const THUMBNAIL_PX = 64;
@@ -88,9 +88,9 @@ function within(times: readonly number[], number: number): number {
 }
 
 async function oneFrame(sink: CanvasSink, times: readonly number[], number: number): Promise<CanvasImageSource> {
-  const found = await sink.getCanvas(within(times, number));
-  if (found === null) throw new VideoProblem(`frame ${number} cannot be decoded; the file is damaged`);
-  return found.canvas;
+  const frame = await sink.getCanvas(within(times, number));
+  if (frame === null) throw new VideoProblem(`frame ${number} cannot be decoded; the file is damaged`);
+  return frame.canvas;
 }
 
 function copied(picture: CanvasImageSource, width: number, height: number): HTMLCanvasElement {
@@ -100,20 +100,11 @@ function copied(picture: CanvasImageSource, width: number, height: number): HTML
   return canvas;
 }
 
-/** Grey values of a whole canvas. */
-export function greyOfCanvas(canvas: HTMLCanvasElement | OffscreenCanvas): Grey {
-  const context: CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D | null = canvas.getContext("2d", {
-    willReadFrequently: true,
-  });
-  if (context === null) throw new VideoProblem("this browser gives no canvas to draw in");
-  return greyOf(context.getImageData(0, 0, canvas.width, canvas.height));
-}
-
 async function greyFrames(sink: CanvasSink, times: readonly number[], done: (count: number) => void): Promise<Grey[]> {
   const pictures: Grey[] = [];
-  for await (const found of sink.canvasesAtTimestamps(times)) {
-    if (found === null) throw new VideoProblem("a frame cannot be decoded; the file is damaged");
-    pictures.push(greyOfCanvas(found.canvas));
+  for await (const frame of sink.canvasesAtTimestamps(times)) {
+    if (frame === null) throw new VideoProblem("a frame cannot be decoded; the file is damaged");
+    pictures.push(greyOfCanvas(frame.canvas));
     done(pictures.length);
   }
   return pictures;

@@ -76,13 +76,13 @@ async function visit(entry: Entry): Promise<void> {
     return;
   }
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
-  const found = await abilities(store.durable);
-  const list = findings(found, link.gates);
-  if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], found);
+  const device = await abilities(store.durable);
+  const list = findings(device, link.gates);
+  if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], device);
   await passGates(root, t, list);
   const lack = returns ? null : lackOfRoom(link.gates, measures(link.gates));
   if (lack && !(await (await import("./flow/room-page")).waitForRoom(root, t, link)))
-    return turnedAway(entry, identity, returns, lack, found);
+    return turnedAway(entry, identity, returns, lack, device);
   const tab = await oneTab(root, t, link_token);
   if (tab === "left") return;
   if (tab === "first" && !(await goesOn(entry, identity))) {
@@ -117,7 +117,13 @@ function anotherPerson(keeping: KeptVisit, identity: Identity): void {
 /** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
 async function begun({ root, link_token }: Entry, identity: Identity, { language, has_code }: Beginning): Promise<RunStarted> {
   const t = translator(language);
-  const start = { language, query: recruiterQuery(location.search), device: { user_agent: navigator.userAgent }, evidence: true };
+  const start = {
+    language,
+    query: recruiterQuery(location.search),
+    device: { user_agent: navigator.userAgent },
+    evidence: true,
+    view_tickets: true,
+  };
   const claimed = (claim: Claim): Promise<RunStarted> => startRun(link_token, { ...start, client_id: identity.client_id(), ...claim });
   const kept = identity.code;
   const askForCode = async (why: MessageKey): Promise<RunStarted> =>
@@ -133,9 +139,9 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
 }
 
 /** A closed gate: explained; where the study screens devices, a visit that has not got further ends here with a way back. */
-async function turnedAway(entry: Entry, identity: Identity, returns: boolean, closed: GateFinding, found: Abilities): Promise<void> {
+async function turnedAway(entry: Entry, identity: Identity, returns: boolean, closed: GateFinding, device: Abilities): Promise<void> {
   const { root, t, link_token, link, language, kept } = entry;
-  const explain = (): void => showClosedGate(root, t, link_token, closed, found, wayBack(t, link));
+  const explain = (): void => showClosedGate(root, t, link_token, closed, device, wayBack(t, link));
   // A run begun in another browser is left to that one: starting it here would take it over.
   const elsewhere = returns && !identity.isKnown;
   if (!link.screens_devices || kept || elsewhere) {
@@ -148,13 +154,13 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
     explain();
     return;
   }
-  if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, found));
+  if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, device));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
   await (await import("./flow/ended")).ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
 }
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
-async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: RunStarted, found: GateFinding[]): Promise<void> {
+async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: RunStarted, warnings: GateFinding[]): Promise<void> {
   const { root, t, link, keeping, kept } = entry;
   const outbox = outboxOf(root, store, keeping);
   // Loaded before anything is sent where the kind is known: an answer that ends the run must find its listener.
@@ -186,7 +192,7 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
     },
     { once: true },
   );
-  for (const { reason } of found) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
+  for (const { reason } of warnings) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
   if (kept) session.events.add("offline", { loaded_without_server: true });
   if (run.resumable_until) serveOffline();
   await play(session, started, store.durable, () => {
@@ -266,8 +272,8 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
 
 /** Only previews and synthetic runs may answer themselves. */
 function simulation(run: RunState): SimulationMode | null {
-  const wanted = new URLSearchParams(location.search).get("simulate");
-  return (run.origin === "preview" || run.origin === "simulated") && (wanted === "visual" || wanted === "data-only") ? wanted : null;
+  const mode = new URLSearchParams(location.search).get("simulate");
+  return (run.origin === "preview" || run.origin === "simulated") && (mode === "visual" || mode === "data-only") ? mode : null;
 }
 
 function showProblem(root: HTMLElement, t: Translate, error: unknown): void {

@@ -34,7 +34,8 @@ export interface RequestOptions {
 }
 
 export async function request(method: string, path: string, options: RequestOptions = {}): Promise<Answer> {
-  const headers: Record<string, string> = { Accept: "application/json" };
+  // The server tells a page that does not say so where each clip is.
+  const headers: Record<string, string> = { Accept: "application/json;clips=hash" };
   if (options.token) headers["Authorization"] = `Bearer ${options.token}`;
   if (options.body !== undefined) headers["Content-Type"] = "application/json";
   const init: RequestInit = { method, headers, cache: "no-store", signal: AbortSignal.timeout(options.timeout_ms ?? 10_000) };
@@ -45,7 +46,7 @@ export async function request(method: string, path: string, options: RequestOpti
     const wait = Number(response.headers.get("Retry-After"));
     return { status: response.status, body: parsed(text), retry_after_s: wait > 0 ? wait : null };
   } catch (error) {
-    throw new NetworkError(`no answer from ${method} ${path}: ${String(error)}`);
+    throw new NetworkError(`${method} ${path}: ${String(error)}`);
   }
 }
 

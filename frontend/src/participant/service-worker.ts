@@ -30,7 +30,7 @@ const WAIT_MS = 8_000;
 async function keep(): Promise<void> {
   const page = await fetch(PAGE, { cache: "no-store" });
   const html = await page.clone().text();
-  const named = [...html.matchAll(/"(\/assets\/participant\/[^"]+)"/g)].map((found) => found[1] ?? "");
+  const named = [...html.matchAll(/"(\/assets\/participant\/[^"]+)"/g)].map((match) => match[1] ?? "");
   const hashed = named.filter((name) => !name.includes("?"));
   if (!page.ok || hashed.length === 0 || !hashed.every((name) => FILES.includes(name))) {
     throw new Error("the page and this worker are of different builds");

@@ -1,5 +1,5 @@
 /** One control for each number the engine draws by. */
-import { DEFAULT_PARAMETERS, type Parameters } from "../blink-engine";
+import { DEFAULT_PARAMETERS, type Parameters, STATE_NAMES } from "../blink-engine";
 
 export interface Control {
   /** Where the number stands in `Parameters`, such as `profile.closing_s.median`. */
@@ -18,15 +18,25 @@ interface Range {
 }
 
 const SHARE: Range = { min: 0, max: 1, step: 0.01 };
-const GROUPS: Readonly<Record<string, string>> = { intervals: "Time between blinks", responses: "Answers to events", profile: "One blink" };
+const GROUPS: Readonly<Record<string, string>> = {
+  intervals: "Time between blinks",
+  drift: "Time between blinks",
+  slow_drift: "Time between blinks",
+  responses: "Answers to events",
+  profile: "One blink",
+};
+/** Gamma shapes of intervals: 1 is a Poisson process, a great one a clock. */
+const SHAPE: Range = { min: 0.3, max: 30, step: 0.1 };
 /** By the last part of the path, or the last two where one is not enough. */
 const RANGES: Readonly<Record<string, Range>> = {
+  ...Object.fromEntries(STATE_NAMES.map((state) => [`${state}.spread`, SHAPE])),
   "closing_s.median": { min: 0.03, max: 0.5, step: 0.005 },
   "opening_s.median": { min: 0.05, max: 1, step: 0.005 },
   "closed_s.median": { min: 0, max: 0.5, step: 0.005 },
   "long_closed_s.median": { min: 0.1, max: 2, step: 0.01 },
   median: { min: 0.3, max: 60, step: 0.1 },
   spread: { min: 0, max: 2, step: 0.01 },
+  kept: { min: 0, max: 0.999, step: 0.001 },
   probability: SHARE,
   earliest_s: { min: 0, max: 2, step: 0.005 },
   latest_s: { min: 0, max: 2, step: 0.005 },
@@ -62,7 +72,12 @@ function controlOf(path: string): Control {
   const range = RANGES[parts.slice(-2).join(".")] ?? RANGES[parts.at(-1) ?? ""];
   if (range === undefined) throw new Error(`expected a range for ${path}; add one to RANGES`);
   const [first = "", ...rest] = parts;
-  const label = (rest.length > 0 ? rest : [first]).join(" ").replaceAll("_s", " (s)").replaceAll("_deg", " (°)").replaceAll("_", " ");
+  const named = first === "intervals" ? [...rest.slice(0, -1), range === SHAPE ? "shape" : "median_s"] : rest;
+  const label = (rest.length > 0 && !first.endsWith("drift") ? named : parts)
+    .join(" ")
+    .replaceAll("_s", " (s)")
+    .replaceAll("_deg", " (°)")
+    .replaceAll("_", " ");
   return { path, label, group: GROUPS[first] ?? "Lid and gaze", ...range };
 }
 

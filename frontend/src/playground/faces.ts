@@ -11,8 +11,8 @@ export interface Strips {
 /** Place of the ascending `steps` value that lies nearest. */
 export function nearest(steps: readonly number[], value: number): number {
   let best = 0;
-  steps.forEach((step, place) => {
-    if (Math.abs(step - value) < Math.abs((steps[best] ?? 0) - value)) best = place;
+  steps.forEach((step, index) => {
+    if (Math.abs(step - value) < Math.abs((steps[best] ?? 0) - value)) best = index;
   });
   return best;
 }

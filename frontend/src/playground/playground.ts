@@ -121,7 +121,11 @@ class Playground {
     box.append(element("summary", "", name));
     for (const control of CONTROLS.filter(({ group }) => group === name)) box.append(this.control(control));
     const source = Object.entries(SOURCES).filter(([key]) => CONTROLS.some(({ group, path }) => group === name && path.includes(key)));
-    if (source.length > 0) box.append(element("p", "playground-source", source.map(([key, text]) => `${key}: ${text}`).join(" · ")));
+    if (source.length > 0) {
+      const list = element("ul", "playground-source");
+      list.append(...source.map(([key, text]) => element("li", "", `${key.replaceAll("_", " ")}: ${text}`)));
+      box.append(list);
+    }
     return box;
   }
 

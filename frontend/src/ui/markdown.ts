@@ -57,13 +57,13 @@ const INLINE = /\*\*(.+?)\*\*|__(.+?)__|\*(.+?)\*|`(.+?)`|\[([^\]]+)\]\(([^)\s]+
 const SAFE_ADDRESS = /^(https?:\/\/|mailto:)/i;
 
 function inline(text: string): Child[] {
-  const found = INLINE.exec(text);
-  if (!found) return [text];
-  const [whole, bold, bold2, italic, code, label, address] = found;
+  const match = INLINE.exec(text);
+  if (!match) return [text];
+  const [whole, bold, bold2, italic, code, label, address] = match;
   return [
-    text.slice(0, found.index),
+    text.slice(0, match.index),
     inlineNode(whole, bold ?? bold2, italic, code, label, address),
-    ...inline(text.slice(found.index + whole.length)),
+    ...inline(text.slice(match.index + whole.length)),
   ];
 }
 

@@ -43,13 +43,13 @@ try {
   await page.waitForFunction(() => document.body.textContent.includes("That was the practice"));
   await press(".actions .primary");
   for (;;) {
-    const found = await see(".ready, .break, form, .code");
-    const name = await found.evaluate((element) => element.className || element.tagName);
+    const screen = await see(".ready, .break, form, .code");
+    const name = await screen.evaluate((element) => element.className || element.tagName);
     if (name.includes("code")) break;
     if (name.includes("ready")) await rate("6");
     else {
       await press(".primary:enabled");
-      await gone(found);
+      await gone(screen);
     }
   }
   const code = await page.$eval(".code output", (element) => element.textContent);

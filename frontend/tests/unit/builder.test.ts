@@ -51,13 +51,13 @@ describe("the declaration's schema", () => {
   });
 });
 
-/** Builds `wanted` as somebody would in the forms: one key after the other, each by the editor that it has. */
-function built(data: unknown, schema: Schema, path: Path, wanted: unknown): unknown {
+/** Builds `expected` as somebody would in the forms: one key after the other, each by the editor that it has. */
+function built(data: unknown, schema: Schema, path: Path, expected: unknown): unknown {
   const editor = editorOf(schema);
   const languages = ["en", "de"];
   switch (editor.kind) {
     case "table":
-      return Object.entries(wanted as Data).reduce(
+      return Object.entries(expected as Data).reduce(
         (made, [name, value]) => {
           const inner = editor.keys.find(([key]) => key === name)?.[1];
           if (inner === undefined) throw new Error(`no editor for ${[...path, name].join(".")}`);
@@ -66,43 +66,43 @@ function built(data: unknown, schema: Schema, path: Path, wanted: unknown): unkn
         isTable(valueAt(data, path)) ? data : withValue(data, path, {}),
       );
     case "variants": {
-      const named = (wanted as Data)[editor.tag];
+      const named = (expected as Data)[editor.tag];
       const tag = typeof named === "string" ? named : (Object.keys(editor.variants)[0] ?? "");
       const inner = editor.variants[tag] ?? {};
-      const others = withValue(wanted, [editor.tag], undefined);
+      const others = withValue(expected, [editor.tag], undefined);
       return built(withValue(data, path, starterOf(editor, tag, languages)), inner, path, others);
     }
     case "elements":
-      return (wanted as unknown[]).reduce<unknown>(
-        (made, element, place) => {
+      return (expected as unknown[]).reduce<unknown>(
+        (made, element, index) => {
           const added = withValue(made, path, [...listAt(made, path), starter(editor.of, languages)]);
-          return built(added, editor.of, [...path, place], element);
+          return built(added, editor.of, [...path, index], element);
         },
         withValue(data, path, []),
       );
     case "languages":
-      return Object.entries(wanted as Data).reduce((made, [language, value]) => built(made, editor.of, [...path, language], value), data);
+      return Object.entries(expected as Data).reduce((made, [language, value]) => built(made, editor.of, [...path, language], value), data);
     case "constant":
-      expect(wanted).toBe(schema.const);
+      expect(expected).toBe(schema.const);
       return data;
     case "flag":
-      expect(typeof wanted).toBe("boolean");
-      return withValue(data, path, wanted);
+      expect(typeof expected).toBe("boolean");
+      return withValue(data, path, expected);
     case "number":
-      expect(typeof wanted).toBe("number");
-      return withValue(data, path, wanted);
+      expect(typeof expected).toBe("number");
+      return withValue(data, path, expected);
     case "choice":
-      expect(editor.options).toContain(wanted);
-      return withValue(data, path, wanted);
+      expect(editor.options).toContain(expected);
+      return withValue(data, path, expected);
     case "text":
-      expect(typeof wanted).toBe("string");
-      return withValue(data, path, wanted);
+      expect(typeof expected).toBe("string");
+      return withValue(data, path, expected);
     case "translated":
-      return Object.entries(wanted as Data).reduce((made, [language, text]) => withValue(made, [...path, language], text), data);
+      return Object.entries(expected as Data).reduce((made, [language, text]) => withValue(made, [...path, language], text), data);
     case "words":
     case "lists":
-      expect(Array.isArray(wanted)).toBe(true);
-      return withValue(data, path, wanted);
+      expect(Array.isArray(expected)).toBe(true);
+      return withValue(data, path, expected);
     default:
       throw new Error(`no editor can set ${path.join(".")}`);
   }
@@ -147,7 +147,7 @@ describe("data under edit", () => {
 
   it("are undone and done again; a word is one step", () => {
     let history = begun({ title: "a" }, "title = 'a'");
-    for (const [place, text] of ["ab", "abc"].entries()) history = edited(history, ["title"], text, 1_000 + place);
+    for (const [index, text] of ["ab", "abc"].entries()) history = edited(history, ["title"], text, 1_000 + index);
     history = edited(history, ["name"], "x", 9_000);
     history = undone(history);
     expect(history.now.data).toEqual({ title: "abc" });

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import type { LinkState, RunStarted, RunState, TrialInfo } from "../../src/api/schema";
+import type { LinkState, RunStarted, RunState } from "../../src/api/schema";
+import { aTrial } from "./a-trial";
 import { applyWrite, type Kept, KeptVisit } from "../../src/participant/flow/kept-visit";
 import { owed } from "../../src/participant/flow/replays";
 
@@ -12,34 +13,12 @@ class FakeStorage {
   removeItem = (key: string): void => void this.items.delete(key);
 }
 
-const trial = (trial_index: number): TrialInfo => ({
-  trial_index,
-  kind: "main",
-  block: 1,
-  clip_sha256: "ab",
-  clip_url: "/c",
-  frames: 45,
-  fps: 30,
-  bytes: 1,
-  width_px: 800,
-  height_px: 300,
-  width_mm: 130,
-  inter_ocular_px: 400,
-  clips: [],
-  prompt: null,
-  plays_done: 0,
-  plays_wanted: 1,
-  answered: false,
-  views_begun: 0,
-  views: [],
-});
-
 function visit(resumable_until: string | null = "2026-11-21T13:00:00Z"): Kept {
   const run = {
     status: "active",
     consented_at: null,
     answered_forms: [] as string[],
-    trials: [trial(0), trial(1)],
+    trials: [aTrial(), aTrial({ trial_index: 1 })],
     elapsed_ms_before: 5,
     server_time: "2026-11-21T11:59:00Z",
     resumable_until,

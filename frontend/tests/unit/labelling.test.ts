@@ -3,7 +3,7 @@ import { candidateFrames, farthestPictures } from "../../src/labelling/choose-fr
 import type { Grey } from "../../src/labelling/grey";
 import { begun, changed, redone, undone } from "../../src/labelling/history";
 import { checkShape, labelsText, parseLabels } from "../../src/labelling/label-file";
-import { at, type Point, type Shape, templateShape, withEyeStretched, withPoint } from "../../src/labelling/points";
+import { at, nearestPoint, type Point, type Shape, templateShape, withEyeStretched, withPoint } from "../../src/labelling/points";
 import { proposeShape } from "../../src/labelling/propose";
 import {
   decide,
@@ -34,6 +34,18 @@ describe("frames to label", () => {
     expect(farthestPictures(pictures, 3)).toEqual([0, 3, 4]);
     expect(farthestPictures(pictures, 3, [2])).toEqual([0, 2, 4]);
     expect(farthestPictures(pictures, 20)).toHaveLength(5);
+  });
+});
+
+describe("points under the pointer", () => {
+  it("are the nearest ones, each at its own centre, however small the eyes are shown", () => {
+    const shape = templateShape(2, [640, 480]).map(([x, y]): Point => [0.2 * x, 0.2 * y]);
+    expect(shape.map((point) => nearestPoint(shape, point, 11))).toEqual(shape.map((_, index) => index));
+  });
+  it("are none farther away than the reach", () => {
+    expect(nearestPoint([[0, 0]], [8, 8], 11)).toBeNull();
+    expect(nearestPoint([[0, 0]], [8, 7], 11)).toBe(0);
+    expect(nearestPoint([], [0, 0], 11)).toBeNull();
   });
 });
 
@@ -98,12 +110,12 @@ function paintedEye(dx: number, dy: number, open: number): { picture: Grey; shap
   const [width, height] = [200, 120];
   const gap = (u: number): number => open * 18 * (1 - (u / 40) ** 2);
   const values = new Uint8ClampedArray(width * height);
-  for (let place = 0; place < values.length; place += 1) {
-    const [u, v] = [(place % width) - 100 - dx, Math.floor(place / width) - 60 - dy];
+  for (let pixel = 0; pixel < values.length; pixel += 1) {
+    const [u, v] = [(pixel % width) - 100 - dx, Math.floor(pixel / width) - 60 - dy];
     const skin = 160 + 14 * Math.sin(u / 6) + 12 * Math.cos(v / 5 + u / 11);
     const eyeball = u * u + v * v < 150 ? 50 : 225;
     const depth = Math.abs(u) < 40 ? gap(u) - Math.abs(v) : -1;
-    values[place] = depth > 0 ? eyeball : Math.abs(depth) < 2 && Math.abs(u) < 42 ? 90 : skin;
+    values[pixel] = depth > 0 ? eyeball : Math.abs(depth) < 2 && Math.abs(u) < 42 ? 90 : skin;
   }
   const point = (u: number, side: number): Point => [100 + dx + u, 60 + dy + side * gap(u)];
   const shape = [...[-40, -24, -8, 8, 24, 40].map((u) => point(u, -1)), ...[20, 0, -20].map((u) => point(u, 1))];

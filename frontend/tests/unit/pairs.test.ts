@@ -16,7 +16,7 @@ describe("layout of a pair", () => {
     const layout = layoutOf(BESIDE, PIXELS, SHOWN, { width: 1440, height: 900 }, 4);
     expect(layout?.canvas).toEqual({ width: 2 * 960 + 80, height: 360 });
     expect(layout?.shown).toEqual({ width: 1000, height: 180 });
-    expect(layout?.places.map(({ x, y, width, height }) => [x, y, width, height])).toEqual([
+    expect(layout?.boxes.map(({ x, y, width, height }) => [x, y, width, height])).toEqual([
       [0, 0, 960, 360],
       [1040, 0, 960, 360],
     ]);
@@ -33,7 +33,7 @@ describe("layout of a pair", () => {
 
   it("has one place for two clips in turn", () => {
     const layout = layoutOf({ arrangement: "one_after_the_other", gap_ms: 300 }, PIXELS, SHOWN, SHOWN, null);
-    expect(layout?.places[0]).toEqual(layout?.places[1]);
+    expect(layout?.boxes[0]).toEqual(layout?.boxes[1]);
     expect(layout?.canvas).toEqual(PIXELS);
   });
 });
@@ -86,7 +86,7 @@ describe("one clock for two clips", () => {
 });
 
 describe("what is sent of a pair", () => {
-  const clip = { clip_url: "/c", fps: 30, width_px: 10, height_px: 5, width_mm: null, inter_ocular_px: null };
+  const clip = { fps: 30 };
   const trial = {
     clips: [
       { ...clip, role: "left", clip_sha256: "aa", frames: 3 },

@@ -40,7 +40,7 @@ describe("the uniform timer", () => {
     const closures = Array.from({ length: 3000 }, (_, frame) => timer.closure(frame / 100));
     const onsets = closures.flatMap((value, frame) => (value > 0 && (closures[frame - 1] ?? 0) === 0 ? [frame] : []));
     expect(onsets.length).toBeGreaterThan(5);
-    onsets.slice(1).forEach((onset, place) => expect(onset - (onsets[place] ?? 0)).toBeCloseTo(400, -1));
+    onsets.slice(1).forEach((onset, index) => expect(onset - (onsets[index] ?? 0)).toBeCloseTo(400, -1));
     expect(Math.max(...closures)).toBe(1);
   });
 });

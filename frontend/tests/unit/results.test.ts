@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { cellLabels } from "../../src/admin/results/plots";
-import { seriesLabels } from "../../src/admin/results/threshold-plots";
+import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
 
 const factor = (name: string, ...levels: [string, string][]) => ({
   name,
@@ -34,5 +34,24 @@ describe("labels of series", () => {
     const every = [series("s1", { character: "a" }), series("s2", { character: "b" }), series("again", { character: "b" })];
     expect([...seriesLabels(every, FACTORS).values()]).toEqual(["Anna", "Bert (s2)", "Bert (again)"]);
     expect([...seriesLabels([series("only", {})], FACTORS).values()]).toEqual(["only"]);
+  });
+});
+
+describe("the figure of a series", () => {
+  const stimuli = [
+    { value: 100, second: 0, n: 4, positive: 1 },
+    { value: 100, second: 1, n: 2, positive: 2 },
+  ];
+  const series = { stimuli, mean: 110, thresholds: [100, 120] } as unknown as Parameters<typeof seriesPlot>[0];
+
+  it("over two factors shows stimuli by both numbers, and the share by colour", () => {
+    const plot = seriesPlot(series, { title: "Speed", second: { title: "Shape", middle: 0.5 } }, "yes");
+    expect([plot.x?.label, plot.y?.label, plot.color?.label]).toEqual(["Speed", "Shape", "yes"]);
+    expect(plot.y?.ticks).toEqual([0, 1]);
+  });
+
+  it("over one shows the share above the stimulus", () => {
+    const plot = seriesPlot(series, { title: "Speed", second: null }, "yes");
+    expect([plot.x?.label, plot.y?.label]).toEqual(["Speed", "yes"]);
   });
 });

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import type { Gates, TrialInfo } from "../../src/api/schema";
+import type { Gates } from "../../src/api/schema";
+import { aTrial } from "./a-trial";
 import { luminance } from "../../src/participant/flow/appearance";
 import { findings, lackOfRoom, type Abilities, type Measures } from "../../src/participant/flow/gates";
 import { owed, Replays } from "../../src/participant/flow/replays";
@@ -9,39 +10,16 @@ import { deviation, randomStart, settled, spreadPercent } from "../../src/partic
 import { distanceFrom } from "../../src/participant/calibration/distance";
 import { keyFor, valueOf } from "../../src/participant/trials/shared/scale-keys";
 
-const trial = (rest: Partial<TrialInfo> = {}): TrialInfo => ({
-  trial_index: 0,
-  kind: "main",
-  block: 1,
-  clip_sha256: "ab",
-  clip_url: "/c",
-  frames: 45,
-  fps: 30,
-  bytes: 1,
-  width_px: 800,
-  height_px: 300,
-  width_mm: 130,
-  inter_ocular_px: 400,
-  clips: [],
-  prompt: null,
-  plays_done: 0,
-  plays_wanted: 1,
-  answered: false,
-  views_begun: 0,
-  views: [],
-  ...rest,
-});
-
 describe("actual size", () => {
   it("shows the inter-ocular distance as declared", () => {
-    const width = clipWidth(trial(), 60, 4);
+    const width = clipWidth(aTrial(), 60, 4);
     expect((width / 800) * 400).toBeCloseTo(60 * 4);
-    expect(clipHeight(trial(), width)).toBeCloseTo((width * 300) / 800);
+    expect(clipHeight(aTrial(), width)).toBeCloseTo((width * 300) / 800);
   });
   it("falls back to the clip's width in mm, then to its own pixels", () => {
-    expect(clipWidth(trial({ inter_ocular_px: null }), 60, 4)).toBe(520);
-    expect(clipWidth(trial({ inter_ocular_px: null, width_mm: null }), 60, 4)).toBe(800);
-    expect(clipWidth(trial(), 60, null)).toBe(800);
+    expect(clipWidth(aTrial({ inter_ocular_px: null }), 60, 4)).toBe(520);
+    expect(clipWidth(aTrial({ inter_ocular_px: null, width_mm: null }), 60, 4)).toBe(800);
+    expect(clipWidth(aTrial(), 60, null)).toBe(800);
   });
 
   const before: ScreenShape = { device_pixel_ratio: 1, screen_width_px: 1_920, screen_height_px: 1_080 };
@@ -111,15 +89,15 @@ describe("gates", () => {
 describe("repetitions", () => {
   it("come once each, at the end of their block or of a later one", () => {
     const replays = new Replays();
-    replays.add(trial({ trial_index: 4, block: 2 }), 2);
-    replays.add(trial({ trial_index: 4, block: 2 }), 2);
+    replays.add(aTrial({ trial_index: 4, block: 2 }), 2);
+    replays.add(aTrial({ trial_index: 4, block: 2 }), 2);
     expect(replays.peek(1)).toBeNull();
     expect(replays.peek(3)?.trial.trial_index).toBe(4);
     replays.shift(3);
     expect(replays.peek(3)).toBeNull();
   });
   it("are owed where an earlier visit stopped before them", () => {
-    expect(owed([trial(), trial({ plays_done: 1, plays_wanted: 2 }), trial({ plays_done: 1 })])).toMatchObject([{ play: 2 }]);
+    expect(owed([aTrial(), aTrial({ plays_done: 1, plays_wanted: 2 }), aTrial({ plays_done: 1 })])).toMatchObject([{ play: 2 }]);
   });
 });
 

@@ -6,7 +6,7 @@ import { behind } from "../../src/participant/trials/threshold/await-choice";
 import { applyNext, begin } from "../../src/participant/trials/shared/next-trials";
 
 function trial(trial_index: number, known: number, clip = "a"): TrialInfo {
-  const clips = [{ role: "shown", clip_sha256: clip, clip_url: `/clips/${clip}.mp4` }];
+  const clips = [{ role: "shown", clip_sha256: clip }];
   const series = { number: 0, position: trial_index + 1, known };
   return {
     trial_index,

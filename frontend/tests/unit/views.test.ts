@@ -1,13 +1,13 @@
-import { describe, expect, it } from "vitest";
+import { describe, expect, it, vi } from "vitest";
 import type { TrialInfo, ViewIn } from "../../src/api/schema";
 import { Outbox } from "../../src/participant/outbox/outbox";
 import { MemoryStore, type OutboxItem, type OutboxStore } from "../../src/participant/outbox/store";
 import type { Session } from "../../src/participant/session";
 import type { Shown } from "../../src/participant/trials/shared/showing";
-import { refreshDropped, visibleShare } from "../../src/participant/views/disturbances";
+import { layout, refreshDropped, visibleShare, watchDisturbances } from "../../src/participant/views/disturbances";
 import { applyViews, beginView, isFromBefore, settleInterrupted, viewsBefore } from "../../src/participant/views/ledger";
 
-Object.assign(globalThis, { window: { innerWidth: 1280, innerHeight: 800, devicePixelRatio: 1 } });
+Object.assign(globalThis, { window: { innerWidth: 1280, innerHeight: 800, devicePixelRatio: 1 }, screen: { width: 1920, height: 1080 } });
 
 /** A browser that keeps things, on a disk whose end the test decides. */
 class Disk extends MemoryStore implements OutboxStore {
@@ -82,6 +82,15 @@ describe("the view ledger", () => {
     disk.go();
     await view.kept;
     expect(await kept()).toMatchObject([{ trial_index: 3, number: 1, play: 1 }]);
+  });
+
+  it("carries the ticket of its play, and none where the run has none", async () => {
+    const { session, kept } = await offline();
+    Object.assign(session.run, { tickets: { batch: "b", by_trial: [[], [], [], ["first", "second"]] } });
+    await beginView(session, trialOf(), 2).kept;
+    Object.assign(session.run, { tickets: null });
+    await beginView(session, trialOf(), 2).kept;
+    expect((await kept()).map(({ evidence }) => evidence)).toEqual([{ batch: "b", ticket: "second" }, null]);
   });
 
   it("counts every view of a trial on, whatever its play", async () => {
@@ -159,6 +168,31 @@ describe("disturbances", () => {
     expect(visibleShare(box, 200, 800)).toBe(0.5);
     expect(visibleShare(box, 200, 150)).toBe(0.25);
     expect(visibleShare(box, 50, 50)).toBe(0);
+  });
+
+  it("counts one leaving of full screen once, however many clips come after it", () => {
+    const page = Object.assign(new EventTarget(), { fullscreenElement: {}, hidden: false, hasFocus: () => true });
+    vi.stubGlobal("document", page);
+    vi.stubGlobal("window", Object.assign(new EventTarget(), { innerWidth: 1280, innerHeight: 800, devicePixelRatio: 1 }));
+    const clip = { getBoundingClientRect: () => ({ ...box, width: 200, height: 100 }) } as HTMLElement;
+    const before = layout();
+    Reflect.set(page, "fullscreenElement", null);
+    expect(watchDisturbances(clip, before).stop().counts).toEqual({ full_screen_left: 1 });
+    expect(watchDisturbances(clip, before).stop().counts).toEqual({});
+    vi.unstubAllGlobals();
+  });
+
+  it.each([
+    ["another screen", { width: 2560, height: 1440 }, { zoomed: 1 }],
+    ["a tablet turned", { width: 1080, height: 1920 }, {}],
+  ])("counts %s between the layout and the clip as its rule says", (_what, now, counts) => {
+    vi.stubGlobal("document", Object.assign(new EventTarget(), { fullscreenElement: null, hidden: false, hasFocus: () => true }));
+    vi.stubGlobal("window", Object.assign(new EventTarget(), { innerWidth: 1280, innerHeight: 800, devicePixelRatio: 1 }));
+    const clip = { getBoundingClientRect: () => ({ ...box, width: 200, height: 100 }) } as HTMLElement;
+    const before = layout();
+    vi.stubGlobal("screen", now);
+    expect(watchDisturbances(clip, before).stop().counts).toEqual(counts);
+    vi.unstubAllGlobals();
   });
 
   it("tells another refresh rate from a hiccup", () => {

@@ -18,11 +18,11 @@ Summarise = Callable[[Session, Study, StudyVersion, Pool], AnyResults]
 
 def summary_of(kind: str) -> Summarise:
     """How the answers to trials of this kind are summed up."""
-    place = f"server.results.kinds.{kind}"
+    module = f"server.results.kinds.{kind}"
     try:
-        summarise: Summarise = import_module(place).summarise
+        summarise: Summarise = import_module(module).summarise
     except ModuleNotFoundError as error:
-        if error.name != place:
+        if error.name != module:
             raise
         from server.results.kinds.unknown import summarise
     return summarise

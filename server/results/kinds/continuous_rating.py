@@ -6,12 +6,11 @@ from sqlalchemy.orm import Session
 
 from experiments import design
 from experiments.trials.continuous_rating.declaration import continuous_rating_of
-from server.clock import now
 from server.models import Study, StudyVersion
 from server.results.mean_traces import Trace, cell_trace
 from server.results.repository import Pool, blinks_of_cells, traces_of
 from server.results.schemas import TraceCell, TraceResults
-from server.results.service import playback_of, time_bins
+from server.results.service import common
 from server.studies.lookup import definition_of
 from server.tallies.pools import pooled
 
@@ -22,17 +21,11 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     declared, tally = continuous_rating_of(definition), pooled(session, of.runs(), "", ())
     order = ["/".join(level for _, level in cell) for cell in design.cells(definition)]
     return TraceResults(
-        study=study.name,
-        origin=of.origin,
-        series=version.series,
-        counted_at=now(),
-        participants=len(tally.means),
+        **common(study, version, of, tally),
         ratings=tally.answers.total(),
         minimum=declared.minimum,
         maximum=declared.maximum,
         cells=trace_cells(order, traces_of(session, of), blinks_of_cells(session, of)),
-        response_times=time_bins(tally),
-        playback=playback_of(tally),
     )
 
 

@@ -10,11 +10,10 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.definition import Experiment
 from experiments.trials.paired_comparison.answer import CODES
-from server.clock import now
 from server.models import Study, StudyVersion
 from server.results.repository import Pool, cells_of
 from server.results.schemas import LevelChoices, PairChoices, PairResults
-from server.results.service import playback_of, time_bins
+from server.results.service import common
 from server.studies.lookup import definition_of
 from server.tallies.pools import PooledTally, pooled
 
@@ -45,19 +44,13 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     for (_, _, code), times in outcomes.items():
         sides[code] += times
     return PairResults(
-        study=study.name,
-        origin=of.origin,
-        series=version.series,
-        counted_at=now(),
-        participants=len(tally.means),
+        **common(study, version, of, tally),
         ratings=outcomes.total(),
         pairs=pair_choices(definition, outcomes),
         levels=level_choices(definition, outcomes),
         left=sides[CODES["left"]],
         right=sides[CODES["right"]],
         ties=sides[CODES["tie"]],
-        response_times=time_bins(tally),
-        playback=playback_of(tally),
     )
 
 
@@ -97,10 +90,10 @@ def _between(outcomes: Mapping[tuple[str, str, int], int]) -> dict[tuple[str, st
 def level_choices(definition: Experiment, outcomes: Outcomes) -> list[LevelChoices]:
     """How often each level was chosen where it stood against another level of its factor, ties as half."""
     rows = []
-    for place, factor in enumerate(definition.factors):
+    for index, factor in enumerate(definition.factors):
         by_level = Outcomes()
         for (left, right, code), times in outcomes.items():
-            one, other = left.split("/")[place], right.split("/")[place]
+            one, other = left.split("/")[index], right.split("/")[index]
             if one != other:
                 by_level[one, other, code] += times
         for level in factor.levels:

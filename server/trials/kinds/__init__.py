@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args
 from experiments.definition import Experiment
 from experiments.trials.kind import Answer
 from server.errors import Invalid
-from server.tallies.tally import Counted, Place
+from server.tallies.tally import Counted, NumberedClip
 from server.trials.schemas import RatingIn
 from server.trials.verdict import Ruling
 
@@ -46,19 +46,23 @@ class Served:
 
     Attributes
     ----------
-    validate: refuses (by an `Invalid`) an answer that the declaration does not allow in this part.
-    judge: the verdict on the views of the clips with these ids by role (none for an attention check), by
-        the declared playback rules.
-    simulated: the answer of a simulated person to a trial as the page gets it, with the declaration as the
-        page gets it.
-    counted: what Results counts of a stored answer to a main trial, given the places of its clips by role;
-        empty where there is no answer.
+    validate : callable
+        Refuses (by an `Invalid`) an answer that the declaration does not allow in this part.
+    judge : callable
+        The verdict on the views of the clips with these ids by role (none for an attention check), by the
+        declared playback rules.
+    simulated : callable
+        The answer of a simulated person to a trial as the page gets it, with the declaration as the page gets
+        it.
+    counted : callable
+        What Results counts of a stored answer to a main trial, given the numbers of its clips by role; empty
+        where there is no answer.
     """
 
     validate: Callable[[Experiment, Part, RatingIn], None]
     judge: "Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]"
     simulated: Callable[[Preference, Mapping[str, Any], Mapping[str, Any], random.Random], dict[str, Any]]
-    counted: Callable[[Mapping[str, Place], Mapping[str, Any]], Iterable[Counted]]
+    counted: Callable[[Mapping[str, NumberedClip], Mapping[str, Any]], Iterable[Counted]]
 
 
 class AnswerOfOtherKind(Invalid):

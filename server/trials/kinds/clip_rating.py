@@ -11,10 +11,11 @@ from experiments.trials.clip_rating.page import ShownClipRating
 from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.scales import RatedScale, scales_of
 from server.errors import Invalid
-from server.tallies.tally import Counted, Place
+from server.tallies.tally import Counted, NumberedClip
 from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
-from server.trials.schemas import PlaybackLog, RatingIn
-from server.trials.verdict import Playback, Ruling, frames_in_log
+from server.trials.schemas import RatingIn
+from server.trials.several_clips import judge_several, playback_of
+from server.trials.verdict import Ruling
 from server.trials.verdict import judge as judge_play
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 TRIAL_SD = 1.0
 """Spread of single answers of simulated people, in points of a seven-point scale."""
+UNIMPAIRED = 3.0
+"""Where the upper end of a scale lies, in points of a seven-point scale from its middle."""
 NOT_APPLICABLE_SHARE = 0.05
 """Share of answers of simulated people that a scale does not apply, where it has that answer."""
 
@@ -45,9 +48,17 @@ class NoSuchScale(Invalid):
     code = "no_such_scale"
 
 
+class NoReference(Invalid):
+    """The study declares no reference before its clips."""
+
+    code = "no_reference"
+
+
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
     """Refuse other scales than those declared, a rating that is off its scale, and some but not all."""
     answer = answer_of(rating, RatingAnswer)
+    if answer.reference_gap_ms is not None and clip_rating_of(experiment).reference is None:
+        raise NoReference("Expected no reference_gap_ms, since this study shows no reference; got one.")
     asked = {scale.name: scale for scale in _asked(experiment, part)}
     for name in answer.answers:
         if name not in asked:
@@ -80,45 +91,33 @@ def _check(scale: RatedScale, given: ScaleAnswer) -> None:
 
 
 def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
-    """The verdict on one play over all its views, and the rule that gave it."""
+    """The verdict on one play over all its views, or on a reference and the clip after it."""
     rules, rated = loaded.experiment.playback, rating.answer.given
     if not clips:
         return judge_play(rules, playback_of(rating.playback), None, 0, 0.0, rated=rated)
+    if "reference" in clips:
+        assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
+        return judge_several(rules, assigned, sum(clip.frames for clip in assigned.values()), rating)
     clip = loaded.clips[clips["shown"]]
     frames = clip.frames * clip_rating_of(loaded.experiment).views
     return judge_play(rules, playback_of(rating.playback), clip.sha256, frames, clip.fps, rated=rated)
-
-
-def playback_of(log: PlaybackLog) -> Playback:
-    """What a log says of one play."""
-    seen = frames_in_log(index for index, _ in log.drawn) if log.drawn is not None else None
-    return Playback(
-        method=log.method,
-        clip_sha256=log.clip_sha256,
-        frames_drawn=log.frames_drawn,
-        frames_late=log.frames_late,
-        frames_missing=log.frames_missing,
-        longest_gap_ms=log.longest_gap_ms,
-        focus_lost=bool(log.focus_lost),
-        frames_seen=seen,
-        refresh_rate_hz=log.refresh_rate_hz,
-        clock_gap_ms=log.clock_gap_ms,
-        clock_late_ms=log.clock_late_ms,
-        disturbances=log.disturbances or {},
-    )
 
 
 def simulated(
     preference: Preference, trial: Mapping[str, Any], declared: Mapping[str, Any], rng: random.Random
 ) -> dict[str, Any]:
     """The answers of a simulated person: on each scale the liking around its middle, now and then that it
-    does not apply where it may.
+    does not apply where it may. After a reference it is the impairment: the best answer, and the lower the
+    further the two likings lie apart.
     """
     told = ShownClipRating.model_validate(declared)
     if not trial["clips"]:
         return _answers({told.check_scale.name: {"response": asked_in(trial["prompt"])}})
     liking = preference(trial["clips"][0]["clip_sha256"])
-    return _answers({scale.name: _answered(scale.rated(""), liking, rng) for scale in told.scales})
+    if told.reference:
+        liking = UNIMPAIRED - abs(liking - preference(trial["clips"][1]["clip_sha256"]))
+    given = _answers({scale.name: _answered(scale.rated(""), liking, rng) for scale in told.scales})
+    return given | ({"reference_gap_ms": told.reference.gap_ms} if told.reference else {})
 
 
 def _answered(scale: RatedScale, liking: float, rng: random.Random) -> dict[str, Any]:
@@ -133,9 +132,9 @@ def _answers(answers: dict[str, Any]) -> dict[str, Any]:
     return {"kind": "clip_rating", "answers": answers}
 
 
-def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
     """Each number by its scale; it has a mean by cell. "Not applicable" is none."""
-    answers, shown = payload.get("answers", {SCALE_NAME: payload}), places["shown"]
+    answers, shown = payload.get("answers", {SCALE_NAME: payload}), clips["shown"]
     return [
         Counted(name, shown.clip, None, one["response"], shown.cell)
         for name, one in answers.items()

@@ -9,10 +9,11 @@ from experiments.definition import Experiment
 from experiments.trials.continuous_rating.answer import ContinuousAnswer
 from experiments.trials.continuous_rating.declaration import continuous_rating_of, samples_of, step_frames
 from server.errors import Invalid
-from server.tallies.tally import Counted, Place
+from server.tallies.tally import Counted, NumberedClip
 from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
-from server.trials.kinds.clip_rating import RatingMissing, RatingOutOfScale, playback_of
+from server.trials.kinds.clip_rating import RatingMissing, RatingOutOfScale
 from server.trials.schemas import RatingIn
+from server.trials.several_clips import playback_of
 from server.trials.verdict import Ruling
 from server.trials.verdict import judge as judge_play
 
@@ -88,11 +89,11 @@ def risen(since_s: float) -> float:
     return u * math.exp(1 - u) if u > 0 else 0.0
 
 
-def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
     """The trace's mean, by cell."""
     if payload["response"] is None:
         return []
-    shown = places["shown"]
+    shown = clips["shown"]
     return [Counted("", shown.clip, None, payload["response"], shown.cell)]
 
 

@@ -3,17 +3,17 @@
 import math
 import random
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
 from experiments.trials.paired_comparison.answer import CODES, ComparisonAnswer, check_response
 from experiments.trials.paired_comparison.declaration import OneAfterTheOther, paired_comparison_of
 from server.errors import Invalid
-from server.tallies.tally import Counted, Place
+from server.tallies.tally import Counted, NumberedClip
 from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
-from server.trials.kinds.clip_rating import RatingMissing, playback_of
+from server.trials.kinds.clip_rating import RatingMissing
 from server.trials.schemas import RatingIn
+from server.trials.several_clips import judge_several, playback_of
 from server.trials.verdict import Ruling
 from server.trials.verdict import judge as judge_play
 
@@ -46,32 +46,15 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
 
 
 def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
-    """The verdict on a showing of all clips of the trial: each must be there, and every frame of each.
-
-    Clips at once are drawn by one clock: a frame of the log is one of each clip, and the longest counts. In
-    turn, and for a reference, the log has one clip after the other.
-    """
+    """The verdict on a showing of all clips of the trial: each must be there, and every frame of each."""
     rules, rated = loaded.experiment.playback, rating.answer.given
-    playback = playback_of(rating.playback)
     if not clips:
-        return judge_play(rules, playback, None, 0, 0.0, rated=rated)
+        return judge_play(rules, playback_of(rating.playback), None, 0, 0.0, rated=rated)
     assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
-    shown = rating.playback.clips.by_role() if rating.playback.clips else {}
-    if playback.method != "none" and {role: one.clip_sha256 for role, one in shown.items()} != {
-        role: clip.sha256 for role, clip in assigned.items()
-    }:
-        return "failed", "wrong_clip"
     pair = [clip.frames for role, clip in assigned.items() if role != "reference"]
     in_turn = isinstance(paired_comparison_of(loaded.experiment).presentation, OneAfterTheOther)
     before = assigned["reference"].frames if "reference" in assigned else 0
-    frames = before + (sum(pair) if in_turn else max(pair))
-    first = next(iter(assigned.values()))
-    playback = replace(playback, clip_sha256=first.sha256)
-    ruling = judge_play(rules, playback, first.sha256, frames, first.fps, rated=rated)
-    counted = {role: one.frames_drawn + one.frames_missing for role, one in shown.items()}
-    if ruling[0] != "good" or counted == {role: clip.frames for role, clip in assigned.items()}:
-        return ruling
-    return "flagged", "frame_log_disagrees"
+    return judge_several(rules, assigned, before + (sum(pair) if in_turn else max(pair)), rating)
 
 
 def simulated(
@@ -88,10 +71,10 @@ def simulated(
     return {"kind": "paired_comparison", "winner": winner, "arrangement": arrangement}
 
 
-def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
     """The number of the answer, for left and right or first and second."""
     code = check_response(payload)
-    pair = [places[role].clip for role in ("left", "first", "right", "second") if role in places]
+    pair = [clips[role].clip for role in ("left", "first", "right", "second") if role in clips]
     return [] if code is None else [Counted("", pair[0], pair[1], code)]
 
 

@@ -2,17 +2,17 @@
 
 import random
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
 from experiments.trials.threshold.answer import CODES, ThresholdAnswer
 from experiments.trials.threshold.declaration import YesNo, threshold_of
 from server.errors import Invalid
-from server.tallies.tally import Counted, Place
+from server.tallies.tally import Counted, NumberedClip
 from server.trials.kinds import Part, Preference, Served, answer_of, asked_in
-from server.trials.kinds.clip_rating import RatingMissing, playback_of
+from server.trials.kinds.clip_rating import RatingMissing
 from server.trials.schemas import RatingIn
+from server.trials.several_clips import judge_several, playback_of
 from server.trials.verdict import Ruling
 from server.trials.verdict import judge as judge_play
 
@@ -43,17 +43,11 @@ def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -
     if not clips:
         return judge_play(rules, playback, None, 0, 0.0, rated=rated)
     assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
-    first = next(iter(assigned.values()))
     frames = sum(clip.frames for clip in assigned.values())
-    if len(assigned) == 1:
-        return judge_play(rules, playback, first.sha256, frames, first.fps, rated=rated)
-    shown = rating.playback.clips.by_role() if rating.playback.clips else {}
-    if playback.method != "none" and {role: one.clip_sha256 for role, one in shown.items()} != {
-        role: clip.sha256 for role, clip in assigned.items()
-    }:
-        return "failed", "wrong_clip"
-    playback = replace(playback, clip_sha256=first.sha256)
-    return judge_play(rules, playback, first.sha256, frames, first.fps, rated=rated)
+    if len(assigned) > 1:
+        return judge_several(rules, assigned, frames, rating)
+    (only,) = assigned.values()
+    return judge_play(rules, playback, only.sha256, frames, only.fps, rated=rated)
 
 
 def simulated(
@@ -61,7 +55,7 @@ def simulated(
 ) -> dict[str, Any]:
     """The answer of a simulated observer: yes, or the interval of the stimulus, as likely as they see it."""
     names = [answer["response"] for answer in declared["answers"]]
-    place = trial["series"] or {"known": 0}
+    series = trial["series"] or {"known": 0}
     if not trial["clips"]:
         return {"kind": "threshold", "chosen": names[asked_in(trial["prompt"]) - 1]}
     seen = [preference.sees(clip["clip_sha256"]) for clip in trial["clips"]]
@@ -71,17 +65,17 @@ def simulated(
         # The standard is no stimulus, so that nothing is seen in it.
         stimulus = 0 if seen[0] >= seen[1] else 1
         chosen = names[stimulus] if rng.random() < seen[stimulus] else names[1 - stimulus]
-    return {"kind": "threshold", "chosen": chosen, "known": place["known"]}
+    return {"kind": "threshold", "chosen": chosen, "known": series["known"]}
 
 
-def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
     """Yes as 1 and no as 0, so that a cell's mean is its share of yes; of two clips, the answer's number."""
     if payload["chosen"] is None:
         return []
-    if "shown" in places:
-        shown = places["shown"]
+    if "shown" in clips:
+        shown = clips["shown"]
         return [Counted("", shown.clip, None, float(payload["chosen"] == "yes"), shown.cell)]
-    return [Counted("", places["first"].clip, places["second"].clip, CODES[payload["chosen"]])]
+    return [Counted("", clips["first"].clip, clips["second"].clip, CODES[payload["chosen"]])]
 
 
 SERVED = Served(validate, judge, simulated, counted)

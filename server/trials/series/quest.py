@@ -8,6 +8,7 @@ import math
 import threading
 import warnings
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -69,6 +70,48 @@ def choices(model: Model, answers: Answers, count: int) -> list[Point]:
             chosen.append(state.chosen)
             answers = (*answers, (state.chosen, state.yes_is_likelier))
     return chosen
+
+
+class Tilt(NamedTuple):
+    """Mean and SD of the posterior of a tilt, in units of the stimulus a unit of the second factor."""
+
+    mean: float
+    sd: float
+
+
+def tilt(model: Model, counts: Mapping[Point, tuple[int, int]]) -> Tilt:
+    """What a person's answers say of the tilt: number of answers and of positive ones at each stimulus.
+
+    The posterior does not depend on the order of answers, so that counts are enough.
+    """
+    with _working:
+        engine, table = _engine(model), _likelihoods(model)
+        posterior = engine.prior.values
+        for point, (n, positive) in counts.items():
+            yes, no = table[point]
+            posterior = posterior * yes**positive * no ** (n - positive)
+            posterior = posterior / posterior.sum()
+        axis = list(engine.param_domain).index("tilt")
+        others = tuple(other for other in range(posterior.ndim) if other != axis)
+        shares, values = posterior.sum(axis=others).tolist(), engine.param_domain["tilt"].tolist()
+    mean = math.fsum(p * value for p, value in zip(shares, values, strict=True))
+    variance = math.fsum(p * (value - mean) ** 2 for p, value in zip(shares, values, strict=True))
+    return Tilt(-mean if model.falling else mean, math.sqrt(variance))
+
+
+@lru_cache(maxsize=64)
+def _likelihoods(model: Model) -> dict[Point, tuple[Any, Any]]:
+    """Of both answers at every stimulus, over the parameters in the order of the prior."""
+    engine = _engine(model)
+    return {
+        point: tuple(
+            engine.likelihoods.sel(**_spoken(model, point), response=said)
+            .transpose(*engine.prior.dims)
+            .values
+            for said in (YES, NO)
+        )
+        for point in (Point(value, second) for value in model.stimuli for second in model.seconds)
+    }
 
 
 def _after(model: Model, answers: Answers) -> _State:

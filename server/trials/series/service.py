@@ -15,8 +15,8 @@ from experiments.trials.threshold.grid import (
     clip_of,
     exemplar_at,
     model,
-    point_at,
     points,
+    points_of,
     series_of,
     standard_of,
 )
@@ -33,7 +33,15 @@ from server.versions import LoadedVersion, Versions
 
 @dataclass(frozen=True)
 class Offer:
-    """A stimulus chosen for a trial. clip: id of its clip; known: answers the choice rests on."""
+    """A stimulus chosen for a trial.
+
+    Attributes
+    ----------
+    clip : int
+        Id of its clip.
+    known : int
+        Answers the choice rests on.
+    """
 
     trial_index: int
     role: str
@@ -43,11 +51,20 @@ class Offer:
 
 @dataclass(frozen=True)
 class Outlook:
-    """What a run's answers lead to.
+    """What a run's answers lead to; `closed` and `remaining` are known once it is kept.
 
-    known: counting answers of each series when this was reckoned. estimates: by trial and play. closing:
-    trials that a series leaves over by ending. closed: those, and the ones closed before. remaining: trials
-    still to be answered. The last two are known once this is kept.
+    Attributes
+    ----------
+    known : mapping of str to int
+        Counting answers of each series when this was reckoned.
+    estimates : mapping of (int, int) to Estimate
+        By trial and play.
+    closing : tuple of int
+        Trials that a series leaves over by ending.
+    closed : tuple of int
+        Those, and the ones closed before.
+    remaining : int
+        Trials still to be answered.
     """
 
     known: Mapping[str, int]
@@ -80,13 +97,13 @@ def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any
     """The outlook on the series that these trials make, after these answers. Pure."""
     experiment = loaded.experiment
     assumed, declared, levels = model(experiment), threshold_of(experiment), points(experiment)
-    known: dict[str, int] = {}
+    shown, known = loaded.once(_points), dict[str, int]()
     offers: list[Offer] = []
     estimates: dict[tuple[int, int], Estimate] = {}
     closing: list[int] = []
     for one in series_of(experiment):
         given = [row for row in answers if row.series == one.name]
-        said: Answers = tuple((_point(loaded, row.version_clip_id), row.positive) for row in given)
+        said: Answers = tuple((shown[row.version_clip_id], row.positive) for row in given)
         known[one.name] = len(given)
         for number, row in enumerate(given, start=1):
             if row.threshold is None:
@@ -199,12 +216,12 @@ def places(connection: Connection, run: int, loaded: LoadedVersion) -> list[tupl
 
 def as_offered(connection: Connection, run: int, trial: StoredTrial, rating: RatingIn) -> StoredTrial:
     """The trial with the clip that was offered from as many answers as the page says it knew of."""
-    place = repository.trial(connection, run, rating.trial_index)
-    if place is None or place.series is None:
+    offered = repository.trial(connection, run, rating.trial_index)
+    if offered is None or offered.series is None:
         return trial
     known = answer_of(rating, ThresholdAnswer).known
     clip = repository.offered(connection, run, rating.trial_index, known)
-    return trial if clip is None else trial._replace(clips={**trial.clips, place.role: clip})
+    return trial if clip is None else trial._replace(clips={**trial.clips, offered.role: clip})
 
 
 def take(
@@ -216,21 +233,21 @@ def take(
     ruling: Ruling,
 ) -> bool:
     """Store what a play says to its series; return whether its trial had been closed before."""
-    place = repository.trial(connection, run, rating.trial_index)
-    if place is None:
+    offered = repository.trial(connection, run, rating.trial_index)
+    if offered is None:
         return False
-    answer, clip = answer_of(rating, ThresholdAnswer), trial.clips[place.role]
-    before = repository.answers_in(connection, run, place.series) if place.series else 0
+    answer, clip = answer_of(rating, ThresholdAnswer), trial.clips[offered.role]
+    before = repository.answers_in(connection, run, offered.series) if offered.series else 0
     two = isinstance(threshold_of(loaded.experiment).task, TwoInterval)
-    right = answer.chosen == (place.role if two else "yes") if answer.given else None
-    counts = place.series is not None and answer.given and ruling[0] != "failed"
+    right = answer.chosen == (offered.role if two else "yes") if answer.given else None
+    counts = offered.series is not None and answer.given and ruling[0] != "failed"
     known = min(answer.known, before)
     values = {
         "study_run_id": run,
         "trial_index": rating.trial_index,
         "play": rating.play,
         "version_clip_id": clip,
-        "value": _point(loaded, clip).value,
+        "value": loaded.once(_points)[clip].value,
         "positive": right,
         "correct": right if counts else None,
         "counts": counts,
@@ -239,15 +256,14 @@ def take(
         "ahead": before - known,
     }
     repository.add_answer(connection, values)
-    repository.show(connection, run, rating.trial_index, place.role, clip)
-    return bool(place.closed)
+    repository.show(connection, run, rating.trial_index, offered.role, clip)
+    return bool(offered.closed)
 
 
-def _point(loaded: LoadedVersion, clip: int) -> Point:
-    """The stimulus that a clip shows."""
-    cell = next(cell for (cell, _), ident in loaded.places.items() if ident == clip)
-    levels = dict(zip(loaded.experiment.factor_names, cell.split("/"), strict=True))
-    point = point_at(loaded.experiment, levels)
-    if point is None:
-        raise AssertionError(f"the clip {cell} is a standard, and no stimulus")
-    return point
+def _points(loaded: LoadedVersion) -> dict[int, Point]:
+    """The stimulus that each clip shows, by the clip's id; standards are none."""
+    names = loaded.experiment.factor_names
+    levels = {
+        ident: dict(zip(names, cell.split("/"), strict=True)) for (cell, _), ident in loaded.places.items()
+    }
+    return points_of(loaded.experiment, levels)

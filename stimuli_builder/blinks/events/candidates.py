@@ -45,17 +45,17 @@ def find_candidates(depth: Depth) -> list[Candidate]:
     padded = np.concatenate([[depth.smooth.min()], depth.smooth, [depth.smooth.min()]])
     wide = 2 * int(REACH_S * depth.fps) + 1
     peaks, facts = find_peaks(padded, prominence=least, wlen=wide)
-    found = []
-    for place, prominence in zip(peaks - 1, facts["prominences"], strict=True):
-        height = float(depth.smooth[place])
+    candidates = []
+    for peak, prominence in zip(peaks - 1, facts["prominences"], strict=True):
+        height = float(depth.smooth[peak])
         if prominence >= RIPPLE * height:
             base = height - float(prominence)
             left, right = (
-                tuple(_crossing(depth, int(place), base + part * prominence, step) for part in LEVELS)
+                tuple(_crossing(depth, int(peak), base + part * prominence, step) for part in LEVELS)
                 for step in (-1, 1)
             )
-            found.append(Candidate(int(place), height, float(prominence), left, right))  # type: ignore[arg-type]
-    return found
+            candidates.append(Candidate(int(peak), height, float(prominence), left, right))  # type: ignore[arg-type]
+    return candidates
 
 
 def _crossing(depth: Depth, peak: int, level: float, step: int) -> float:

@@ -18,8 +18,10 @@ class Network:
 
     Attributes
     ----------
-    mean, spread : (features,) of the training data.
-    layers : weights (in, out) and offsets (out,) in order.
+    mean, spread : float64 array (features,)
+        Of the training data.
+    layers : tuple of (float64 array, float64 array)
+        Weights (in, out) and offsets (out,) in order.
     """
 
     kinds: tuple[str, ...]

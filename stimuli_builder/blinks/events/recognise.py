@@ -80,12 +80,12 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
 
 
 def _pieces(series: BlinkSeries) -> list[_Piece]:
-    found = []
+    pieces = []
     for start, stop in runs(np.isfinite(series.distance)):
         if stop - start >= max(5, SHORTEST_PIECE_S * series.fps):
             depth = depth_of(series.distance[start:stop], series.fps)
-            found.append(_Piece(start, depth, find_candidates(depth)))
-    return found
+            pieces.append(_Piece(start, depth, find_candidates(depth)))
+    return pieces
 
 
 def _whole(pieces: list[_Piece], size: int) -> Array:

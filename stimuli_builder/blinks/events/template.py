@@ -36,7 +36,10 @@ MISFIT = 0.03
 class Forms:
     """Closing and opening of the template (0 to 1, over even shares of the phase), and the usual phases.
 
-    `log_s` and `log_sd`: mean and spread of the logarithm of closing, closed and opening time in seconds.
+    Attributes
+    ----------
+    log_s, log_sd : float64 array
+        Mean and spread of the logarithm of closing, closed and opening time in seconds.
     """
 
     closing: Array

@@ -31,12 +31,12 @@ CLASSES = (*KINDS, "nothing")
 def labelled_features(series: Generated) -> tuple[Array, list[str]]:
     """Features of every dip of every eye, and what each is."""
     depths = [depth_of(distance, series.fps) for distance in series.distances]
-    found = [find_candidates(depth) for depth in depths]
+    of_eyes = [find_candidates(depth) for depth in depths]
     rows, kinds = [], []
-    for eye, (depth, candidates) in enumerate(zip(depths, found, strict=True)):
+    for eye, (depth, candidates) in enumerate(zip(depths, of_eyes, strict=True)):
         other = None
         if len(depths) == 2:
-            other = depths[1 - eye].smooth / deep_level(found[1 - eye], depths[1 - eye])
+            other = depths[1 - eye].smooth / deep_level(of_eyes[1 - eye], depths[1 - eye])
         rows.append(features_of(candidates, depth, other))
         kinds += [true_kind(candidate, depth, series.motions) for candidate in candidates]
     return np.concatenate(rows), kinds

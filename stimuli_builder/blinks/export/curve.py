@@ -62,10 +62,10 @@ def make_curve(
     for profile, minimum in zip(profiles, minima, strict=True):
         up, nasal = lower_lid(profile)
         other = profile.closure if profile.closure_other is None else profile.closure_other
-        place = (frames - minimum) * profile.fps / fps + profile.minimum_index
+        position = (frames - minimum) * profile.fps / fps + profile.minimum_index
         for track, values in zip(tracks, (profile.closure, other, up, nasal), strict=True):
             # Blinks drawn closer than they last meet at the more closed of the two.
-            np.maximum(track, np.interp(place, np.arange(values.size), values, left=0, right=0), out=track)
+            np.maximum(track, np.interp(position, np.arange(values.size), values, left=0, right=0), out=track)
     onsets = [minimum - p.down_frames / p.fps * fps for p, minimum in zip(profiles, minima, strict=True)]
     names = tuple((p.profile_id, round(onset, 4)) for p, onset in zip(profiles, onsets, strict=True))
     left, right, up, nasal = np.round(tracks, 6)

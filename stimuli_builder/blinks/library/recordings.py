@@ -16,7 +16,10 @@ _EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "one": None}
 class Recording:
     """One recording: file, column of each eye, rate (None: from time_s), who is seen, and rights.
 
-    `keep_lower_lid`: whether the lower lid's motion in a track is good enough to be kept.
+    Attributes
+    ----------
+    keep_lower_lid : bool
+        Whether the lower lid's motion in a track is good enough to be kept.
     """
 
     name: str

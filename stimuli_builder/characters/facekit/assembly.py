@@ -69,7 +69,7 @@ class Assembly:
         view = self._scene.view
         declaration = Declaration(
             name=name,
-            label=self._scene.identity.label,
+            label=", ".join(filter(None, (self._scene.identity.label, self._scene.framing.shows))),
             size_px=view.size_px,
             px_per_mm=view.px_per_mm,
             inter_ocular_mm=INTER_OCULAR_MM,

@@ -29,16 +29,22 @@ from stimuli_builder.characters.facekit.plan import (
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
 
-# Raise when geometry, textures, materials or lights change: work of another recipe is not resumed.
-RECIPE = 3
+# Raise when geometry, textures, materials, lights or that framing change: other recipes' work is not resumed.
+RECIPES = {"eyes": 4, "face": 5}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
+
+
+def character_name(face: str, framing: str) -> str:
+    """Name of the character that a framing of a face makes: `alder`, or `alder-face`."""
+    return face if framing == "eyes" else f"{face}-{framing}"
 
 
 @dataclass(frozen=True)
 class FaceOrder:
     """What to bake and where; `work` keeps rendered shots so that a stopped bake goes on.
 
-    Of the atlas's `levels`, `rendered` are rendered and the others moved in between.
+    Of the atlas's `levels`, `rendered` are rendered and the others moved in between; `denser_ends` renders as
+    many again in the first and the last eighth.
     """
 
     name: str
@@ -55,11 +61,20 @@ class FaceOrder:
     blender: Path
     device: str
     threads: int
+    denser_ends: bool = False
+    seed: int | None = None
+    """The number that drew the face whole; None for one of the identities file."""
+
+    @property
+    def character(self) -> str:
+        """Name of the character."""
+        return character_name(self.name, self.framing)
 
     def work_folder(self, kit: FaceKit) -> Path:
         """Folder of this face's shots: another face, size, quality, kit or recipe has another."""
         key = f"{self.identity.model_dump_json()} {self.framing} {self.size_px} {self.samples} {self.light}"
-        digest = hashlib.sha256(f"{key} {load_light(self.light)} {kit.fingerprint} {RECIPE}".encode())
+        key += f" {load_light(self.light)} {kit.fingerprint} {RECIPES[self.framing]}"
+        digest = hashlib.sha256(key.encode())
         return self.work / f"face-{self.name}-{digest.hexdigest()[:10]}"
 
 
@@ -82,7 +97,8 @@ class FaceBake:
     @cached_property
     def levels(self) -> list[Shot]:
         """The levels' shots, in the order of rendering."""
-        return level_shots(self.work, self.scene.boxes, self.order.samples, self.order.rendered)
+        order = self.order
+        return level_shots(self.work, self.scene.boxes, order.samples, order.rendered, order.denser_ends)
 
     @cached_property
     def lower(self) -> list[Shot]:
@@ -160,16 +176,18 @@ class FaceBake:
         grid = set(closures_of(count))
         used = [closure for closure in rendered if closure in grid]
         assembly = Assembly(self.scene, self.frame, self.levels, self.lower, used)
-        assembly.write(self.order.out, self.order.name, count, self._provenance(count, used))
+        assembly.write(self.order.out, self.order.character, count, self._provenance(count, used))
 
     def _provenance(self, levels: int, rendered: list[float]) -> dict[str, Any]:
         order, width, height = self.order, *self.order.size_px
+        ends = " --denser-ends" if order.denser_ends else ""
+        face = f"--identity {order.name}" if order.seed is None else f"--seed {order.seed}"
         return {
-            "command": f"stimuli bake face --identity {order.name} --framing {order.framing} "
-            f"--size {width}x{height} --levels {levels} --rendered {order.rendered} "
+            "command": f"stimuli bake face {face} --framing {order.framing} "
+            f"--size {width}x{height} --levels {levels} --rendered {order.rendered}{ends} "
             f"--samples {order.samples.boxes} --frame-samples {order.samples.frame} --light {order.light}",
             "geometry": NOTICE,
-            "recipe": RECIPE,
+            "recipe": RECIPES[order.framing],
             "rendered_levels": len(rendered),
             "rendered_closures": rendered,
             "samples": order.samples.boxes,

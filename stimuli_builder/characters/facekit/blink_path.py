@@ -6,6 +6,7 @@ lifted off. A stroke of 0 is open and 1 shut; `lid_skin.py` finds the stroke of 
 """
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
 
 from stimuli_builder.characters.facekit.identity import Movement
 from stimuli_builder.characters.facekit.kit import Array, FaceKit, Index
@@ -21,7 +22,10 @@ _OUTER_CLEARANCE_CM = 0.11
 _NEAR_CM, _REACH_CM = 3.4, 1.0
 # The kit's blink pulls faintly at brow and cheek; what is declared to hold still does.
 _WHOLE_CM, _STILL_CM = 1.9, 2.5
-_CORNER_LIFTS = ((1, 0.05), (2, 0.075), (3, 0.055))
+# The shut corner by the nose is shallow: how far behind the skin round it the loops may lie, cm, and how far
+# from the corner that holds.
+_CORNER_DEPTHS_CM = (0.16, 0.10, 0.05, 0.03, 0.02, 0.015, 0.015, 0.015, 0.015)
+_CORNER_UNDER_CM, _CORNER_SOFT_CM, _CORNER_WHOLE_CM, _CORNER_END_CM = 0.09, 0.01, 0.55, 1.1
 
 
 class BlinkPath:
@@ -35,10 +39,15 @@ class BlinkPath:
         Each eye's globe by side.
     loops : dict
         Each eye's loops of vertices by side.
+    look : tuple
+        Degrees that both eyes look to the person's left and up, besides what moves with the lid.
+    expression : float64 array (26719, 3) or 0
+        Displacement of a face that does not rest, cm; added at every stroke.
     """
 
     def __init__(self, kit: FaceKit, rest: Array, movement: Movement) -> None:
         self.kit, self.rest, self.movement = kit, rest, movement
+        self.look, self.expression = (0.0, 0.0), np.zeros((1, 3))
         self.globes = {side: globe_of(kit, rest, side) for side in SIDES}
         self.loops = {side: lid_loops(kit, side) for side in SIDES}
         self._others = {side: self._other_movement(side) for side in SIDES}
@@ -69,6 +78,7 @@ class BlinkPath:
         x, _, z = self.globes[side].centre
         yaw = np.arctan2(-x, CAMERA_Z_CM - z) - side * np.radians(self.movement.gaze_in_degrees) * stroke
         pitch = -np.radians(self.movement.gaze_down_degrees) * stroke
+        yaw, pitch = yaw + np.radians(self.look[0]), pitch + np.radians(self.look[1])
         return np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
 
     def clearance(self, points: Array, side: int, stroke: float) -> Array:
@@ -84,6 +94,8 @@ class BlinkPath:
         out = self.rest + sum(strokes[side] * self._others[side] for side in SIDES)
         for side in SIDES:
             out[self._moved[side]] = self._along(side, strokes[side])
+        out = out + self.expression
+        for side in SIDES:
             if any(lower_cm):
                 near, weight = self._lower_lids[side]
                 out[near] = moved_lower_lid(out[near], weight, self.globes[side], side, *lower_cm)
@@ -107,11 +119,33 @@ class BlinkPath:
         points = base + self._blink[side]
         for _ in range(3):
             points = self._edges_together(points, base, side)
-        for loop, lift in _CORNER_LIFTS:
-            # The shut corner by the nose is shallow, not a slit.
-            index = self.loops[side][loop]
-            nasal = np.clip((-points[index, 0] * side - 0.55) / 0.4, 0, 1)
-            points[index] *= (1 + lift * nasal / np.linalg.norm(points[index], axis=1))[:, None]
+        return self._corner_filled(points, side)
+
+    def _corner_filled(self, points: Array, side: int) -> Array:
+        """Bring the pocket of the nasal corner forward to a smooth skin laid over what surrounds it.
+
+        The kit's corner is a pocket 2 mm deep, right for an open eye; between shut lids it is a dark pit.
+        """
+        loops = self.loops[side]
+        across = points[:, 0] * side
+        across = across - across[loops[3]].min()
+        upper = np.concatenate([chains(self.kit, loops[k], side)[0] for k in range(4, 9)])
+        lower = np.concatenate([chains(self.kit, loops[k], side)[1] for k in (7, 8)])
+        round_it = [*loops[9:13], upper[across[upper] > 0.25], lower[across[lower] > 0.35]]
+        anchors = np.unique(np.concatenate(round_it))
+        anchors = anchors[across[anchors] < _CORNER_END_CM + 0.3]
+        skin = RBFInterpolator(points[anchors, :2], points[anchors, 2], smoothing=1e-3)
+        edge_upper = chains(self.kit, loops[3], side)[0]
+        for index, depth in zip(loops, _CORNER_DEPTHS_CM, strict=False):
+            near = index[across[index] < _CORNER_END_CM]
+            # What of the lower lid has slipped under the upper one stays there.
+            edge = _profile(across[near], across[edge_upper], points[edge_upper, 1])
+            under = np.isin(near, chains(self.kit, index, side)[1][1:]) * smooth(
+                -0.03, 0.02, points[near, 1] - edge
+            )
+            missing = skin(points[near, :2]) - depth - _CORNER_UNDER_CM * under - points[near, 2]
+            share = smooth(_CORNER_END_CM, _CORNER_WHOLE_CM, across[near])
+            points[near, 2] += share * _CORNER_SOFT_CM * np.logaddexp(0, missing / _CORNER_SOFT_CM)
         return points
 
     def _declared_blink(self, side: int) -> Array:
@@ -147,10 +181,10 @@ class BlinkPath:
         loops, globe = self.loops[side], self.globes[side]
         index = np.concatenate(loops[1:])
         least = [*_CLEARANCE_CM, *[_OUTER_CLEARANCE_CM] * len(loops)]
-        wanted = np.concatenate([np.full(len(loop), w) for loop, w in zip(loops[1:], least, strict=False)])
+        least_cm = np.concatenate([np.full(len(loop), w) for loop, w in zip(loops[1:], least, strict=False)])
         gap = self.clearance(vertices[index], side, stroke)
-        need = _SOFT_CM * np.logaddexp(0, (wanted - gap) / _SOFT_CM)
-        need[gap > wanted + 6 * _SOFT_CM] = 0
+        need = _SOFT_CM * np.logaddexp(0, (least_cm - gap) / _SOFT_CM)
+        need[gap > least_cm + 6 * _SOFT_CM] = 0
         lift = np.zeros(len(vertices))
         lift[index] = need
         lift = self._spread(lift, side)

@@ -80,7 +80,7 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
         "film": film(),
         "tear": tear(),
         "flesh": flesh(look),
-        "seam": seam(look),
+        "spectacles": spectacles(),
         "lash": hair("lash", [min(0.008, c * 0.25) for c in look["hair"]], 0.25),
         "brow": hair("brow", look["hair"], 0.33),
     }
@@ -164,8 +164,8 @@ def film() -> Any:
         n.add("BsdfTransparent"),
         n.add("MixShader"),
     )
-    place = n.add("TexCoord").outputs["Object"]
-    ripples = n.math("MULTIPLY", n.noise(place, 9.0, 2), 0.0004)
+    coordinates = n.add("TexCoord").outputs["Object"]
+    ripples = n.math("MULTIPLY", n.noise(coordinates, 9.0, 2), 0.0004)
     n.put(n.add("Bump", Strength=1.0, Distance=1.0, Height=ripples).outputs[0], glass.inputs["Normal"])
     ray = n.add("LightPath")
     n.put(n.math("MAXIMUM", ray.outputs["Is Shadow Ray"], ray.outputs["Is Diffuse Ray"]), mix.inputs[0])
@@ -198,18 +198,11 @@ def flesh(look: dict[str, Any]) -> Any:
     return n.surface(shader)
 
 
-def seam(look: dict[str, Any]) -> Any:
-    """Skin of the lids' own pigments, a little redder, where they meet by the nose."""
-    n = Nodes("seam")
-    melanin, blood = 1.15 * look["melanin"], look["haemoglobin"] + 0.12
-    shader = n.add("BsdfPrincipled", Roughness=0.45, Specular_IOR_Level=0.4)
-    colour = [
-        base * math.exp(-melanin * m - blood * b) for base, m, b in zip(BASE, MELANIN, BLOOD, strict=True)
-    ]
-    shader.inputs["Base Color"].default_value = (*colour, 1)
-    shader.inputs["Subsurface Weight"].default_value = 1.0
-    shader.inputs["Subsurface Radius"].default_value = (1.0, 0.34, 0.17)
-    shader.inputs["Subsurface Scale"].default_value = 0.065
+def spectacles() -> Any:
+    """Dark plastic of a pair of glasses' rims."""
+    n = Nodes("spectacles")
+    shader = n.add("BsdfPrincipled", Roughness=0.3, Specular_IOR_Level=0.5)
+    shader.inputs["Base Color"].default_value = (0.02, 0.016, 0.014, 1)
     return n.surface(shader)
 
 

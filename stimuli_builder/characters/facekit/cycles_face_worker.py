@@ -25,11 +25,11 @@ GPU_KINDS = ("OPTIX", "CUDA", "HIP", "METAL", "ONEAPI")
 Things = list[tuple[dict[str, Any], Any]]
 
 
-def use_device(wanted: str) -> str:
+def use_device(device_name: str) -> str:
     """Choose a GPU if there is one ('auto', or 'gpu', which must have one), else the CPU; its name."""
     scene = bpy.context.scene
     scene.cycles.device = "CPU"
-    if wanted == "cpu":
+    if device_name == "cpu":
         return "CPU"
     addon = bpy.context.preferences.addons.get("cycles")
     for kind in GPU_KINDS if addon is not None else ():
@@ -38,13 +38,13 @@ def use_device(wanted: str) -> str:
         except TypeError:
             continue
         addon.preferences.get_devices()
-        found = [device for device in addon.preferences.devices if device.type == kind]
-        if found:
+        devices = [device for device in addon.preferences.devices if device.type == kind]
+        if devices:
             for device in addon.preferences.devices:
                 device.use = device.type == kind
             scene.cycles.device = "GPU"
-            return f"{kind} {found[0].name}"
-    if wanted == "gpu":
+            return f"{kind} {devices[0].name}"
+    if device_name == "gpu":
         raise RuntimeError("no GPU that Cycles can use")
     return "CPU"
 

@@ -15,8 +15,6 @@ TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
 _SHADE_REACH_CM = (0.16, 0.07)
 _SHADE_DEPTH = (0.55, 0.22)
-_SEAM_POINTS = 70
-_SEAM_LOOPS = (8, 7, 6, 5, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +112,11 @@ def tear_line(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     # It thins out well before the temporal corner: there a wide one mirrors a light as a white bar.
     inset = np.minimum(along / 14, along[::-1] / 60)
     thickness = 0.018 * np.clip(inset, 0, 1) * (1 - 0.7 * smooth(0.9, 1.0, stroke))
-    return _tube(line, thickness)
+    return tube(line, thickness)
 
 
-def _tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
+def tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
+    """A tube along (n, 3) points with a radius at each."""
     along = np.gradient(line, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True) + 1e-9
     first = np.cross(along, [0, 0, 1.0])
@@ -141,31 +140,6 @@ def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
     starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
     quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), quads)
-
-
-def seam(path: BlinkPath, posed: Array, side: int) -> Mesh:
-    """Skin where the lids' nasal ends have met; without it the shut corner is a dark pit."""
-    upper, lower = (edge_line(path, posed, side, LASH_LOOP, up)[:_SEAM_POINTS] for up in (True, False))
-    gap = np.linalg.norm(upper - lower, axis=1)
-    met = smooth(0.17, 0.11, gap) * smooth(_SEAM_POINTS - 1, _SEAM_POINTS - 25, np.arange(_SEAM_POINTS))
-    # The more of it has met, the farther the skin is pressed out of the groove between the lids.
-    pressed = min(1.0, float(met.mean()) / 0.4)
-    line = (upper + lower) / 2 + np.array([0, 0, -0.035 + 0.085 * pressed])
-    tips = np.array([_nasal_tip(path, posed, side, loop) for loop in _SEAM_LOOPS])
-    beyond = _evenly(np.vstack([tips + np.array([0, 0, 0.12 * pressed - 0.02]), line[:1]]), _SEAM_POINTS)[:-1]
-    thin = np.linspace(0.5, 1.0, len(beyond)) * (0.3 + 0.7 * pressed)
-    share = np.concatenate([met[0] * thin, met])
-    width = np.concatenate([np.full(len(beyond), 0.085), np.full(len(line), 0.060)])
-    # Without width where nothing has met: a thread across the open eye would be seen.
-    radius = (0.038 + (width - 0.038) * pressed) * share * smooth(0.0, 0.05, share)
-    return _tube(np.concatenate([beyond, line]), radius)
-
-
-def _evenly(line: Array, count: int) -> Array:
-    """(count, 3) points evenly along a line."""
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    at = np.linspace(0, length[-1], count)
-    return np.stack([np.interp(at, length, line[:, k]) for k in range(3)], -1)
 
 
 def _nasal_tip(path: BlinkPath, posed: Array, side: int, loop: int) -> Array:

@@ -12,9 +12,9 @@ def value_noise(points: Array, seed: int, octaves: int = 3, roughness: float = 0
     table = np.random.default_rng([seed, 99]).normal(size=(_TABLE,) * 3).astype(np.float32)
     out = np.zeros(len(points))
     for octave in range(octaves):
-        place = points * 2**octave + 7.3 * octave
-        cell = np.floor(place).astype(np.int64)
-        share = place - cell
+        sampled = points * 2**octave + 7.3 * octave
+        cell = np.floor(sampled).astype(np.int64)
+        share = sampled - cell
         share = share * share * (3 - 2 * share)
         out += roughness**octave * _mixed(table, cell, share)
     return out * 1.6

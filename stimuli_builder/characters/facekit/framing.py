@@ -27,11 +27,13 @@ class Framing:
     """Box of the kit's faces that are needed, cm."""
     levels: int
     """Rounds of subdivision."""
+    shows: str = ""
+    """What a label says of the framing."""
 
 
 FRAMINGS = {
     "eyes": Framing(128.0, 4.3, (960, 360), (-9, -0.5, 0), (9, 8.5, 99), 3),
-    "face": Framing(128.0, -31.0, (720, 900), (-99, -99, -7), (99, 99, 99), 2),
+    "face": Framing(128.0, -36.0, (720, 900), (-99, -99, -7), (99, 99, 99), 2, "forehead to chin"),
 }
 
 

@@ -42,7 +42,7 @@ def edge_line(path: BlinkPath, vertices: Array, side: int, loop: int, upper: boo
 class _LashRow:
     """What is drawn once for a row of lashes; `leader` is the longest lash of each one's clump."""
 
-    place: Array
+    along_lid: Array
     size: Array
     fan: Array
     start: Array
@@ -63,7 +63,7 @@ class Lashes:
         """The strands on the edge of the posed coarse vertices."""
         row, globe = self.row, self.path.globes[self.side]
         line = edge_line(self.path, vertices, self.side, LASH_LOOP, self.upper)
-        number = row.place * (len(line) - 1)
+        number = row.along_lid * (len(line) - 1)
         low = np.minimum(number.astype(np.int64), len(line) - 2)
         root = line[low] + (number - low)[:, None] * (line[low + 1] - line[low])
         radial = root - globe.centre
@@ -98,7 +98,7 @@ def _clumped(points: Array, leader: Index) -> Array:
 def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
     count = round((135 if upper else 75) * hair.lashes)
     low, high = (0.13, 0.985) if upper else (0.22, 0.97)
-    place = np.sort(rng.uniform(low, high, count))
+    along_lid = np.sort(rng.uniform(low, high, count))
     clump = np.repeat(np.arange(count), rng.choice([1, 2, 3, 4], count, p=[0.28, 0.32, 0.26, 0.14]))[:count]
     _, clump = np.unique(clump, return_inverse=True)
     groups = int(clump.max()) + 1 if count else 0
@@ -107,11 +107,11 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
         rng.normal(0, 0.07, groups),
         rng.normal(1, 0.12, groups),
     )
-    centre = np.bincount(clump, place, groups) / np.maximum(np.bincount(clump, minlength=groups), 1)
-    middle = (place - 0.5) * 2
-    gather = centre[clump] - place
+    centre = np.bincount(clump, along_lid, groups) / np.maximum(np.bincount(clump, minlength=groups), 1)
+    middle = (along_lid - 0.5) * 2
+    gather = centre[clump] - along_lid
     if upper:
-        size = 0.58 + 0.24 * np.exp(-(((place - 0.68) / 0.25) ** 2)) - 0.22 * smooth(0.3, 0.1, place)
+        size = 0.58 + 0.24 * np.exp(-(((along_lid - 0.68) / 0.25) ** 2)) - 0.22 * smooth(0.3, 0.1, along_lid)
         size = size * longer[clump] * rng.normal(0.95, 0.14, count)
         fan = (
             0.42 * middle
@@ -124,7 +124,7 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
         end = 36.0 - 88.0 * curled[clump] * rng.normal(1, 0.07, count)
         radius = 0.0052 * rng.normal(1, 0.18, count)
     else:
-        size = 0.24 + 0.12 * np.exp(-(((place - 0.62) / 0.3) ** 2))
+        size = 0.24 + 0.12 * np.exp(-(((along_lid - 0.62) / 0.3) ** 2))
         size = size * longer[clump] * rng.normal(0.95, 0.18, count)
         fan = 0.40 * middle + fanned[clump] + rng.normal(0, 0.08, count) + gather * 3.5
         start, end = np.full(count, -12.0), -58.0 * curled[clump]
@@ -134,7 +134,7 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
         [np.flatnonzero(clump == g)[np.argmax(size[clump == g])] for g in range(groups)], np.int64
     )
     lift = rng.uniform(-0.02, 0.02, count)
-    return _LashRow(place, size, fan, start, end, np.clip(radius, 0.002, None), lift, leader[clump])
+    return _LashRow(along_lid, size, fan, start, end, np.clip(radius, 0.002, None), lift, leader[clump])
 
 
 class Brow:
@@ -183,7 +183,7 @@ class Brow:
         )
         across = np.clip(rng.normal(0.05, np.where(fine, 0.75, 0.55)), -1.7, 1.6)
         beyond = (np.maximum(along - 1, 0) + np.minimum(along, 0)) * side * 3.5
-        place = np.stack(
+        along_lid = np.stack(
             [np.interp(along, s, line[:, 0]) + beyond, np.interp(along, s, line[:, 1]) + half * across], -1
         )
         lean = np.interp(along, [0, 0.1, 0.3, 0.6, 1], [74, 60, 40, 20, -12])
@@ -195,16 +195,16 @@ class Brow:
         length = np.interp(along, [0, 0.15, 0.6, 1], [0.42, 0.62, 0.70, 0.44]) * np.where(fine, 0.6, 1)
         length = length * np.clip(rng.normal(0.88, 0.2, n), 0.35, 1.4)
         self._points, self._root = self._laid(
-            place, lean, length, rng.normal(26, 9, n), rng.uniform(0.012, 0.045, n), side
+            along_lid, lean, length, rng.normal(26, 9, n), rng.uniform(0.012, 0.045, n), side
         )
         self._radii = np.where(fine, 0.0024, 0.0042) * np.clip(rng.normal(1, 0.2, n), 0.5, 1.6)
 
     def _laid(
-        self, place: Array, lean: Array, length: Array, bend: Array, rise: Array, side: int
+        self, along_lid: Array, lean: Array, length: Array, bend: Array, rise: Array, side: int
     ) -> tuple[Array, Index]:
         """(n, 8, 3) points that follow the skin from their roots, and the roots' vertices."""
-        height, normal, root = self._on_skin(place)
-        at = np.concatenate([place, height[:, None]], 1)
+        height, normal, root = self._on_skin(along_lid)
+        at = np.concatenate([along_lid, height[:, None]], 1)
         points = [at - 0.02 * normal]
         for k in range(1, BROW_POINTS):
             share = k / (BROW_POINTS - 1)

@@ -128,7 +128,7 @@ def _read_packed(file: Path) -> FaceKit:
 
 
 def _kit(
-    place: Path,
+    folder: Path,
     neutral: Array,
     faces: Index,
     modes: Array,
@@ -138,15 +138,15 @@ def _kit(
     """The kit, once its sizes are those that the vertex numbers of this package mean."""
     if neutral.shape != (VERTICES, 3) or faces.shape != (FACES, 4):
         raise InputError(
-            f"{place}: expected ICT-FaceKit's {VERTICES} vertices and {FACES} faces, got "
+            f"{folder}: expected ICT-FaceKit's {VERTICES} vertices and {FACES} faces, got "
             f"{len(neutral)} and {len(faces)}; use 'ICT Face Model Light' unchanged"
         )
     if modes.shape != (MODES, VERTICES, 3):
         raise InputError(
-            f"{place}: expected {MODES} identity modes of that mesh, got {len(modes)}; use the whole kit"
+            f"{folder}: expected {MODES} identity modes of that mesh, got {len(modes)}; use the whole kit"
         )
     if len(landmarks) != 68 or not (landmarks.min() >= 0 and landmarks.max() < VERTICES):
-        raise InputError(f"{place}: expected 68 landmark vertices, got {len(landmarks)}; use the whole kit")
+        raise InputError(f"{folder}: expected 68 landmark vertices, got {len(landmarks)}; use the whole kit")
     if not np.isfinite(neutral).all():
-        raise InputError(f"{place}: the kit's mesh holds numbers that are not finite; use the kit unchanged")
+        raise InputError(f"{folder}: the kit's mesh holds numbers that are not finite; use the kit unchanged")
     return FaceKit(neutral, faces, modes, expressions, landmarks)

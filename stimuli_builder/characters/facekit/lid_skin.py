@@ -168,16 +168,6 @@ class FaceSkin:
         z = np.where(crosses, points[..., 2], 0).sum(1) / np.maximum(crosses.sum(1), 1)
         return np.stack([y_low, y_high, z], -1)
 
-    def least_clearance(self, posed: Array, closure: float) -> tuple[int, float]:
-        """How many of the lids' vertices lie inside an eye, and the least distance outside in cm."""
-        strokes, loop = self.strokes.of(closure), self.coordinates.loop
-        gaps = []
-        for side in SIDES:
-            here = (self.coordinates.side == side) & (loop > 1.2) & (loop < 12)
-            gaps.append(self.path.clearance(posed[here], side, strokes[side]))
-        gap = np.concatenate(gaps)
-        return int((gap < 0).sum()), float(gap.min())
-
 
 @dataclass(frozen=True, eq=False)
 class LinearStrokes:

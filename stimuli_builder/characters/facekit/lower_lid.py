@@ -14,9 +14,12 @@ def lower_lid_weight(loop: Array, below: Array, along: Array) -> Array:
 
     Parameters
     ----------
-    loop : (n,) number of the vertex's loop, continued between loops.
-    below : (n,) 1 below the line through the eye's corners, 0 above.
-    along : (n,) way from the nasal corner (0) to the temporal one (1).
+    loop : float64 array (n,)
+        Number of the vertex's loop, continued between loops.
+    below : float64 array (n,)
+        1 below the line through the eye's corners, 0 above.
+    along : float64 array (n,)
+        Way from the nasal corner (0) to the temporal one (1).
     """
     inside = np.clip(along, 0, 1)
     return np.asarray(below * np.sin(np.pi * inside) * smooth(_STILL_LOOP, _WHOLE_LOOP, loop))

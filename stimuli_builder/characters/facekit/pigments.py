@@ -143,12 +143,12 @@ class Pigments:
         out = np.zeros(len(self.rest))
         places = np.flatnonzero((self.rest[:, 2] > 5) & (self.skin.coordinates.loop > 6))
         tree = cKDTree(self.rest)
-        for place in rng.choice(places, SPOTS):
+        for point in rng.choice(places, SPOTS):
             mole = rng.random() < 0.04
             size = rng.uniform(0.05, 0.09) if mole else rng.uniform(0.015, 0.05)
             strength = (0.25 if mole else 0.13) * rng.uniform(0.3, 1)
-            near = tree.query_ball_point(self.rest[place], 0.22)
-            distance2 = ((self.rest[near] - self.rest[place]) ** 2).sum(1)
+            near = tree.query_ball_point(self.rest[point], 0.22)
+            distance2 = ((self.rest[near] - self.rest[point]) ** 2).sum(1)
             out[near] += strength * np.exp(-distance2 / size**2)
         return self.look.freckles * out * (1.0 + self.look.melanin)
 

@@ -9,6 +9,7 @@ from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, OPEN, VER
 from stimuli_builder.characters.facekit.renderer import Shot
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129)
+END_SHARE = 1 / 8
 LOWER_LID_AFTER = 10
 """Shots before the lower lid's: the still frame and nine levels."""
 
@@ -33,18 +34,31 @@ def frame_shot(work: Path, size_px: tuple[int, int], samples: Samples) -> Shot:
     return Shot(work / "frame.npz", OPEN, {"frame": (0, 0, *size_px)}, samples.frame)
 
 
-def level_shots(work: Path, boxes: dict[str, Box], samples: Samples, levels: int) -> list[Shot]:
-    """Both eyes at each closure: both ends, then closures halfway between those before."""
+def denser_ends(levels: int) -> list[float]:
+    """The closures halfway between those of the first and of the last eighth of an even grid.
+
+    There a picture moved in between errs most: the lid begins to move, and the lids' lashes meet.
+    """
+    halfway = [(k + 0.5) / (levels - 1) for k in range(levels - 1)]
+    return [closure for closure in halfway if closure < END_SHARE or closure > 1 - END_SHARE]
+
+
+def level_shots(
+    work: Path, boxes: dict[str, Box], samples: Samples, levels: int, ends: bool = False
+) -> list[Shot]:
+    """Both eyes at each closure: both ends, then closures halfway between those before; last, denser ends."""
     plan: list[Shot] = []
     planned: set[float] = set()
     for count in LEVEL_COUNTS[: LEVEL_COUNTS.index(levels) + 1]:
         fresh = [closure for closure in closures_of(count) if closure not in planned]
         planned |= set(fresh)
-        plan += [
-            Shot(work / f"level_{closure:.6f}.npz", LidPose(closure), boxes, samples.boxes)
-            for closure in fresh
-        ]
-    return plan
+        plan += [_level_shot(work, closure, boxes, samples) for closure in fresh]
+    further = [closure for closure in denser_ends(levels) if ends]
+    return plan + [_level_shot(work, closure, boxes, samples) for closure in further]
+
+
+def _level_shot(work: Path, closure: float, boxes: dict[str, Box], samples: Samples) -> Shot:
+    return Shot(work / f"level_{closure:.6f}.npz", LidPose(closure), boxes, samples.boxes)
 
 
 def lower_lid_shots(work: Path, boxes: dict[str, Box], samples: Samples) -> list[Shot]:

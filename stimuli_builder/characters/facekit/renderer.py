@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,16 @@ class Shot:
     samples: int
 
     def read(self) -> dict[str, NDArray[np.float16]]:
-        """(h, w, 3) scene-linear light of each box."""
-        with np.load(self.file) as stored:
-            return {name: stored[name] for name in stored.files}
+        """(h, w, 3) scene-linear light of each box; InputError where it is damaged or another bake's."""
+        try:
+            with self.file.open("rb") as content, np.load(content) as stored:
+                light = {name: stored[name] for name in stored.files}
+        except (OSError, ValueError, EOFError, BadZipFile) as error:
+            raise InputError(f"{self.file} is damaged: delete it and bake again; the others stay") from error
+        expected = {name: (box[3], box[2], 3) for name, box in self.boxes.items()}
+        if {name: picture.shape for name, picture in light.items()} != expected:
+            raise InputError(f"{self.file} holds other boxes than this bake's: delete it and bake again")
+        return light
 
 
 @dataclass(frozen=True)

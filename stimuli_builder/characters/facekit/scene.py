@@ -15,8 +15,8 @@ import numpy as np
 
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.eye_texture import eye_maps
-from stimuli_builder.characters.facekit.eyes import Mesh, caruncle, eyeball, seam, tear_line, wet_film
-from stimuli_builder.characters.facekit.framing import FRAMINGS, Box, View
+from stimuli_builder.characters.facekit.eyes import Mesh, caruncle, eyeball, tear_line, wet_film
+from stimuli_builder.characters.facekit.framing import FRAMINGS, Box, Framing, View
 from stimuli_builder.characters.facekit.hair import Brow, Lashes, Strands
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import Array, FaceKit
@@ -60,8 +60,11 @@ class Part:
 class FaceScene:
     """One identity in one framing, posed at any closure."""
 
-    def __init__(self, kit: FaceKit, identity: Identity, framing: str, size_px: tuple[int, int]) -> None:
-        self.identity, self.framing = identity, FRAMINGS[framing]
+    def __init__(
+        self, kit: FaceKit, identity: Identity, framing: str | Framing, size_px: tuple[int, int]
+    ) -> None:
+        self.identity = identity
+        self.framing = FRAMINGS[framing] if isinstance(framing, str) else framing
         self.path = BlinkPath(kit, identity.rest(kit), identity.movement)
         self.strokes = lid_skin(self.path, identity).strokes
         levels = self.framing.levels - (size_px[0] < SMALL_WIDTH_PX)
@@ -91,8 +94,7 @@ class FaceScene:
 
     def shapes(self, pose: LidPose) -> list[Part]:
         """The parts without the skin's colours."""
-        strokes, lower_cm = self.strokes.of(pose.closure), self._lower_cm(pose)
-        coarse, posed = self.path.at(strokes, lower_cm), self.skin.at_strokes(strokes, lower_cm)
+        strokes, coarse, posed = self.strokes_of(pose), self._coarse(pose), self.posed_skin(pose)
         parts = [Part("skin", "skin", Mesh(posed, self.skin.fine.quads))]
         for side, name in SIDE_NAMES.items():
             stroke = strokes[side]
@@ -101,10 +103,20 @@ class FaceScene:
                 Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
                 Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
                 Part(f"flesh_{name}", "flesh", caruncle(self.path, coarse, side)),
-                Part(f"seam_{name}", "seam", seam(self.path, coarse, side)),
                 Part(f"brow_{name}", "brow", self._brows[side].at(posed)),
             ]
         return parts + [Part(name, "lash", row.at(coarse)) for name, row in self._lashes]
+
+    def strokes_of(self, pose: LidPose) -> dict[int, float]:
+        """The stroke of each side's lid."""
+        return self.strokes.of(pose.closure)
+
+    def posed_skin(self, pose: LidPose) -> Array:
+        """(n, 3) vertices of the refined skin."""
+        return self.skin.at_strokes(self.strokes_of(pose), self._lower_cm(pose))
+
+    def _coarse(self, pose: LidPose) -> Array:
+        return self.path.at(self.strokes_of(pose), self._lower_cm(pose))
 
     def _lower_cm(self, pose: LidPose) -> tuple[float, float]:
         return pose.vertical_mm / self.view.mm_per_cm, pose.horizontal_mm / self.view.mm_per_cm

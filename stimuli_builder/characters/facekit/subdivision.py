@@ -62,8 +62,8 @@ def _once(faces: Index, count: int) -> tuple[sparse.csr_array, Index]:
     slot = np.arange(4)[None] < sides[:, None]
     corner = faces[slot]
     face = np.repeat(np.arange(len(faces)), sides)
-    place = np.tile(np.arange(4), (len(faces), 1))[slot]
-    following = faces[face, (place + 1) % sides[face]]
+    index_in_face = np.tile(np.arange(4), (len(faces), 1))[slot]
+    following = faces[face, (index_in_face + 1) % sides[face]]
     pairs = np.sort(np.stack([corner, following], -1), axis=1)
     edges, edge = np.unique(pairs, axis=0, return_inverse=True)
     edge = edge.reshape(-1)

@@ -19,9 +19,12 @@ class Detection:
 
     Attributes
     ----------
-    points : (18, 2) or, for one eye, (9, 2) in pixels, in the order of label files.
-    iris : (eyes, 5, 2); centre and four points of each iris's edge.
-    faces : faces seen in the picture; the largest is the one given.
+    points : float64 array
+        (18, 2) or, for one eye, (9, 2) in pixels, in the order of label files.
+    iris : float64 array (eyes, 5, 2)
+        Centre and four points of each iris's edge.
+    faces : int
+        Faces seen in the picture; the largest is the one given.
     """
 
     points: Points
@@ -43,7 +46,8 @@ def eye_points(upper: Points, lower: Points) -> Points:
 
     Parameters
     ----------
-    upper, lower : (k, 2) contours from the outer canthus to the inner, and from the inner to the outer.
+    upper, lower : float64 array (k, 2)
+        Contours from the outer canthus to the inner, and from the inner to the outer.
     """
     return np.concatenate(
         [upper[:1], along(upper, UPPER_SHARES), upper[-1:], along(lower, LOWER_SHARES)], axis=0
@@ -53,6 +57,6 @@ def eye_points(upper: Points, lower: Points) -> Points:
 def along(curve: Points, shares: Sequence[float]) -> Points:
     """Points of a polyline (k, 2) at shares of its length."""
     steps = np.hypot(*np.diff(curve, axis=0).T)
-    place = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = np.array(shares) * place[-1]
-    return np.stack([np.interp(wanted, place, curve[:, axis]) for axis in (0, 1)], axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    targets = np.array(shares) * along[-1]
+    return np.stack([np.interp(targets, along, curve[:, axis]) for axis in (0, 1)], axis=1)

@@ -71,7 +71,8 @@ class Faces:
         faces = self._mesh.process(picture).multi_face_landmarks or []
         answers = []
         for face in faces:
-            points = np.array([(p.x * width - 0.5, p.y * height - 0.5) for p in face.landmark])
+            # MediaPipe cuts its crops by pixel indices, so that 0 is the middle of the first pixel already.
+            points = np.array([(p.x * width, p.y * height) for p in face.landmark])
             box = [*points.min(0).tolist(), *points.max(0).tolist()]
             eyes = [[points[list(part)].tolist() for part in eye] for eye in EYES]
             answers.append({"box": box, "eyes": eyes})
@@ -113,14 +114,14 @@ class Eye:
         packet = packet_creator.create_image(image_format=image_frame.ImageFormat.SRGB, data=crop)
         self._graph.add_packet_to_input_stream("image", packet.at(self._time))
         self._graph.wait_until_idle()
-        found = {}
+        landmarks = {}
         for name, points in self._out.items():
             points = points.copy()
             if flip:
                 points[:, 0] = SIDE - 1 - points[:, 0]
-            found[name] = (points - SIDE / 2) / scale + [x, y]
-        contour = found["contour"]
-        return [contour[list(UPPER)].tolist(), contour[list(LOWER)].tolist(), found["iris"].tolist()]
+            landmarks[name] = (points - SIDE / 2) / scale + [x, y]
+        contour = landmarks["contour"]
+        return [contour[list(UPPER)].tolist(), contour[list(LOWER)].tolist(), landmarks["iris"].tolist()]
 
 
 def read(count: int) -> bytes:

@@ -38,6 +38,15 @@ def test_synthesise_then_mixed_and_ordinal_read_the_export_as_is(call, tmp_path)
     assert found["synthetic"] is True
     assert [e["effect"] for e in found["effects"]] == ["lower_lid"]
     assert found["n_items"] == 20
+    code, out, _ = call("mixed", "ratings.csv", "--df", "kenward-roger", "--intervals", "--json", "few.json")
+    assert code == 0
+    assert "Kenward and Roger's degrees of freedom" in " ".join(out.split())
+    assert "profile likelihood" in out
+    assert max(map(len, out.splitlines())) <= 80
+    few = json.loads((tmp_path / "few.json").read_text(encoding="utf-8"))
+    assert few["df_method"] == "kenward-roger"
+    assert all(row["ci"][0] < row["estimate"] < row["ci"][1] for row in few["coefficients"])
+    assert all(row["ci"] is None for row in found["coefficients"])
     code, out, _ = call("ordinal", "ratings.csv")
     assert code == 0
     assert "lower_lid" in out

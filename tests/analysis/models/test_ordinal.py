@@ -131,6 +131,20 @@ def test_slopes_equal_those_of_clmm():
     assert without.effects[0].p_value < ours.effects[0].p_value / 5
 
 
+def test_effects_that_so_few_ratings_leave_open_are_refused_in_one_line():
+    cells = ["ct", "cm", "pt", "ct", "pm", "pm", "cm", "pt"]
+    rows = pd.DataFrame(
+        [
+            (person, a, b, f"clip{number}", int(rating))
+            for person, ratings in (("P", "44233343"), ("Q", "35244444"))
+            for number, ((a, b), rating) in enumerate(zip(cells, ratings, strict=True))
+        ],
+        columns=["participant", "A", "B", "clip", "rating"],
+    )
+    with pytest.raises(InputError, match=r"too few ratings or participants to tell .* apart"):
+        fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip", slopes="main")
+
+
 def test_correlated_slopes_are_refused():
     rows = pd.read_csv(GOLDEN.parent / "ordinal_slopes.csv")
     with pytest.raises(InputError, match="expected all, main or none"):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 from typer.testing import CliRunner
 
 from analysis.cli import app
@@ -148,6 +149,42 @@ def test_the_command_writes_what_it_promises(tmp_path: Path) -> None:
     assert told["items"][0]["p"] is None
     assert {"ability", "se", "p", "rank"} <= told["items"][1].keys()
     assert told["method"] == "bradley-terry"
+
+
+def test_contrasts_are_printed_with_both_errors_and_which_to_read(tmp_path: Path) -> None:
+    """Raters who agree with themselves more than with others: robust errors are the larger ones."""
+    rows = []
+    for rater in range(8):
+        favourite = "abac"[rater % 4]
+        for left, right in (("a", "b"), ("b", "c"), ("a", "c")) * 4:
+            chosen = favourite if favourite in (left, right) else left
+            rows.append((left, right, chosen, f"r{rater}"))
+    path, out = tmp_path / "t.csv", tmp_path / "o.json"
+    text = "\n".join(",".join(row) for row in rows)
+    path.write_text(f"left,right,winner,id\n{text}\n", encoding="utf-8")
+    call = ["pairs", str(path), "--participant", "id", "--json", str(out)]
+    done = CliRunner().invoke(app, call)
+    assert done.exit_code == 0, done.output
+    contrasts = json.loads(out.read_text())["contrasts"]
+    for one in contrasts:
+        assert one["se_robust"] > 1.5 * one["se"]
+        t = one["difference"] / one["se_robust"]
+        assert one["p_robust"] == pytest.approx(2 * stats.t.sf(abs(t), 7))
+        cells = next(line for line in done.output.splitlines() if f"{one['first']} - {one['second']}" in line)
+        for printed in (one["se"], one["se_robust"]):
+            assert f"{printed:.3f}" in cells
+        assert f"{t:.2f}" in cells
+    ordered = sorted(contrasts, key=lambda one: one["p_robust"])
+    assert ordered[0]["p_robust_holm"] == pytest.approx(min(1.0, 3 * ordered[0]["p_robust"]))
+    assert "the robust p are those to report" in " ".join(done.output.split())
+    assert max(map(len, done.output.replace(str(tmp_path), "").splitlines())) <= 80
+
+
+def test_without_raters_the_table_says_whose_errors_it_has(tmp_path: Path) -> None:
+    rows = [("a", "b", "left"), ("b", "a", "left"), ("a", "b", "left")]
+    done = CliRunner().invoke(app, ["pairs", str(table(tmp_path, rows))])
+    assert "robust SE" not in done.output
+    assert "with raters named there are robust ones too" in " ".join(done.output.split())
 
 
 @pytest.mark.parametrize(

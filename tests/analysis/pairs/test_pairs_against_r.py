@@ -38,6 +38,8 @@ def test_abilities_equal_r(key: str, table: str, method: Any, order: bool) -> No
     assert result.log_likelihood == pytest.approx(expected["logLik"], rel=1e-10)
     if "robust" in expected:
         np.testing.assert_allclose([i.se_robust for i in result.items], expected["robust"], rtol=1e-6)
+        against_first = [c.se_robust for c in result.contrasts if c.first == REFERENCE["items"][0]]
+        np.testing.assert_allclose(against_first, expected["robust"][1:], rtol=1e-6)
     if order:
         assert result.order_effect is not None
         assert result.order_effect.estimate == pytest.approx(expected["order"], rel=1e-7)

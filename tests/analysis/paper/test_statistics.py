@@ -25,6 +25,9 @@ def only(text: str):
         "r(48) = .31, p = .028",
         "z = 2.33, p = .020",
         "F(1, 18) = 0.2, p > .05",
+        "F(1, 18) = 0.00, p = .947, partial η² = .00, 95% CI [.00, .07]",
+        "F(1, 18) = 0.00, p = 1.000",
+        "t(18) = 0.00, p = .998",
         "F(1, 40) = 9.00, p = .005, generalised η² = .05",
     ],
 )
@@ -42,6 +45,7 @@ def test_what_fits_is_consistent(text) -> None:
         ("F(1, 30) = 4.56, p = .041, η² = .40", "inconsistent", "partial η² of .13"),
         ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.20, .40]", "inconsistent", "does not hold"),
         ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.10, .14]", "inconsistent", "noncentral F"),
+        ("F(1, 18) = 0.00, p = .90", "inconsistent", "gives p = .9"),
         ("r(48) = .31, p = 1.2", "inconsistent", "no probability"),
     ],
 )

@@ -16,6 +16,7 @@ from analysis.read.study_answers import load_csv
 from experiments import rules
 from experiments.errors import InputError
 from experiments.load import load_experiment
+from experiments.schema.canonical import definition_sha256
 from tests.analysis.comparisons_file import compare, row_of, write_comparisons
 from tests.analysis.ratings_file import change
 from tests.conftest import REPOSITORY
@@ -110,6 +111,33 @@ def test_a_check_is_failed_by_another_answer_than_asked(tmp_path, rows) -> None:
     assert [run["participant"] for run in found.numbers["exclusions"]["runs"]] == ["P00"]
 
 
+def in_two_series(rows, first: str, second: str):
+    """The same answers in two data series, each under a declaration with this hash."""
+    both = []
+    for series, digest in enumerate((first, second), start=1):
+        of = {"data_series": series, "study_version": series, "definition_sha256": digest}
+        both += [row | of | {"run": f"{row['run']}-{series}"} for row in rows]
+    return both
+
+
+def test_a_declaration_chooses_the_series_that_was_made_with_it(tmp_path, rows) -> None:
+    own = definition_sha256(DEMO)
+    for first, second, series in ((own, "f" * 64, 1), ("f" * 64, own, 2), ("e" * 64, "f" * 64, 2)):
+        said = report(tmp_path, in_two_series(rows, first, second)).decisions
+        assert said[0] == f"answers of data series {series}, origin simulated"
+        assert f"data series {series}: {len(rows)} rows of others left aside" in said
+        assert not any("analysed together" in line for line in said)
+        foreign = [line for line in said if "another declaration than the one given" in line]
+        assert bool(foreign) == (own not in (first, second))
+
+
+def test_versions_of_one_series_are_counted_without_those_left_aside(tmp_path, rows) -> None:
+    rows = in_two_series(rows, "e" * 64, definition_sha256(DEMO))
+    rows = change(rows, lambda row: row["run"] == "r3-2", definition_sha256="d" * 64)
+    said = report(tmp_path, rows).decisions
+    assert "2 versions of the experiment's declaration were used; analysed together" in said
+
+
 def test_origins_are_not_pooled(tmp_path, rows) -> None:
     mixed = change(rows, lambda row: row["run"] == "r1", run_origin="participant", synthetic=0)
     found = report(tmp_path, mixed)
@@ -190,7 +218,8 @@ def test_every_table_sentence_and_figure_of_simulated_data_says_so(tmp_path, row
 
 def test_the_same_comparisons_give_the_same_report(tmp_path, rows) -> None:
     one, two = (report(tmp_path, rows).parts[0] for _ in range(2))
-    assert dataclasses.replace(one, draw=two.draw, more=two.more) == two
+    assert dataclasses.replace(one, draw=two.draw, more=two.more, beside=two.beside) == two
+    assert one.beside("") == two.beside("")
     assert [picture.svg for picture in one.draw()] == [picture.svg for picture in two.draw()]
 
 

@@ -3,21 +3,28 @@
 import csv
 import json
 import random
+from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
+from analysis.plans.clip_rating import READING
+from analysis.plans.prepare import study_contents
+from analysis.read.study_answers import load_csv
+from analysis.report.write import write_report
 from experiments import design
 from experiments.load import load_experiment
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.scales import scales_of
+from tests.analysis.report.test_latex import well_formed
 from tests.conftest import REPOSITORY
 
 TOML = REPOSITORY / "experiments" / "sliders-demo.toml"
 DEMO = load_experiment(str(TOML))
 SCALES = scales_of(DEMO)
+WITH_RULES = DEMO.model_copy(update={"exclusions": load_experiment("exp3").exclusions[:2]})
 
 
 @pytest.fixture
@@ -41,12 +48,16 @@ def rows() -> list[dict[str, object]]:
     return rows
 
 
-def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> None:
-    path = tmp_path / "r.csv"
+def write(path: Path, rows: list[dict[str, object]]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, RATINGS.csv_header(DEMO.factor_names))
         writer.writeheader()
         writer.writerows(rows)
+
+
+def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> None:
+    path = tmp_path / "r.csv"
+    write(path, rows)
     out = tmp_path / "out"
     done = CliRunner().invoke(
         app, ["run", str(TOML), "--csv", str(path), "--out", str(out), "--no-sensitivity"]
@@ -66,6 +77,36 @@ def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> No
     assert len(list(out.glob("*.svg"))) >= len(SCALES)
 
 
+def test_each_scale_has_its_companions_models_and_multiverse(tmp_path, rows) -> None:
+    path, out, steps = tmp_path / "r.csv", tmp_path / "out", list[str]()
+    write(path, rows)
+    contents = study_contents(WITH_RULES, load_csv(path, WITH_RULES, READING))
+    write_report(contents, out, more=True, progress=steps.append)
+    text = (out / "report.md").read_text(encoding="utf-8")
+    for title in ("Bayes factors", "Robust companions", "Linear mixed model", "Multiverse of exclusions"):
+        assert text.count(f"### {title}") == len(SCALES)
+    for scale in SCALES:
+        assert f"{scale.name}: multiverse of exclusions" in steps
+        assert (out / f"{scale.name}-figure-multiverse.png").is_file()
+        assert (out / f"{scale.name}-mixed-verify.R").is_file()
+    made = (out / "report.tex").read_text(encoding="utf-8")
+    well_formed(made, out)
+    for scale in SCALES:
+        assert f"tab:{scale.name}-robust" in made
+        assert f"fig:{scale.name}-figure-multiverse" in made
+
+
+def test_the_multiverse_of_a_scale_is_that_of_the_scale_alone(tmp_path, rows) -> None:
+    path = tmp_path / "r.csv"
+    write(path, rows)
+    answers = load_csv(path, WITH_RULES, READING)
+    among = study_contents(WITH_RULES, answers).parts[1].more(lambda _: None)
+    alone = study_contents(WITH_RULES, answers, scale=SCALES[1].name).parts[0].more(lambda _: None)
+    assert [table.rows for section in among for table in section.tables] == [
+        table.rows for section in alone for table in section.tables
+    ]
+
+
 def alpha_of(rows: list[dict[str, object]]) -> float:
     """Cronbach's alpha by its definition: k / (k - 1) (1 - sum of variances / variance of the sum)."""
     turned = []
@@ -79,10 +120,7 @@ def alpha_of(rows: list[dict[str, object]]) -> float:
 
 def report_of(tmp_path, rows, *options):
     path, out = tmp_path / "r.csv", tmp_path / "n.json"
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, RATINGS.csv_header(DEMO.factor_names))
-        writer.writeheader()
-        writer.writerows(rows)
+    write(path, rows)
     done = CliRunner().invoke(
         app, ["run", "sliders_demo", "--csv", str(path), "--json", str(out), "--no-report", *options]
     )

@@ -96,6 +96,26 @@ def test_each_series_is_the_fit_of_its_own_trials(tmp_path, rows) -> None:
     assert (numbers["kind"], numbers["n_participants"], numbers["n_trials"]) == ("threshold", 6, len(rows))
 
 
+def test_the_report_leads_with_the_answer_for_people(tmp_path, rows) -> None:
+    contents = report(tmp_path, rows)
+    part, numbers = contents.parts[0], contents.numbers
+    keys = [table.key for table in part.tables]
+    assert keys[0] == "threshold-means"
+    assert keys.index("threshold-differences") < keys.index("thresholds")
+    means = {numbers["labels"][mean["condition"]]: mean for mean in numbers["means"]}
+    assert {row[0]: row[2] for row in part.tables[0].rows} == {
+        label: f"{mean['mean']:.3f}" for label, mean in means.items()
+    }
+    assert all(any(label in line and "on average" in line for line in part.brief) for label in means)
+
+
+def test_of_one_person_the_fit_over_all_trials_leads(tmp_path, rows) -> None:
+    alone = [row for row in rows if row["participant"] == "P0"]
+    part = report(tmp_path, alone).parts[0]
+    assert part.tables[0].key == "thresholds"
+    assert "over all trials" in part.brief[0]
+
+
 def test_series_are_compared_within_people(tmp_path, rows) -> None:
     numbers = report(tmp_path, rows).numbers
     names = [series.name for series in series_of(EXPERIMENT)]

@@ -14,6 +14,7 @@ from analysis.plans.prepare import study_contents
 from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents
+from analysis.report.numbers import fixed
 from analysis.report.write import write_report
 from analysis.thresholds.plane import counted_points, fit_plane
 from experiments.definition import Experiment
@@ -87,10 +88,15 @@ def rows() -> list[dict[str, object]]:
     return rows_of(WITHIN)
 
 
+@pytest.fixture(scope="module")
+def within(rows: list[dict[str, object]], tmp_path_factory: pytest.TempPathFactory) -> Contents:
+    return report(tmp_path_factory.mktemp("within"), WITHIN, rows)
+
+
 def test_each_series_is_the_fit_of_its_own_trials_over_both_factors(
-    tmp_path: Path, rows: list[dict[str, object]]
+    within: Contents, rows: list[dict[str, object]]
 ) -> None:
-    contents = report(tmp_path, WITHIN, rows)
+    contents = within
     for series in series_of(WITHIN):
         mine = [row for row in rows if row["series"] == series.name]
         x = np.array([float(str(row["value"])) for row in mine])
@@ -110,13 +116,11 @@ def test_each_series_is_the_fit_of_its_own_trials_over_both_factors(
         assert abs(fit.tilt - TILT) < 4 * fit.tilt_se
         means = contents.numbers["means"][series.name]
         assert means["threshold"]["people"] == 6
-    assert any("moved by" in sentence for sentence in contents.parts[0].sentences)
+    assert any("Its tilt, the change per unit of" in sentence for sentence in contents.parts[0].sentences)
 
 
-def test_series_are_compared_in_pairs_in_threshold_and_tilt(
-    tmp_path: Path, rows: list[dict[str, object]]
-) -> None:
-    numbers = report(tmp_path, WITHIN, rows).numbers
+def test_series_are_compared_in_pairs_in_threshold_and_tilt(within: Contents) -> None:
+    numbers = within.numbers
     assert [one["what"] for one in numbers["differences"]] == ["threshold", "tilt"]
     for one in numbers["differences"]:
         each = {
@@ -153,8 +157,22 @@ def test_series_of_two_groups_are_compared_by_welch(tmp_path: Path, experiment: 
 GROUPS = {True: ({"s1", "s2"},), False: ({"s1", "s2"}, {"s3", "s4"}, {"s1", "s4"})}
 
 
-def test_the_report_has_its_tables_and_lines(tmp_path: Path, rows: list[dict[str, object]]) -> None:
-    paths = [path.name for path in write_report(report(tmp_path, WITHIN, rows), tmp_path / "report")]
+def test_the_report_says_how_the_threshold_tilts_with_its_interval(within: Contents) -> None:
+    for series, label in within.numbers["labels"].items():
+        fit = within.numbers["population"][series]
+        assert fit["people"] == 6
+        assert fit["tilt_ci"]["low"] < TILT < fit["tilt_ci"]["high"]
+        [sentence] = [said for said in within.parts[0].sentences if said.startswith(f"{label}: ")]
+        interval = f"{fixed(fit['tilt_ci']['low'], 3)} to {fixed(fit['tilt_ci']['high'], 3)}"
+        assert f"was {fixed(fit['tilt'], 3)} (95% CI {interval}), so that it depends on Character" in sentence
+    parameters = within.parts[0].tables[0]
+    assert [row[0] for row in parameters.rows[:2]] == [
+        f"{label}, 6 people" for label in within.numbers["labels"].values()
+    ]
+
+
+def test_the_report_has_its_tables_and_lines(tmp_path: Path, within: Contents) -> None:
+    paths = [path.name for path in write_report(within, tmp_path / "report")]
     assert {"report.html", "figure-thresholds.svg"} <= set(paths)
     text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
     assert "Threshold along Character" in text

@@ -91,3 +91,30 @@ def test_the_figure_is_byte_stable(plan, tmp_path):
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
     with pytest.raises(InputError, match="ending"):
         save_power_figure(result, tmp_path / "power.gif")
+
+
+def test_a_study_of_several_scales_has_the_power_of_the_expected_f():
+    """F(1, 11) = 9 of 12 participants fixes dz; ratings of 1 to 5 are coarse, which costs some."""
+    power = {}
+    for scale in (None, "eeriness"):
+        own = make_plan("sliders-demo", effects=["character=9"], scale=scale)
+        result = simulate_power(own, [12, 30], 1500, seed=4)
+        assert result.effects == ("character",)
+        power[scale] = result.power[0]
+    exact = [stats.ncf.sf(stats.f.isf(0.05, 1, n - 1), 1, n - 1, n * 9 / 12) for n in (12, 30)]
+    assert power["eeriness"] == pytest.approx(exact, abs=0.05)
+    assert (power[None] > 0.3).all()
+    assert (power[None] < power["eeriness"]).all()
+
+
+@pytest.mark.parametrize(
+    ("study", "options", "said"),
+    [
+        ("sliders-demo", {"effects": ["character=9"], "scale": "eerines"}, "did you mean 'eeriness'"),
+        ("sliders-demo", {}, "name the effects that you expect, for example --effect character=6.5"),
+        ("pairs-demo", {"effects": ["character=9"]}, "this needs trials with a scale"),
+    ],
+)
+def test_what_a_study_without_published_figures_needs_is_said(study, options, said):
+    with pytest.raises(InputError, match=said):
+        make_plan(study, **options)

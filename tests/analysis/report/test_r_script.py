@@ -1,7 +1,5 @@
 """The report's R script computes its tables anew: where R is, it agrees, and it finds a changed number."""
 
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -11,59 +9,75 @@ from analysis.cli import app
 from analysis.plans.result import analyse_cells
 from analysis.read.long_csv import read_long_table
 from analysis.report.r_script import r_files
-from analysis.report.verify_with_r import verify_with_r
 from analysis.within.cell_means import cell_table
 from experiments.errors import InputError
+from tests.analysis.report.r_process import needed, run_together
 
 GOLDEN = Path(__file__).parents[2] / "golden/r"
 CALL = ("--participant", "participant", "--rating", "rating")
+OF_CELLS = "--participant participant --rating rating --within A,B"
+OF_GROUPS = "--participant id --rating y --within phase,hour --between treatment,gender --covariate age"
+CASES = {
+    "within": ("within/complete_2.csv", f"{OF_CELLS} --equivalence -0.3,0.5"),
+    "both": ("between/obk_age.csv", f"{OF_GROUPS} --equivalence 1.5"),
+    "between": ("between/between_only.csv", "--participant id --rating y --between g,h --type 2"),
+    "few": ("within/few_participants_2.csv", OF_CELLS),
+    "box": ("box_m.csv", "--participant id --rating score --within A,B --between group"),
+    "changed": ("between/between_only.csv", "--participant id --rating y --between g,h"),
+}
 
 
-def has_afex() -> bool:
-    """Whether R and the packages of the script are installed."""
-    rscript = shutil.which("Rscript")
-    call = [rscript or "", "-e", "library(afex); library(emmeans)"]
-    return rscript is not None and subprocess.run(call, capture_output=True, check=False).returncode == 0
-
-
-needs_r = pytest.mark.skipif(not has_afex(), reason="R with afex and emmeans is not installed")
-
-
-def report(folder: Path, file: str, *options: str) -> Path:
-    call = ["anova", str(GOLDEN / file), "--out", str(folder), *options]
+def report(folder: Path, file: str, options: str) -> Path:
+    call = ["anova", str(GOLDEN / file), "--out", str(folder), *options.split()]
     told = CliRunner().invoke(app, call)
     assert told.exit_code == 0, told.output
     return folder / "verify.R"
 
 
-@needs_r
-@pytest.mark.parametrize(
-    ("file", "options"),
-    [
-        ("within/complete_2.csv", "--participant participant --rating rating --within A,B"),
-        (
-            "between/obk_age.csv",
-            "--participant id --rating y --within phase,hour --between treatment,gender --covariate age",
-        ),
-        ("between/between_only.csv", "--participant id --rating y --between g,h --type 2"),
-    ],
-)
-def test_r_agrees_with_every_number(tmp_path, file, options) -> None:
-    said = verify_with_r([report(tmp_path, file, *options.split())])
-    assert "Every number agrees with R." in said
-    assert "DIFFER" not in said
-
-
-@needs_r
-def test_r_finds_a_changed_number(tmp_path) -> None:
-    script = report(tmp_path, "within/complete_2.csv", *CALL, "--within", "A,B")
-    data = (tmp_path / "cell-means.csv").read_text().splitlines()
+@pytest.fixture(scope="module")
+def of_r(tmp_path_factory) -> dict[str, str]:
+    """What R says of every case; of `changed` one cell mean is another."""
+    needed("afex", "car", "emmeans")
+    folder = tmp_path_factory.mktemp("r")
+    scripts = [report(folder / name, *case) for name, case in CASES.items()]
+    path = folder / "changed" / "cell-means.csv"
+    data = path.read_text().splitlines()
     *cells, mean = data[1].split(",")
     data[1] = ",".join([*cells, str(float(mean) + 0.01)])
-    (tmp_path / "cell-means.csv").write_text("\n".join(data))
-    with pytest.raises(InputError, match="DIFFER") as caught:
-        verify_with_r([script])
-    assert "\n" not in str(caught.value)
+    path.write_text("\n".join(data))
+    return dict(zip(CASES, run_together(scripts), strict=True))
+
+
+@pytest.mark.parametrize("case", [name for name in CASES if name != "changed"])
+def test_r_agrees_with_every_number(of_r, case) -> None:
+    assert "Every number agrees with R." in of_r[case], of_r[case]
+    assert "DIFFER" not in of_r[case]
+
+
+@pytest.mark.parametrize(
+    ("case", "tables"),
+    [
+        ("within", "sizes    partial, sizes    general, sizes    interval, sizes    mv interv."),
+        ("within", "dz       dz, dz       interval, bayes    BF10, tost     A, tost     B"),
+        (
+            "both",
+            "adjusted, contrast, effects  Pillai, simple   F, simple   p, dz       interval, levene   F",
+        ),
+        ("both", "bayes    BF10, tost     treatment, tost     hour"),
+        ("between", "sizes    interval, dz       dz, levene   p"),
+        ("box", "levene   F, box      M"),
+    ],
+)
+def test_every_kind_of_number_is_compared(of_r, case, tables) -> None:
+    for table in tables.split(", "):
+        assert f"\n{table}" in of_r[case]
+
+
+def test_r_finds_a_changed_number(of_r) -> None:
+    differing = [line for line in of_r["changed"].splitlines() if line.endswith("DIFFER")]
+    kinds = {line.split()[0] for line in differing}
+    assert {"effects", "means", "pairs", "sizes", "dz"} <= kinds
+    assert "Some numbers DIFFER from R." in of_r["changed"]
 
 
 def test_names_and_levels_that_r_would_read_as_code_stay_text(tmp_path) -> None:

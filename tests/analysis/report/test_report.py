@@ -13,8 +13,9 @@ from analysis.plans.clip_rating import READING, analyse_study
 from analysis.plans.result import Analysis, analyse_cells
 from analysis.plans.sensitivity import bayes_factors
 from analysis.read.study_answers import StudyAnswers, load_csv
-from analysis.report.formats import Table, as_latex, as_markdown, as_text, latex_text, wrap
+from analysis.report.formats import Table, as_markdown, as_text, wrap
 from analysis.report.json_output import as_data
+from analysis.report.latex import as_latex, latex_text
 from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
 from analysis.report.sentences import sentences
 from analysis.report.tables import all_tables, paper_table
@@ -109,8 +110,8 @@ def test_report_is_whole_marked_self_contained_and_byte_stable(tmp_path) -> None
         write_report(contents_of(analysis_of("exp3", tmp_path, 6)), folder)
     names = sorted(path.name for path in one.iterdir())
     assert names == [
-        *("cell-means.csv", "figure-lower-lid.png", "figure-lower-lid.svg", "report.html", "report.md"),
-        *("results.json", "tables.tex", "verify.R"),
+        *("cell-means.csv", "figure-lower-lid.png", "figure-lower-lid.svg", "report.docx"),
+        *("report.html", "report.md", "report.tex", "results.json", "tables.tex", "verify.R"),
     ]
     assert all((one / name).read_bytes() == (two / name).read_bytes() for name in names)
     html = (one / "report.html").read_text(encoding="utf-8")
@@ -151,7 +152,7 @@ def test_names_are_escaped_everywhere(tmp_path) -> None:
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<script>" not in html
     assert "&lt;i&gt;&amp;" in html
-    assert r"x\_y|\%" in (tmp_path / "tables.tex").read_text(encoding="utf-8")
+    assert r"x\_y\textbar{}\%" in (tmp_path / "tables.tex").read_text(encoding="utf-8")
     assert "x_y\\|%" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
@@ -193,7 +194,7 @@ def test_numbers_are_printed_as_apa_has_them(made, text) -> None:
 
 def test_text_wraps_and_latex_escapes() -> None:
     assert max(map(len, wrap("word " * 60, 40))) <= 40
-    assert latex_text("a_b & 5% < η²") == r"a\_b \& 5\% $<$ $\eta$$^2$".replace("$$", "")
+    assert latex_text("a_b & 5% < η²") == r"a\_b \& 5\% \ensuremath{<} \ensuremath{\eta}\ensuremath{^2}"
     table = Table("k", "Title", ("a", "b"), (("x" * 90, "1"),))
     assert max(map(len, as_text(table).splitlines())) <= 80
     assert "\\toprule" in as_latex(table)

@@ -39,7 +39,7 @@ def test_the_ratings_give_every_printed_figure(name, seed, tmp_path):
     plan = make_plan(name)
     made = synthesise(plan, seed)
     assert not made.missed
-    write_ratings(made, tmp_path / "ratings.csv")
+    write_ratings([made], tmp_path / "ratings.csv")
     rows = read_rows(tmp_path / "ratings.csv")
     factors = list(plan.space.factors)
     levels = dict(zip(plan.space.factors, plan.space.levels, strict=True))
@@ -89,7 +89,7 @@ def test_the_impossible_mean_is_named_with_its_reason():
 def test_every_row_is_marked_and_has_the_columns_of_the_export(tmp_path):
     plan = make_plan("exp3", 12)
     out = tmp_path / "ratings.csv"
-    count = write_ratings(synthesise(plan, 4), out)
+    count = write_ratings([synthesise(plan, 4)], out)
     experiment = load_experiment("exp3")
     with out.open(newline="", encoding="utf-8") as handle:
         reader = csv.DictReader(handle)
@@ -106,8 +106,8 @@ def test_every_row_is_marked_and_has_the_columns_of_the_export(tmp_path):
 def test_same_seed_same_file(tmp_path):
     plan = make_plan("exp3")
     for name in ("a.csv", "b.csv"):
-        write_ratings(synthesise(plan, 9), tmp_path / name)
-    write_ratings(synthesise(plan, 10), tmp_path / "c.csv")
+        write_ratings([synthesise(plan, 9)], tmp_path / name)
+    write_ratings([synthesise(plan, 10)], tmp_path / "c.csv")
     first = (tmp_path / "a.csv").read_bytes()
     assert first == (tmp_path / "b.csv").read_bytes()
     assert first != (tmp_path / "c.csv").read_bytes()
@@ -136,7 +136,7 @@ def test_an_effect_wished_away_takes_its_printed_means_along():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("exp9",), "no published figures for 'exp9'"),
+        (("exp9",), "no experiment 'exp9'"),
         (("exp3", 4), "at least 5 participants"),
         (("exp3", None, ["lower_lid=4"]), "factor.level=4.80"),
         (("exp3", None, ["lower_lid.boht=4"]), "did you mean 'both'"),

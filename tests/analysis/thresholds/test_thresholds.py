@@ -111,6 +111,7 @@ def test_the_command_writes_pooled_people_and_means(tmp_path: Path) -> None:
     assert told["pooled"]["all"]["threshold"] == pytest.approx(5.3, abs=0.6)
     assert [one["participant"] for one in told["people"]] == ["00", "01", "02", "03"]
     assert told["means"][0]["people"] == 4
+    assert done.output.index("mean over people") < done.output.index("over all trials")
 
 
 @pytest.mark.parametrize(

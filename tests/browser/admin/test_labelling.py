@@ -81,6 +81,15 @@ def test_points_are_labelled_undone_and_saved_as_stimuli_reads_them(
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
 
+    # In the view of the whole frame, where points overlap, a press on a centre takes that point.
+    page.get_by_role("button", name="Whole frame").click()
+    for number in range(18):
+        point = page.locator(f'circle.point[data-point="{number}"]')
+        box = point.bounding_box()
+        assert box is not None
+        page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        expect(point).to_have_attribute("aria-pressed", "true")
+
     before = place_of(page, 0)
     box = page.locator('circle.point[data-point="0"]').bounding_box()
     assert box is not None

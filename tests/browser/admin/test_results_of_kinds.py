@@ -16,7 +16,7 @@ from tests.browser.admin.conftest import Dashboard
 from tests.browser.admin.test_walk import shoot
 from tests.browser.server_process import ServerProcess
 from tests.browser.visit import axe_violations
-from tests.server.trials.test_thresholds import Api
+from tests.helpers.simulated import Api
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 PEOPLE = {"pairs-demo": 3, "sliders-demo": 2, "threshold-demo": 1, "timing-continuous": 2}
@@ -58,7 +58,7 @@ def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> 
             )
             link = process.link(study, "general", synthetic=True)
             for number in range(people):
-                person = Person(Api(client), Rater(number, 1, {}))  # type: ignore[arg-type]
+                person = Person(Api(client), Rater(number, 1, {}))
                 assert person.take_part(link)
     process.start()
     yield process

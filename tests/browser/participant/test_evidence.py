@@ -15,7 +15,7 @@ pytestmark = pytest.mark.browser
 
 @pytest.fixture
 def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
-    """A server that refuses answers without evidence."""
+    """A server that refuses answers and views without evidence."""
     process = ServerProcess(tmp_path / "data", evidence="refuse")
     yield process
     process.stop()
@@ -37,4 +37,9 @@ def test_every_answer_of_the_page_brings_its_evidence(
     with_clips = [row for row in evidence if row["clip_ms"] > 0]
     assert [row["digest_right"] for row in with_clips] == [1] * len(with_clips)
     assert all('"presses"' in row["interaction"] for row in evidence)
-    assert strict.rows("SELECT DISTINCT evidence FROM study_runs") == [{"evidence": "asked"}]
+    runs = strict.rows("SELECT evidence, view_tickets FROM study_runs")
+    assert runs == [{"evidence": "asked", "view_tickets": 1}]
+    views = strict.rows("SELECT completed, outcome, issued_at, clip_ms FROM views")
+    assert len(views) == len(with_clips)
+    assert all(view["issued_at"] and view["completed"] and view["clip_ms"] > 0 for view in views)
+    assert strict.rows("SELECT type FROM run_events WHERE type LIKE '%refused'") == []

@@ -11,6 +11,12 @@ from tests.browser.visit import Visit, axe_violations, fit_card
 
 pytestmark = pytest.mark.browser
 EVENTS = "SELECT type, data FROM run_events"
+RATED_AT_THE_OTHER_RATE = "SELECT 1 FROM ratings WHERE refresh_rate_hz BETWEEN 47.55 AND 47.65"
+# Stamps that are 21 ms apart, 47.6 Hz, however late the machine calls.
+OTHER_REFRESH_RATE = """
+    let stamp = 0;
+    window.requestAnimationFrame = (draw) => setTimeout(() => draw((stamp += 21)), 1);
+"""
 
 
 def reasons(server: ServerProcess) -> str:
@@ -226,6 +232,25 @@ def test_zoom_keeps_the_size_and_another_screen_asks_again(
     visit_or_asked(page, visit)
     page.wait_for_selector("text=Your screen has changed")
     assert axe_violations(page) == []
+    page.evaluate(OTHER_REFRESH_RATE)
+    page.click(".primary")
+    fit_card(page)
+    page.click("text=It is, within")
+    visit.trials(most=1)
+    assert server.rows_soon(RATED_AT_THE_OTHER_RATE, 1)
+
+
+def test_a_clip_shown_on_another_screen_before_the_size_is_known_there_is_flagged(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin().instructions().practice()
+    page.wait_for_selector(".ready")
+    page.evaluate("Object.defineProperty(screen, 'width', {value: 3000, configurable: true})")
+    visit.rate()
+    row = server.rows_soon("SELECT * FROM ratings WHERE kind = 'main' AND method = 'webcodecs'", 1)[0]
+    assert "zoomed" in row["disturbances"]
 
 
 def visit_or_asked(page: Page, visit: Visit) -> None:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page
@@ -10,9 +11,10 @@ from playwright.sync_api import Page
 from server.cli_common import migrated_services
 from server.models import View, ViewClip
 from server.views.frame_log import unpacked
+from tests.browser.analysed import analysed
 from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN
-from tests.browser.visit import axe_violations
+from tests.browser.visit import Visit, axe_violations
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -37,12 +39,13 @@ IN_TURN = PAIRS.replace(
     'arrangement = "side_by_side", if_too_narrow = "stack"',
     'arrangement = "one_after_the_other", gap_ms = 100',
 )
+STACKED = PAIRS.replace('arrangement = "side_by_side", if_too_narrow = "stack"', 'arrangement = "stacked"')
 
 
 @pytest.fixture(scope="module")
 def studies(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[Served]:
     """A server that refuses answers whose clips were not there."""
-    made = {"pairs": (PAIRS, 8), "long_pairs": (PAIRS, 60), "in_turn": (IN_TURN, 8)}
+    made = {"pairs": (PAIRS, 8), "long_pairs": (PAIRS, 60), "in_turn": (IN_TURN, 8), "stacked": (STACKED, 8)}
     with serve(tmp_path_factory.mktemp("pairs"), made, evidence="refuse") as served:
         yield served
 
@@ -56,7 +59,7 @@ def answer(page: Page, key: str) -> None:
     page.wait_for_selector(".pair-answers", state="detached")
 
 
-def test_pairs_by_keyboard(studies: Served, page: Page) -> None:
+def test_pairs_by_keyboard(studies: Served, page: Page, tmp_path: Path) -> None:
     visit = studies.visit("pairs", page)
     for key in ("ArrowRight", "3"):
         show_to_answers(page)
@@ -82,6 +85,56 @@ def test_pairs_by_keyboard(studies: Served, page: Page) -> None:
         assert (left, right) == ("left", "right")
         assert one == other
         assert len(one) > 0
+    said = analysed(studies.server, "pairs", tmp_path)
+    assert "origin participant" in said
+    assert "Choices in each pair" in said
+
+
+def logs_of(studies: Served) -> list[dict[str, list[tuple[int, float]]]]:
+    """The frame log of each clip of each view of the run begun last, by role."""
+    ids = [view["id"] for view in studies.views()]
+    with migrated_services(studies.server.settings) as services, services.database.read() as session:
+        clips = session.query(ViewClip).where(ViewClip.view.in_(ids)).order_by(ViewClip.view).all()
+        return [
+            {clip.role: unpacked(clip.frame_log) for clip in clips if clip.view == one} for one in sorted(ids)
+        ]
+
+
+def rows_after(studies: Served, page: Page, visit: Visit, keys: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Answer a pair by each key, every screen accessible, and give what the server stored."""
+    for key in keys:
+        show_to_answers(page)
+        assert axe_violations(page) == []
+        answer(page, key)
+    visit.trials()
+    assert visit.problems == []
+    return stored(studies)
+
+
+def test_pairs_above_one_another(studies: Served, page: Page) -> None:
+    visit = studies.visit("stacked", page)
+    page.wait_for_selector(".ready")
+    box = page.locator(".trial canvas").bounding_box()
+    assert box is not None
+    rows = rows_after(studies, page, visit, ("1", "2"))
+    assert [row["winner"] for row in rows] == ["left", "right"], "the upper clip is the left one"
+    assert [row["arrangement"] for row in rows] == ["stacked"] * 2
+    width, height = page.viewport_size["width"], page.viewport_size["height"]
+    assert (box["width"] <= width, box["height"] <= height) == (True, True)
+    for logs in logs_of(studies):
+        assert list(logs) == ["left", "right"]
+        assert logs["left"] == logs["right"], "one clock draws both"
+
+
+def test_pairs_in_turn_with_the_declared_gap(studies: Served, page: Page) -> None:
+    visit = studies.visit("in_turn", page)
+    rows = rows_after(studies, page, visit, ("1", "3"))
+    assert [row["winner"] for row in rows] == ["left", "tie"], "the first clip is the left one"
+    assert [row["arrangement"] for row in rows] == ["one_after_the_other"] * 2
+    for logs in logs_of(studies):
+        assert sorted(logs) == ["first", "second"]
+        end, begin = logs["first"][-1][1], logs["second"][0][1]
+        assert begin - end >= 100, "the gap is not shorter than declared"
 
 
 @pytest.mark.parametrize(

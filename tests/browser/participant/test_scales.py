@@ -34,6 +34,7 @@ not_applicable = { en = "I cannot say" }
 STUDY = re.sub(
     r"(?s)\[trial\].*?(?=\[\[forms)", lambda _: SCALES, without(PLAIN, ("trials = 1", "trials = 0"))
 )
+IN_TURN = STUDY.replace("pointer_delay_ms = 0", 'pointer_delay_ms = 0\narrangement = "one_after_the_other"')
 
 
 def at_the_scales(page: Page, press_start: bool = True) -> None:
@@ -106,3 +107,29 @@ def test_touch_on_a_small_screen(
     assert answers["natural"]["response"] == 2
     assert 15 <= answers["eerie"]["response"] <= 35
     context.close()
+
+
+def test_scales_come_one_after_another_where_declared(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", IN_TURN)
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin().instructions()
+    page.wait_for_selector(".ready")
+    page.keyboard.press(" ")
+    page.wait_for_selector(".key")
+    assert (page.locator(".key").count(), page.locator(".slider").count()) == (3, 0)
+    assert axe_violations(page) == []
+    page.keyboard.press("2")
+    page.wait_for_selector(".slider.untouched")
+    assert page.locator(".key").count() == 0, "the scale before has gone"
+    assert axe_violations(page) == []
+    page.mouse.click(*slider_at(page, 0.5))
+    page.locator(".trial .actions .primary").click()
+    page.wait_for_selector(".ready")
+    (row,) = server.rows_soon("SELECT payload FROM trial_ratings", 1)
+    answers = json.loads(row["payload"])["answers"]
+    assert answers["natural"]["response"] == 2
+    assert 45 <= answers["eerie"]["response"] <= 55
+    assert answers["natural"]["rt"] < answers["eerie"]["rt"], "each scale has its own time"
+    assert visit.problems == []

@@ -2,13 +2,16 @@
 
 import logging
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.browser.server_process import ServerProcess
+from tests.helpers.processor_waits import ProcessorWaits
 from tools.scope.browser import program
+from tools.scope.compare import POLL_MS, REFRESH_MS, Play
 from tools.scope.conditions import CONDITIONS
 from tools.scope.display import Display, missing_here
 from tools.scope.measure import measure
@@ -47,7 +50,8 @@ def test_what_is_recorded_was_on_the_screen(
     if program(browser) is None:
         pytest.skip(f"no {browser} here: run `make setup-test`")
     before_others = os.geteuid() == 0
-    row = measure(display, running, tmp_path, browser, FPS, CONDITIONS["idle"], PLAYS, before_others)
+    with ProcessorWaits(own_lateness=not before_others) as waits:
+        row = measure(display, running, tmp_path, browser, FPS, CONDITIONS["idle"], PLAYS, before_others)
     LOG.info("%s", cells(row))
     assert row.lost == 0
     measured = [play for play in row.plays if play.is_measured]
@@ -55,10 +59,19 @@ def test_what_is_recorded_was_on_the_screen(
     drawn = {index for play in measured for index, _ in play.record.drawn}
     seen = {index for play in measured for index, _ in play.sight.onsets}
     assert seen <= drawn
-    right = [play for play in measured if play.is_right]
-    if os.getloadavg()[0] <= (os.cpu_count() or 1):
-        assert len(right) == len(measured)
-        assert not any(play.is_off for play in measured)
+    for play in measured:
+        waited_ms = waits.within(*on_the_wall_clock(play))
+        LOG.info(
+            "off %.1f ms, late %.1f ms, waited %.1f ms", play.worst_off_ms, play.worst_late_ms, waited_ms
+        )
+        assert max(play.worst_off_ms, play.worst_late_ms) <= REFRESH_MS + POLL_MS + waited_ms
+        assert play.missing * 1000 / FPS <= waited_ms
+
+
+def on_the_wall_clock(play: Play) -> tuple[float, float]:
+    """From the start key to the end of the clip, in ms."""
+    offset_ms = 1000 * (time.time() - time.monotonic())
+    return play.pressed_ms + offset_ms, play.sight.ended_ms + offset_ms
 
 
 def test_as_many_views_are_stored_as_were_on_the_screen(

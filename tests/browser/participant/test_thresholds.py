@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page
 
+from tests.browser.analysed import analysed
 from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations
@@ -84,7 +85,7 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(studies: Served,
     assert all(row["threshold_sd"] for row in rows)
 
 
-def test_two_clips_in_turn(studies: Served, page: Page) -> None:
+def test_two_clips_in_turn(studies: Served, page: Page, tmp_path: Path) -> None:
     visit = studies.visit("in_turn", page)
     show_to_answers(page)
     assert axe_violations(page) == []
@@ -98,6 +99,7 @@ def test_two_clips_in_turn(studies: Served, page: Page) -> None:
     assert [row["response"] for row in rows] == ["first", "second", "second", "first"]
     assert all(bool(row["correct"]) == (row["response"] == row["interval"]) for row in rows)
     assert {row["verdict"] for row in rows} <= {"good", "uncertain", "flagged"}
+    assert "origin participant" in analysed(studies.server, "in_turn", tmp_path)
 
 
 @pytest.mark.parametrize(("study", "chosen"), [("yes_no", "yes"), ("in_turn", "first")])

@@ -19,7 +19,7 @@ SHORT, MIDDLE, LONG = 20, 60, 100
 PLAIN_TRIALS = without(
     PLAIN,
     ("trials = 1", "trials = 0"),
-    ("[display]", "[playback]\nfail_on_focus_lost = false\n\n[display]"),
+    ("[playback]", "[playback]\nfail_on_focus_lost = false"),
 )
 FULL_SCREEN = without(PLAIN_TRIALS, ("full_screen = false", "full_screen = true"))
 TWO_TRIALS = without(PLAIN_TRIALS, ('split_by = "character"\n', ""), ("per_cell = 3", "per_cell = 1"))
@@ -176,10 +176,16 @@ def as_before(page: Page) -> None:
     page.set_viewport_size({"width": 1280, "height": 800})
 
 
-def disturbed_view(studies: Served, page: Page, disturb: Callable[[Page], object], number: int) -> set[str]:
-    """What is stored to have disturbed the view of the run's next trial, of which this happens."""
+def disturbed_view(
+    studies: Served, page: Page, disturb: Callable[[Page], object], number: int, *, before: bool = False
+) -> set[str]:
+    """What is stored to have disturbed the view of the run's next trial, in or before which this happens."""
+    page.wait_for_selector(".ready")
+    if before:
+        disturb(page)
     start_clip(page)
-    disturb(page)
+    if not before:
+        disturb(page)
     page.wait_for_selector(".scale")
     as_before(page)
     page.keyboard.press("4")
@@ -199,13 +205,23 @@ def test_what_disturbs_a_view_is_recorded_and_flags_it(studies: Served, window: 
     assert "zoomed" in disturbed_view(studies, window, zoomed, 3)
 
 
-def test_full_screen_left_is_recorded_and_flags_the_view(studies: Served, window: Page) -> None:
+def test_a_zoom_before_the_start_key_disturbs_the_view_too(studies: Served, window: Page) -> None:
+    studies.visit("long_clips", window)
+    assert "zoomed" in disturbed_view(studies, window, zoomed, 1, before=True)
+
+
+def leave_full_screen(page: Page) -> None:
+    page.evaluate("document.exitFullscreen()")
+    page.wait_for_function("document.fullscreenElement === null")
+
+
+@pytest.mark.parametrize("before", [False, True], ids=["in the clip", "before the start key"])
+def test_full_screen_left_is_recorded_and_flags_the_view(studies: Served, window: Page, before: bool) -> None:
     visit = Visit(window, studies.server.address).open(studies.studies["full_screen"].link_token).begin()
     window.wait_for_selector("text=Go to full screen")
     window.click(".primary")
     visit.instructions()
-    seen = disturbed_view(studies, window, lambda page: page.evaluate("document.exitFullscreen()"), 1)
-    assert "full_screen_left" in seen
+    assert "full_screen_left" in disturbed_view(studies, window, leave_full_screen, 1, before=before)
 
 
 def test_an_undisturbed_view_is_recorded_as_one(studies: Served, page: Page) -> None:

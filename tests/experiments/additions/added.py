@@ -176,9 +176,18 @@ import { messages as english, type Messages } from "./en";
 export const messages: Messages = { ...english, continue: "Fortsätt" };
 """
 
+SWEDISH_CHECKS = """\
+\"""Words of motion checks in Swedish, a sentence of them.\"""
+
+from dataclasses import replace
+
+from experiments.check_words.en import WORDS as ENGLISH
+from experiments.check_words.words import DIGITS, Asked
+
+WORDS = replace(ENGLISH, digit=Asked("Vilken siffra såg du?", DIGITS))
+"""
+
 LANGUAGE: dict[str, str | Edit] = {
+    "experiments/check_words/sv.py": SWEDISH_CHECKS,
     "frontend/src/i18n/languages/sv.ts": SWEDISH,
-    "frontend/src/i18n/reviewed.ts": Edit(
-        'on: "2026-11-21" } };', 'on: "2026-11-21" }, sv: { by: "a reader", on: "2026-11-22" } };'
-    ),
 }

@@ -21,7 +21,7 @@ from server.migrate import upgrade
 from server.settings import Settings
 from server.simulation.person import Person, Rater
 from server.studies.lookup import find_study
-from tests.experiments.trials.toy.api import Api
+from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, add_study
 
 FIELD = """\
@@ -58,7 +58,7 @@ def main(folder: Path) -> dict[str, Any]:
     link = study.link(synthetic=True)
     with TestClient(create_app(settings)) as client:
         for seed in range(3):
-            assert Person(Api(client), Rater(seed, 1, {})).take_part(link)  # type: ignore[arg-type]
+            assert Person(Api(client), Rater(seed, 1, {})).take_part(link)
     with services.database.read() as session:
         stored = find_study(session, "short", OPERATOR, "view")
         table = b"".join(FORMATS["csv"](session, stored, "simulated"))

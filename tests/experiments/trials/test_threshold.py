@@ -12,6 +12,7 @@ from experiments.trials.counts import block_sizes
 from experiments.trials.threshold import THRESHOLD
 from experiments.trials.threshold.grid import Point, model, points, seconds, series_of, stimuli
 from tests.experiments.trials.test_kinds import text_with
+from tests.helpers.thresholds import TWO_INTERVAL
 
 FACTORS = """
 [[factors]]
@@ -37,19 +38,7 @@ stimulus = { factor = "duration" }
 task = { asks = "yes_no", yes = { en = "Yes", de = "Ja" }, no = { en = "No", de = "Nein" } }
 stop = { trials = 12, at_least = 8, sd = 20.0 }
 """
-TWO = """
-[trial]
-kind = "threshold"
-question = { en = "Which?" , de = "Welcher?" }
-stimulus = { factor = "duration" }
-stop = { trials = 12 }
-
-[trial.task]
-asks = "two_interval"
-standard = "100"
-first = { en = "1", de = "1" }
-second = { en = "2", de = "2" }
-"""
+TWO = TWO_INTERVAL.replace("trials = 6", "trials = 12")
 
 
 def text_of(trial: str = YES_NO) -> str:

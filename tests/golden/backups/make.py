@@ -16,7 +16,7 @@ HERE = Path(__file__).resolve().parent
 
 
 def main() -> None:
-    """One finished visit, one begun."""
+    """One finished visit, one begun, one whose person is known to a recruiter, with the key file."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         settings = Settings(
@@ -34,7 +34,10 @@ def main() -> None:
             first.rate_all()
             second = Participant(client, study.link_token).agree()
             second.rate(second.state()["trials"][0], comment="an open visit")
-        back_up(services, HERE / f"{newest_revision()}.tar", with_clips=False)
+            known = Participant(client, study.link(recruiter={"kind": "sona"}))
+            known.start(query={"survey_code": "40177"})
+        name = f"{newest_revision()}.tar"
+        back_up(services, HERE / name, with_clips=False, keys=HERE / f"{newest_revision()}.keys.json")
         services.database.close()
 
 

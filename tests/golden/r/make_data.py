@@ -108,8 +108,53 @@ def write_model(name, participants, sizes, clips, kept, slopes, kind):
         writer.writerows(model_rows(rng, participants, sizes, clips, kept, slopes, kind))
 
 
+def write_far_apart():
+    """Ordinal ratings of people whose intercepts have SD 4: Laplace's approximation is poor."""
+    rng = np.random.default_rng(5)
+    with (HERE / "models" / "ordinal_far_apart.csv").open("w", newline="") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["participant", "A", "rating"])
+        for person in range(8):
+            own = rng.normal(0, 4)
+            for level, _ in itertools.product(range(3), range(30)):
+                latent = 0.6 * level + own + rng.logistic()
+                writer.writerow(
+                    [person + 1, f"a{level}", int(np.searchsorted([-1.5, -0.5, 0.5, 1.5], latent)) + 1]
+                )
+
+
+def hard_rows(seed, people, items, levels, crossed):
+    """Continuous ratings of items that people see at every level, or (not crossed) at one."""
+    rng = np.random.default_rng(seed)
+    own, slopes, of_item = (
+        rng.normal(0, 1, people),
+        rng.normal(0, 0.5, (people, levels)),
+        rng.normal(0, 0.5, items),
+    )
+    for person, item in itertools.product(range(people), range(items)):
+        for level in range(levels) if crossed else [item % levels]:
+            value = 4 + 0.3 * level + own[person] + slopes[person, level] + of_item[item] + rng.normal()
+            yield [person + 1, f"i{item}", f"a{level}", round(float(value), 2)]
+
+
+def write_hard(name, rows):
+    with (HERE / f"hard_{name}.csv").open("w", newline="") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["participant", "item", "A", "score"])
+        writer.writerows(rows)
+
+
+def write_hard_cases():
+    write_hard("three_people", hard_rows(4, 3, 4, 2, crossed=True))
+    rows = list(hard_rows(5, 9, 9, 3, crossed=False))
+    kept = np.sort(np.random.RandomState(5).choice(len(rows), len(rows) - 6, replace=False))
+    write_hard("flat_profile", [rows[k] for k in kept])
+
+
 if __name__ == "__main__":
     for name, case in WITHIN.items():
         write_within(name, *case)
     for name, case in MODELS.items():
         write_model(name, *case)
+    write_far_apart()
+    write_hard_cases()

@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,11 +22,13 @@ from experiments.load import FOLDER
 from experiments.seal import deviations, read_clips_sha256, read_seal
 from server.accounts.identity import OPERATOR
 from server.app import create_app
-from server.capsules.build import Wanted, _without_answers, build_capsule
+from server.capsules.build import CapsuleContents, _without_answers, build_capsule
 from server.context import Services, open_services
+from server.models import Job
 from server.seals.service import seal_plan
 from server.settings import Settings
 from server.studies.lookup import find_study
+from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import Participant, add_study
 from tests.server.export.test_psych_ds import VALIDATOR
 
@@ -79,7 +82,7 @@ def _take_part(person: Participant, number: int) -> None:
 @pytest.fixture(scope="module")
 def capsule(opened: Services) -> Path:
     target = opened.settings.data_folder / "exp3-capsule.zip"
-    build_capsule(opened, "exp3", Wanted(sensitivity=False), target)
+    build_capsule(opened, "exp3", CapsuleContents(sensitivity=False), target)
     return target
 
 
@@ -326,7 +329,7 @@ def test_answers_to_motion_checks_stay_out() -> None:
 
 def test_the_clips_can_stay_out(opened: Services, tmp_path: Path) -> None:
     target = tmp_path / "small.zip"
-    build_capsule(opened, "exp3", Wanted(clips=False, sensitivity=False), target)
+    build_capsule(opened, "exp3", CapsuleContents(clips=False, sensitivity=False), target)
     with zipfile.ZipFile(target) as archive:
         assert not [name for name in archive.namelist() if name.endswith(".mp4")]
         assert len(json.loads(archive.read("materials/manifest.json"))["clips"][0]["sha256"]) == 64
@@ -335,5 +338,41 @@ def test_the_clips_can_stay_out(opened: Services, tmp_path: Path) -> None:
 
 def test_a_study_without_answers_has_no_capsule(opened: Services, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the report, which could not be made"):
-        build_capsule(opened, "exp3", Wanted(origin="pilot"), tmp_path / "none.zip")
+        build_capsule(opened, "exp3", CapsuleContents(origin="pilot"), tmp_path / "none.zip")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def owner(opened: Services) -> Iterator[Admin]:
+    app = create_app(opened.settings)
+    with TestClient(app) as client:
+        yield signed_in(client, app.state.services, "owner")
+
+
+def test_a_capsule_is_made_and_downloaded_from_the_dashboard(owner: Admin, tmp_path: Path) -> None:
+    order = {"origin": "participant", "clips": False, "sensitivity": False}
+    begun = owner.send("POST", "/studies/exp3/capsules", order)
+    assert begun.status_code == 202, begun.text
+    until = time.monotonic() + 300
+    while any(one["status"] in ("queued", "running") for one in owner.get("/studies/exp3/capsules").json()):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    made = owner.get("/studies/exp3/capsules").json()[-1]
+    assert (made["status"], made["message"]) == ("done", "")
+    target = tmp_path / "capsule.zip"
+    target.write_bytes(owner.get(f"/studies/exp3/capsules/{made['id']}.zip").content)
+    assert target.stat().st_size == made["bytes"]
+    (unpacked := tmp_path / "opened").mkdir()
+    capsule, _ = open_capsule(target, unpacked)
+    assert capsule.sha256 == made["sha256"]
+
+
+def test_one_capsule_of_a_study_at_a_time(opened: Services, owner: Admin) -> None:
+    with opened.database.write() as session:
+        study = find_study(session, "exp3", OPERATOR, "view")
+        job = Job(public_id="a" * 32, kind="capsule", study_id=study.id, status="queued", message="")
+        session.add(job)
+    refused = owner.send("POST", "/studies/exp3/capsules", {})
+    with opened.database.write() as session:
+        session.delete(session.merge(job))
+    assert (refused.status_code, "being made already" in refused.text) == (409, True)

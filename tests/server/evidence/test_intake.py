@@ -16,7 +16,7 @@ from server.evidence.repository import has_refusals
 from server.evidence.service import judge_run
 from server.models import AnswerEvidence, RunEvent, StudyRun
 from tests.helpers.evidence import Watcher
-from tests.helpers.studies import Participant, StudyInDatabase
+from tests.helpers.studies import Participant, StudyInDatabase, clip_url
 from tests.server.evidence.conftest import CLIP_S
 
 SHOWN_S = CLIP_S + 1.0
@@ -155,7 +155,7 @@ def test_a_page_from_before_an_upgrade_is_taken_with_the_digest_of_the_bytes(wat
     trial = with_clips(watcher.state())[0]
     watcher.wait(SHOWN_S)
     given = watcher.evidence(trial)
-    given["digest"] = older_digest(given["ticket"], watcher.client.get(trial["clip_url"]).content)
+    given["digest"] = older_digest(given["ticket"], watcher.client.get(clip_url(trial)).content)
     assert watcher.answer(trial, given).status_code == 201
 
 
@@ -199,12 +199,22 @@ def test_a_page_from_before_the_upgrade_begins_without_evidence(
     assert rows(services) == []
 
 
+def begun(watcher: Watcher, trial: Any) -> dict[str, Any]:
+    """A view that begins, with its ticket."""
+    given = watcher.evidence(trial)
+    return {
+        "id": str(uuid.uuid4()),
+        "trial_index": trial["trial_index"],
+        "number": 1,
+        "started_at_client": watcher.moment.isoformat(),
+        "evidence": {"batch": given["batch"], "ticket": given["ticket"]},
+    }
+
+
 def test_an_answer_after_a_reload_needs_no_second_view(watcher: Watcher) -> None:
     """The clip was seen by the tickets of the page before; those of the reloaded page are seconds old."""
     first, second = with_clips(watcher.state())[:2]
-    view = {"id": str(uuid.uuid4()), "trial_index": first["trial_index"], "number": 1}
-    view["started_at_client"] = watcher.moment.isoformat()
-    assert watcher.request("POST", "/views", {"views": [view]}).status_code == 200
+    assert watcher.request("POST", "/views", {"views": [begun(watcher, first)]}).status_code == 200
     watcher.wait(SHOWN_S)
     watcher.state()
     watcher.wait(0.1)
@@ -214,12 +224,8 @@ def test_an_answer_after_a_reload_needs_no_second_view(watcher: Watcher) -> None
 
 def test_views_told_of_at_once_are_no_time_to_watch_them(watcher: Watcher) -> None:
     trials = with_clips(watcher.state())
-    begun = [
-        {"id": str(uuid.uuid4()), "trial_index": trial["trial_index"], "number": 1}
-        | {"started_at_client": watcher.moment.isoformat()}
-        for trial in trials
-    ]
-    watcher.request("POST", "/views", {"views": begun})
+    views = [begun(watcher, trial) for trial in trials]
+    assert watcher.request("POST", "/views", {"views": views}).status_code == 200
     watcher.wait(SHOWN_S)
     watcher.state()
     watcher.wait(0.1)
@@ -241,6 +247,18 @@ def test_an_expired_ticket_is_refused_and_costs_the_run_nothing(watcher: Watcher
         assert session.scalars(kinds).all() == ["answer_expired"]
         [run] = session.scalars(select(StudyRun))
         assert not has_refusals(session, run)
+
+
+def test_more_trusted_presses_than_presses_are_refused(watcher: Watcher, services: Services) -> None:
+    """A share above one would pass for a person's."""
+    trial = with_clips(watcher.state())[0]
+    watcher.wait(SHOWN_S)
+    claimed = {"presses": 2, "trusted": 3, "press_ms": 90.0, "moves": 5}
+    answer = watcher.answer(trial, watcher.evidence(trial, interaction=claimed))
+    assert code(answer) == "422 invalid"
+    assert "at most as many trusted presses as presses, got 3 of 2" in answer.text
+    assert rows(services) == []
+    assert watcher.answer(trial).status_code == 201
 
 
 def test_a_replayed_ticket_brings_no_second_answer(watcher: Watcher, services: Services) -> None:
@@ -282,7 +300,7 @@ def test_each_refusal_has_the_one_error_shape_and_is_noted_once(watcher: Watcher
             assert set(answer.json()) == {"error"}
             assert set(answer.json()["error"]) == {"code", "message", "details"}
     with services.database.read() as session:
-        noted = [event.data["code"] for event in session.scalars(select(RunEvent))]
+        noted = [event.data["code"] for event in session.scalars(select(RunEvent).order_by(RunEvent.id))]
     assert sorted(code for code in noted if code) == sorted(
         ("ticket_invalid", "ticket_of_another_trial", "clip_digest_missing", "clip_digest_differs")
     )

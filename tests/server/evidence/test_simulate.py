@@ -7,6 +7,7 @@ import pytest
 from sqlalchemy import select
 
 from server.context import Services
+from server.evidence.signals import GUESSED_BY_CHANCE
 from server.models import StudyRun
 from server.simulation.manners import MANNERS
 from tests.helpers.databases import run_server_command
@@ -25,6 +26,7 @@ EXPECTED = {
     "assistive": {"unclear"},
     "honest": {"likely", "unclear"},
 }
+BY_LUCK = {"http-slow": "unclear", "assistive": "likely"}
 PEOPLE = 2
 
 
@@ -32,6 +34,12 @@ PEOPLE = 2
 def study(services: Services, quick_folder: Path) -> StudyInDatabase:
     """Clips of three seconds, ten motion checks."""
     return add_study(services, quick_folder / "clips", STUDY, frames=CLIP_FRAMES)
+
+
+def allowed(manner: str, signals: dict[str, float]) -> set[str]:
+    """The verdicts on a run; of those who guess, one in a hundred is right as often as who sees."""
+    lucky = manner in BY_LUCK and signals["motion_checks_guessed"] < GUESSED_BY_CHANCE
+    return EXPECTED[manner] | ({BY_LUCK[manner]} if lucky else set())
 
 
 def test_every_manner_has_an_expectation() -> None:
@@ -43,13 +51,14 @@ def test_a_manner_is_simulated_judged_and_written(
     services: Services, study: StudyInDatabase, tmp_path: Path, manner: str
 ) -> None:
     out = tmp_path / "runs.json"
-    command = ("simulate", study.name, "--as", manner, "--participants", str(PEOPLE), "--json", str(out))
+    command = ("simulate", study.name, "--as", manner, "--participants", str(PEOPLE), "--at-once", "1")
+    command += ("--json", str(out))
     called = run_server_command(services.settings, *command)
     assert (called.returncode, called.stderr) == (0, "")
     assert f"{PEOPLE} as {manner}" in called.stdout
     runs = json.loads(out.read_text(encoding="utf-8"))["runs"]
     assert len(runs) == PEOPLE
-    assert {run["verdict"] for run in runs} <= EXPECTED[manner]
+    assert all(run["verdict"] in allowed(manner, run["signals"]) for run in runs)
     if manner == "honest":  # one person in a hundred may be doubted, not both of two
         assert "likely" in {run["verdict"] for run in runs}
     with services.database.read() as session:

@@ -84,3 +84,9 @@ def test_every_experiment_has_scripts_that_parse(name: str, language: str, tmp_p
 def declared(name: str) -> Experiment:
     folder = Path(load_experiment.__code__.co_filename).parent
     return load_experiment(str(folder / f"{name}.toml"))
+
+
+def test_random_factors_are_random_in_the_script_and_not_compared() -> None:
+    written = script(load_experiment("faces-demo"), "R", "ratings.csv")
+    assert 'within <- c("profile")' in written
+    assert '"(1 | participant)", "(1 | `face`)", "(1 | `face`:`profile`)"' in written

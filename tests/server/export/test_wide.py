@@ -9,6 +9,9 @@ from experiments.columns.form_columns import form_columns
 from experiments.load import parse_experiment
 from server.context import Services
 from server.export.excel import guarded_cell
+from server.export.scripts import LANGUAGES, script
+from server.export.wide import cells_of
+from tests.conftest import REPOSITORY
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 from tests.server.trials.test_comparisons import PAIRS
@@ -119,3 +122,14 @@ def test_a_last_play_without_an_answer_leaves_the_earlier_one_standing(
     [row] = rows_of(viewer, "wide.csv")
     assert row["answers"] == "1"
     assert [value for name, value in row.items() if name.startswith("rating_") and value] == ["6.0"]
+
+
+def test_a_level_that_is_not_rated_has_no_column_and_is_none_in_scripts() -> None:
+    text = (REPOSITORY / "experiments" / "dcr-demo.toml").read_text(encoding="utf-8")
+    rated = parse_experiment(text)
+    not_rated = parse_experiment(text.replace("rate_itself = true", "rate_itself = false"))
+    assert [cell.levels for cell in cells_of(rated)] == [("both",), ("vertical",), ("none",)]
+    assert [cell.levels for cell in cells_of(not_rated)] == [("vertical",), ("none",)]
+    for language in LANGUAGES:
+        assert '"both"' in script(rated, language, "ratings.csv")
+        assert '"both"' not in script(not_rated, language, "ratings.csv")

@@ -2,6 +2,8 @@
 
 import json
 import re
+import uuid
+from pathlib import Path
 from typing import Any
 
 from fastapi.testclient import TestClient
@@ -16,7 +18,8 @@ from server.methods.repository import Number
 from server.methods.service import methods_of
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
-from tests.helpers.studies import Participant, StudyInDatabase
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+from tests.server.trials.test_motion_checks import answered, checked, of_kind, right_answers
 
 
 def taken_part(client: TestClient, study: StudyInDatabase) -> None:
@@ -51,7 +54,14 @@ def test_the_counts_are_those_of_the_runs(
     assert "2 were completed" in answer["paragraph"]
     assert "attention checks failed" in answer["paragraph"]
     with services.database.read() as session:  # as somebody who doubts a number would
+        declared = [one for one in answer["numbers"] if one["source"].startswith("declaration: ")]
+        assert {one["name"]: one["value"] for one in declared} == {
+            "attention_per_block": 1,
+            "motion_checks_per_block": 0,
+        }
         for one in answer["numbers"]:
+            if one in declared:
+                continue
             assert session.scalar(text(one["source"])) == one["value"], one["name"]
 
 
@@ -100,3 +110,40 @@ def test_latex_has_no_sign_that_means_something(words: str) -> None:
     made: Any = Methods("s", "participant", 1, (f"x {words} {{n}}",), numbers).latex().splitlines()[1]
     bare = re.sub(r"\\textbackslash\{\}|\\textasciitilde\{\}|\\[&%$#_{}]", "", made)
     assert not set(bare) & set("&%$#_{}~\\")
+
+
+def test_motion_checks_are_told_with_how_many_were_right(
+    client: TestClient, services: Services, tmp_path: Path, viewer: Admin
+) -> None:
+    study = add_study(services, tmp_path / "clips", checked(SHORT))
+    right = right_answers(services, "short")
+    asked = 0
+    for takes_other_way in (False, True):
+        person = Participant(client, study.link_token).agree()
+        first, second, *others = of_kind(person.state(), "check")
+        asked += 2 + len(others)
+        if takes_other_way:
+            body = {"answer": {"kind": "check", "check": None, "other_way": True}}
+            body |= {"trial_index": first["trial_index"], "playback": {"method": "none"}}
+            assert person.request("PUT", f"/ratings/{uuid.uuid4()}", body).status_code == 201
+        else:
+            assert answered(person, first, right[first["clip_sha256"]]).status_code == 201
+        assert answered(person, second, right[second["clip_sha256"]]).status_code == 201
+        for trial in others:
+            assert answered(person, trial, right[trial["clip_sha256"]] % 4 + 1).status_code == 201
+        person.answer_all()
+        assert person.request("POST", "/complete").status_code == 200
+    numbers = {one["name"]: one["value"] for one in viewer.get("/studies/short/methods").json()["numbers"]}
+    assert {name: value for name, value in numbers.items() if name.startswith("motion")} == {
+        "motion_checks_per_block": 2,
+        "motion_checks": asked - 1,
+        "motion_checks_right": 3,
+        "motion_checks_other_way": 1,
+    }
+    with services.database.read() as session:
+        declared_study = find_study(session, "short", OPERATOR, "view")
+        written = methods_of(session, declared_study, "participant", None).latex()
+    assert "motion alone (digit, direction)" in written
+    assert "% motion\\_checks" not in written
+    assert "% motion_checks_right = 3: SELECT count(*)" in written
+    assert "% motion_checks_per_block = 2: declaration: evidence.motion_checks.per_block" in written

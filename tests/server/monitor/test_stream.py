@@ -17,8 +17,9 @@ from server.models import AdminSession
 from server.settings import Settings
 from server.stopping import Stopping
 from tests.helpers.admins import Admin, signed_in
+from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase
-from tests.server.test_durability import free_port, start
+from tests.server.test_durability import start
 
 STREAM = "/studies/short/monitor/stream"
 

@@ -22,8 +22,8 @@ def test_an_installation_in_order(services: Services, study: StudyInDatabase) ->
     close_to_others(services.settings)
     found = by_subject(services)
     assert [finding for finding in found.values() if finding.verdict == "failed"] == []
-    assert found["clips"].found == "8, all there"
-    assert found["studies"].found == "1"
+    assert found["clips"].state == "8, all there"
+    assert found["studies"].state == "1"
 
 
 class TestTroubles:
@@ -38,7 +38,7 @@ class TestTroubles:
         wrong = open_services(services.settings.model_copy(update=changes))
         found = by_subject(wrong)
         wrong.database.close()
-        assert found["clips"].found == "1 of 8 missing or cut short"
+        assert found["clips"].state == "1 of 8 missing or cut short"
         assert found["secret key"].advice == f"run: chmod 600 {key}"
         assert "https" in found["public address"].advice
         assert found["admin page"].verdict == "failed"

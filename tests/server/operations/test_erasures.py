@@ -8,7 +8,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select
 
 from server.context import Services, open_services
-from server.models import AuditEntry, RecruiterIdentity, StudyRun
+from server.identities.repository import keep
+from server.identities.sealing import KnownAs
+from server.models import AuditEntry, StudyRun
 from server.operations import erasures
 from server.operations.backup import back_up
 from server.operations.restore import restore
@@ -32,7 +34,7 @@ def test_every_visit_of_the_same_person_is_erased(
     with services.database.write() as session:
         for visit, identifier in zip(visits, ("5a9d", "5a9d", "77b2"), strict=True):
             run = session.scalars(select(StudyRun).where(StudyRun.public_id == visit.run_id)).one()
-            session.add(RecruiterIdentity(study_run_id=run.id, identifier=identifier))
+            keep(session, run, run.study.pseudonym_key, KnownAs(identifier))
     first, second, other = (visit.run_id for visit in visits)
     answer = experimenter.send("POST", f"{RUNS}/{first}/erase", {"confirm": first})
     assert answer.status_code == 200

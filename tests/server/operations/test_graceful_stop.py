@@ -13,8 +13,9 @@ from server.context import Services
 from server.settings import Settings
 from server.simulation.http import JsonClient
 from server.simulation.person import Person, Rater
+from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase
-from tests.server.test_durability import free_port, start
+from tests.server.test_durability import start
 
 RATERS = 4
 

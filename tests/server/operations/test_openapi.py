@@ -26,6 +26,17 @@ def operations(client: TestClient) -> list[Any]:
     return [operation for operation in found if not operation.path.endswith(STREAMS)]
 
 
+def pairs(files: Any) -> list[tuple[str, Any]]:
+    return list(files.items()) if isinstance(files, dict) else list(files)
+
+
+def as_file(value: Any) -> Any:
+    """What a client can send as a file; a number or the like is made where a schema asks for bytes."""
+    if isinstance(value, tuple):
+        return (value[0], as_file(value[1]), *value[2:])
+    return value if isinstance(value, str | bytes) or hasattr(value, "read") else str(value)
+
+
 def failures(caller: TestClient, found: list[Any], headers: dict[str, str]) -> list[str]:
     """What answered with 500 or more (503 says "not built" or "not ready" in its own shape)."""
     wrong: list[str] = []
@@ -46,6 +57,8 @@ def failures(caller: TestClient, found: list[Any], headers: dict[str, str]) -> l
             given_args.pop("cookies", None)
             if isinstance(given_args.get("data"), bytes):
                 given_args["content"] = given_args.pop("data")
+            if given_args.get("files"):
+                given_args["files"] = [(name, as_file(value)) for name, value in pairs(given_args["files"])]
             answer = caller.request(headers=sent, **given_args)
             if answer.status_code >= 500 and answer.status_code != 503:
                 wrong.append(f"{case.method} {case.formatted_path}: {answer.text[:200]}")

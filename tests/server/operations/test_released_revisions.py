@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from server.context import open_services
+from server.identities.repository import readable
 from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.operations.restore import restore
 from server.operations.rows import Content
@@ -28,7 +29,8 @@ def test_a_released_revision_is_migrated_with_its_rows(
 ) -> None:
     settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "data")
     services = open_services(settings)
-    described = restore(services, backup)
+    keys = backup.with_suffix(".keys.json")
+    described = restore(services, backup, keys=keys if keys.exists() else None)
     assert described.revision == backup.stem
     assert current_revision(services.database) == newest_revision()
 
@@ -37,6 +39,8 @@ def test_a_released_revision_is_migrated_with_its_rows(
             return {table.name: content_of(connection, table) for table in tables_of(connection)}
 
     migrated = contents()
+    if keys.exists():
+        assert migrated["identity_keys"].rows == migrated["recruiter_identities"].rows == 1
     assert migrated["trial_ratings"].rows == described.tables["trial_ratings"].rows == 13
     downgrade(services.database)
     upgrade(services.database)
@@ -46,5 +50,6 @@ def test_a_released_revision_is_migrated_with_its_rows(
         }
     assert current_revision(services.database) == newest_revision()
     with services.database.read() as session:
+        assert all(readable(session))
         assert list(Recount(services.versions).differing(session)) == []
     services.database.close()

@@ -33,7 +33,7 @@ def test_two_backups_a_minute_apart_leave_the_one_of_twenty_days_ago(
         assert called.returncode == 0, called.stderr
     assert old.exists()
     assert own.exists()
-    assert len(list(tmp_path.iterdir())) == 4
+    assert len(list(tmp_path.glob("*.tar"))) == 4
 
 
 def test_beyond_the_days_everything_goes_and_each_day_keeps_its_last() -> None:

@@ -142,6 +142,10 @@ def test_an_answer_decides_the_group_and_with_it_the_trials(
     # The page whose answer was lost sends it again and gets the same trials; another group is refused.
     again = person.request("PUT", "/forms/about", answers("right")).json()
     assert again["run"]["trials"] == saved["run"]["trials"]
+    person.accepted = "*/*"  # a page that was open over an upgrade
+    older = person.request("PUT", "/forms/about", answers("right")).json()["run"]["trials"]
+    addresses = [f"/clips/{trial['clip_sha256']}.mp4" for trial in older if trial["clips"]]
+    assert [trial["clip_url"] for trial in older if trial["clips"]] == addresses != []
     changed = person.request("PUT", "/forms/about", answers("left"))
     assert (changed.status_code, changed.json()["error"]["code"]) == (409, "group_decided")
     person.rate_all()
@@ -162,7 +166,10 @@ def test_erasing_leaves_nothing_of_the_answer_that_decided_the_group(
         path = f"/studies/short/runs/{people[-1].run_id}/erase"
         assert experimenter.send("POST", path, {"confirm": people[-1].run_id}).status_code == 200
     with services.database.read() as session:
-        left, right = ({name: getattr(run, name) for name in TOLD} for run in session.query(StudyRun))
+        left, right = (
+            {name: getattr(run, name) for name in TOLD}
+            for run in session.query(StudyRun).order_by(StudyRun.id)
+        )
         assert left == right == {"group_name": "", "slot": NO_SLOT, "status": "complete", "trials_total": 8}
         assert session.query(TrialClip).count() == 0
     # The place is free again.

@@ -1,3 +1,5 @@
+import hashlib
+import json
 import uuid
 from typing import Any
 
@@ -6,7 +8,7 @@ from fastapi.testclient import TestClient
 
 from server.context import Services
 from server.models import Calibration, FormAnswer, RunEvent, Study, StudyRun
-from tests.helpers.studies import Participant, StudyInDatabase
+from tests.helpers.studies import Participant, StudyInDatabase, clip_url
 
 CALIBRATION = {
     "px_per_mm": 3.8,
@@ -35,7 +37,6 @@ def test_the_page_gets_everything_but_the_cells(participant: Participant) -> Non
     ]
     assert [trial["trial_index"] for trial in state["trials"]] == list(range(12))
     clip = state["trials"][0]
-    assert clip["clip_url"] == f"/clips/{clip['clip_sha256']}.mp4"
     assert (clip["frames"], clip["fps"], clip["width_mm"], clip["inter_ocular_px"]) == (4, 30, 120, 128)
     assert (clip["plays_done"], clip["plays_wanted"], clip["answered"]) == (0, 1, False)
     checks = [trial for trial in state["trials"] if trial["kind"] == "attention"]
@@ -45,7 +46,28 @@ def test_the_page_gets_everything_but_the_cells(participant: Participant) -> Non
 
 def test_clips_are_where_the_page_is_told(client: TestClient, participant: Participant) -> None:
     trial = participant.agree().state()["trials"][0]
-    assert len(client.get(trial["clip_url"]).content) == trial["bytes"]
+    content = client.get(clip_url(trial)).content
+    assert hashlib.sha256(content).hexdigest() == trial["clip_sha256"]
+
+
+def test_a_page_of_before_addresses_followed_from_hashes_gets_its_clips(
+    client: TestClient, participant: Participant
+) -> None:
+    """It was open over the upgrade, and says what a browser says by itself."""
+    participant.agree().accepted = "application/json"
+    for trial in participant.state()["trials"]:
+        assert bool(trial["clips"]) == bool(trial["clip_url"])
+        for clip in trial["clips"]:
+            content = client.get(clip["clip_url"]).content
+            assert hashlib.sha256(content).hexdigest() == clip["clip_sha256"]
+            assert (clip["width_px"], clip["inter_ocular_px"]) == (trial["width_px"], 128)
+            assert (trial["clip_url"], trial["bytes"]) == (clip["clip_url"], len(content))
+
+
+def test_the_answer_to_a_start_is_short(participant: Participant) -> None:
+    """It grows with each trial: 166 of them are 91 KB, 16 KB gzipped."""
+    trials = participant.agree().state()["trials"]
+    assert max(len(json.dumps(trial, separators=(",", ":"))) for trial in trials) < 560
 
 
 @pytest.mark.parametrize("header", [None, "Bearer nonsense", "Basic eA=="])

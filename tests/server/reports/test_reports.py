@@ -40,7 +40,10 @@ def test_a_report_is_built_by_a_process_of_its_own(
     assert re.search(r"tickets: Share of answers with a good ticket.*?<td", shown.text, re.S)
     assert 'completed visits hold <a href="#methods-' in shown.text
     for mark in re.findall(r'href="#methods-(\d+)"', shown.text):
-        assert re.search(rf'<li id="methods-{mark}">\w+: <code>SELECT count', shown.text)
+        source = re.search(rf'<li id="methods-{mark}">(\w+): <code>([^<]+)', shown.text)
+        assert source is not None
+        name, query = source.groups()
+        assert query.startswith("declaration: " if name.endswith("_per_block") else "SELECT count"), name
 
 
 def test_a_report_on_no_data_fails_with_a_reason(experimenter: Admin, study: StudyInDatabase) -> None:

@@ -52,8 +52,11 @@ def test_erasure_leaves_a_tombstone_and_nothing_else(
 def test_no_internet_address_is_stored_anywhere(services: Services, participant: Participant) -> None:
     from server.models.base import Base
 
-    names = {column.name for table in Base.metadata.tables.values() for column in table.columns}
-    assert not [name for name in names if name in ("ip", "ip_address", "remote_addr", "address")]
+    names = {str(column) for table in Base.metadata.tables.values() for column in table.columns}
+    names -= {"mailed_links.address"}  # an account's, where letters go to
+    assert not [
+        name for name in names if name.split(".")[1] in ("ip", "ip_address", "remote_addr", "address")
+    ]
 
 
 def test_a_run_of_another_study_is_not_found(viewer: Admin, study: StudyInDatabase) -> None:

@@ -9,16 +9,17 @@ from fastapi.testclient import TestClient
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
 from tests.helpers.tiny_clips import encoded_video
+from tests.helpers.uploads import upload
 
 FILES = [f"blink_{duration}_{number}.mp4" for duration in (100, 167, 233, 300, 367) for number in (1, 2)]
 
 
 def own_study(experimenter: Admin, template: str, files: list[str]) -> Any:
     video = encoded_video(4, 30) + bytes([0, 0, 0, 9]) + b"free"
-    sent = [("files", (name, video + bytes([place]))) for place, name in enumerate(files)]
-    upload = experimenter.client.post("/api/admin/uploads", files=sent).json()
+    sent = [(name, video + bytes([place])) for place, name in enumerate(files)]
+    received = upload(experimenter, *sent).json()
     body = {
-        "name": "own", "upload": upload["id"], "levels": {"pattern": "blink_{duration}_{exemplar}.mp4"},
+        "name": "own", "upload": received["id"], "levels": {"pattern": "blink_{duration}_{exemplar}.mp4"},
         "own_clips": {"title": "Own", "question": "Which?", "template": template},
     }  # fmt: skip
     return experimenter.send("POST", "/studies", body)
@@ -26,7 +27,7 @@ def own_study(experimenter: Admin, template: str, files: list[str]) -> Any:
 
 @pytest.mark.parametrize(
     ("template", "trials"),
-    [("rating", 10), ("sliders", 10), ("acr", 10), ("pairs", 20), ("just_noticeable", 40)],
+    [("rating", 10), ("sliders", 10), ("acr", 10), ("dcr", 10), ("pairs", 20), ("just_noticeable", 40)],
 )
 def test_a_template_is_a_study_that_can_be_taken_part_in(
     client: TestClient, experimenter: Admin, template: str, trials: int
@@ -46,6 +47,16 @@ def test_categories_are_those_of_p910_worst_first(experimenter: Admin) -> None:
     scale = tomllib.loads(own_study(experimenter, "acr", FILES).json()["toml"])["trial"]["scale"]
     assert [label["en"] for label in scale["labels"]] == ["Bad", "Poor", "Fair", "Good", "Excellent"]
     assert (scale["minimum"], scale["maximum"]) == (1, 5)
+
+
+@pytest.mark.parametrize(("first", "level"), [("100", "100"), ("reference", "reference")])
+def test_the_reference_is_the_level_of_this_name_or_the_first(
+    experimenter: Admin, first: str, level: str
+) -> None:
+    files = [f"blink_{duration}_{number}.mp4" for duration in (first, "167") for number in (1, 2)]
+    trial = tomllib.loads(own_study(experimenter, "dcr", files).json()["toml"])["trial"]
+    assert (trial["reference"]["factor"], trial["reference"]["level"]) == ("duration", level)
+    assert trial["scale"]["labels"][4]["en"] == "Imperceptible"
 
 
 def test_the_standard_is_the_lowest_number(experimenter: Admin) -> None:

@@ -16,6 +16,7 @@ from server.tallies.recount import Recount
 from server.tallies.tally import tally_of, unpacked
 from tests.helpers.admins import Admin
 from tests.helpers.comparisons import comparisons
+from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 
 PAIRS = (
@@ -164,28 +165,8 @@ def test_both_clips_are_judged(judge: Participant) -> None:
 def test_simulated_people_compare_to_the_end_and_the_csv_has_their_answers(
     client: TestClient, services: Services, pairs: StudyInDatabase
 ) -> None:
-    class Api:
-        """The client that `Person` speaks through."""
-
-        token = ""
-
-        def get(self, path: str) -> Any:
-            return self._send("GET", path)
-
-        def put(self, path: str, body: Any = None) -> Any:
-            return self._send("PUT", path, body)
-
-        def post(self, path: str, body: Any = None) -> Any:
-            return self._send("POST", path, body)
-
-        def _send(self, method: str, path: str, body: Any = None) -> Any:
-            headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
-            answer = client.request(method, path, json=body, headers=headers)
-            assert answer.status_code < 300, answer.text
-            return answer.json()
-
     link = pairs.link(synthetic=True)
-    person = Person(Api(), Rater(1, 1, {}))  # type: ignore[arg-type]
+    person = Person(Api(client), Rater(1, 1, {}))
     assert person.take_part(link)
     rows = stored(services)
     main = [row for row in rows if row["kind"] == "main"]

@@ -20,6 +20,7 @@ from server.export.formats import FORMATS
 from server.models import Study
 from server.simulation.person import Person, Rater
 from server.trials.kinds.continuous_rating import LAG_S
+from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 
 STUDY = re.sub(r"(?s)\[trial\].*?(?=\[\[exclusions)", lambda _: CONTINUOUS_RATING.example + "\n", SHORT)
@@ -78,30 +79,6 @@ def test_a_trace_of_another_length_fails_its_play(client: TestClient, study: Stu
     assert (receipt["verdict"], receipt["rule"], receipt["again"]) == ("failed", "wrong_trace", True)
 
 
-class Api:
-    """The client that a simulated person speaks through."""
-
-    token = ""
-
-    def __init__(self, client: TestClient) -> None:
-        self._client = client
-
-    def get(self, path: str) -> Any:
-        return self._send("GET", path)
-
-    def put(self, path: str, body: Any = None) -> Any:
-        return self._send("PUT", path, body)
-
-    def post(self, path: str, body: Any = None) -> Any:
-        return self._send("POST", path, body)
-
-    def _send(self, method: str, path: str, body: Any = None) -> Any:
-        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
-        answer = self._client.request(method, path, json=body, headers=headers)
-        assert answer.status_code < 300, answer.text
-        return answer.json()
-
-
 def test_the_analysis_recovers_the_lag_of_simulated_people(
     client: TestClient, services: Services, study: StudyInDatabase, tmp_path: Path
 ) -> None:
@@ -113,7 +90,7 @@ def test_the_analysis_recovers_the_lag_of_simulated_people(
     assert set(map(tuple, clips.values())) == {BLINKS_S}
     for seed in range(4):
         rater = Rater(seed, 1, {}, blinks_of=clips)
-        assert Person(Api(client), rater).take_part(link)  # type: ignore[arg-type]
+        assert Person(Api(client), rater).take_part(link)
     path = tmp_path / "traces.csv"
     path.write_bytes(exported(services, "simulated"))
     answers = load_csv(path, study.experiment, plan_of("continuous_rating").reading)

@@ -25,26 +25,11 @@ from server.studies.importing import add_version
 from server.studies.lookup import active_version
 from server.tallies.recount import Recount
 from tests.helpers.databases import run_server_command
+from tests.helpers.motion_checks import CHECKS, checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 from tests.helpers.thresholds import YES_NO, text_with
 from tests.server.trials.test_comparisons import PAIRS
 from tests.server.trials.test_continuous import STUDY as TRACES
-
-CHECKS = """
-[evidence.motion_checks]
-per_block = 2
-kinds = ["digit", "direction"]
-clips = 12
-
-[evidence.motion_checks.other_way]
-label = { en = "I cannot see moving patterns", de = "Ich sehe keine bewegten Muster" }
-text = { en = "# Thank you", de = "# Danke" }
-
-"""
-
-
-def checked(text: str, checks: str = CHECKS) -> str:
-    return text.replace("[trial]\n", f"{checks}[trial]\n", 1)
 
 
 @pytest.fixture
@@ -212,7 +197,7 @@ def test_manners_differ_in_what_they_make_of_checks(services: Services, tmp_path
     study = add_study(services, tmp_path / "clips", checked(SHORT, eight), frames=30)
     right = right_answers(services, study.name)
     raters = [Rater(number, 1, {}, checks=right) for number in range(4)]
-    runs = act(services.settings, study.link("general", synthetic=True), raters, manner_called(name), 2)
+    runs = act(services.settings, study.link("general", synthetic=True), raters, manner_called(name), 1)
     guessed = [run["signals"]["motion_checks_guessed"] for run in runs]
     assert all(run["verdict"] != "likely" for run in runs) or name == "honest"
     if name in ("honest", "flow"):

@@ -16,6 +16,7 @@ from server.export.formats import FORMATS, row_count
 from server.models import Rating, Study
 from server.simulation.person import Person, Rater
 from tests.helpers.admins import Admin
+from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 
 SCALES = """\
@@ -131,32 +132,10 @@ def test_a_clip_that_failed_goes_without_any_answer_but_not_without_some(rater: 
     assert (receipt["verdict"], receipt["rule"]) == ("failed", "not_rated")
 
 
-class Api:
-    """The client that `Person` speaks through."""
-
-    def __init__(self, client: TestClient) -> None:
-        self.client, self.token = client, ""
-
-    def get(self, path: str) -> Any:
-        return self._send("GET", path)
-
-    def put(self, path: str, body: Any = None) -> Any:
-        return self._send("PUT", path, body)
-
-    def post(self, path: str, body: Any = None) -> Any:
-        return self._send("POST", path, body)
-
-    def _send(self, method: str, path: str, body: Any = None) -> Any:
-        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
-        reply = self.client.request(method, path, json=body, headers=headers)
-        assert reply.status_code < 300, reply.text
-        return reply.json()
-
-
 def test_a_simulated_person_answers_every_scale_and_results_show_the_one_chosen(
     client: TestClient, services: Services, scales: StudyInDatabase, experimenter: Admin
 ) -> None:
-    person = Person(Api(client), Rater(1, 1, {}))  # type: ignore[arg-type]
+    person = Person(Api(client), Rater(1, 1, {}))
     assert person.take_part(scales.link(synthetic=True))
     with services.database.read() as session:
         query = text("SELECT kind, scale, response, expected_response FROM ratings")

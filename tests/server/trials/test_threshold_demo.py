@@ -14,36 +14,25 @@ from experiments.load import load_experiment
 from server.context import Services
 from server.export.formats import FORMATS
 from server.models import Study
-from server.simulation.observer import Truth, observer_of, truth_of
-from server.simulation.person import Person, Rater
+from server.simulation.observer import Truth, truth_of
 from tests.conftest import REPOSITORY
+from tests.helpers.simulated import take_part
 from tests.helpers.studies import add_study
-from tests.server.trials.test_thresholds import Api
 
 DEMO = REPOSITORY / "experiments" / "threshold-demo.toml"
 TRUE_MS = 300.0
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_seed")
 def test_simulated_people_have_the_thresholds_that_they_were_given(
-    client: TestClient, services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    client: TestClient, services: Services, tmp_path: Path
 ) -> None:
     if not services.database.is_sqlite:
         pytest.skip("the series themselves are tested on PostgreSQL in test_thresholds.py")
     # Another order of the trials gives another person, and one in some hundred lies outside three errors.
-    monkeypatch.setattr("server.participants.links.secrets.randbits", lambda _bits: 7)
     study = add_study(services, tmp_path / "clips", DEMO.read_text(encoding="utf-8"))
-    with services.database.read() as session:
-        version = services.versions.get(session, 1)
-        names = version.experiment.factor_names
-        levels = {
-            version.clips[ident].sha256: dict(zip(names, cell.split("/"), strict=True))
-            for (cell, _), ident in version.places.items()
-        }
-    observer = observer_of(study.experiment, levels, f"threshold={TRUE_MS},spread=60")
-    link = study.link(synthetic=True)
-    for seed in range(1):
-        assert Person(Api(client), Rater(seed, 7, levels, observer)).take_part(link)  # type: ignore[arg-type]
+    take_part(client, study, f"threshold={TRUE_MS},spread=60", seeds=(0,), effects_seed=7)
     with services.database.read() as session:
         found = session.query(Study).filter_by(name=study.name).one()
         text = b"".join(FORMATS["csv"](session, found, "all")).decode()

@@ -19,10 +19,11 @@ from server.simulation.http import JsonClient
 from server.simulation.person import Person, Rater
 from server.trials.series import service as series
 from tests.helpers.comparisons import comparisons
+from tests.helpers.ports import free_port
 from tests.helpers.studies import SHORT, add_study
 from tests.helpers.thresholds import YES_NO, text_with, thresholds
 from tests.server.participants.test_choosing import TEXT as CHOSEN
-from tests.server.test_durability import free_port, start
+from tests.server.test_durability import start
 
 PEOPLE = 4
 

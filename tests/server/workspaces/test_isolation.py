@@ -18,7 +18,7 @@ from server.accounts.identity import OPERATOR
 from server.app import _routers
 from server.context import Services
 from server.errors import NotFound
-from server.models import RIGHTS, Job, Right
+from server.models import RIGHTS, AccountLogin, Job, Right
 from server.studies.links import create_link
 from server.studies.lookup import find_study
 from server.studies.uploads import upload_folder
@@ -30,9 +30,13 @@ ADMIN = "/api/admin"
 STUDY = f"{ADMIN}/studies/{{study}}"
 Endpoint = tuple[str, str]
 OUTSIDERS = ("owner elsewhere", "experimenter elsewhere", "viewer elsewhere", "nowhere", "administrator")
-OWN: set[str] = {f"{ADMIN}/invitations/{{token}}", f"{ADMIN}/blinks/strips/{{name}}"}
+OWN: set[str] = {
+    f"{ADMIN}/invitations/{{token}}",
+    f"{ADMIN}/blinks/strips/{{name}}",
+    f"{ADMIN}/session/providers/{{provider}}",
+}
 """Beginnings of paths whose parameter is a secret of one's own, or a file that is everybody's."""
-ADMINISTRATORS = ("accounts", "invitations", "audit", "workspaces")
+ADMINISTRATORS = ("accounts", "invitations", "audit", "workspaces", "backups")
 """What the administrator of the server sees of all laboratories: not one of their answers."""
 NEEDED: dict[Right, set[str]] = {
     "view": {
@@ -40,15 +44,22 @@ NEEDED: dict[Right, set[str]] = {
         "POST versions/check",
         "GET versions/{number}",
         "GET clips",
+        "GET originals/{sha256}",
+        "GET originals/{sha256}/frame-map.csv",
         "GET monitor",
         "GET monitor/stream",
         "GET results",
         "GET data/analysis.{language}",
         "GET data/codebook.md",
         "GET reports",
+        "GET rehearsals/latest",
+        "GET rehearsals/{rehearsal}",
+        "GET rehearsals/{rehearsal}/report/{file}",
+        "GET capsules",
         "GET methods",
         "GET methods/methods.txt",
         "GET comparison",
+        "GET retention",
         "GET seal",
         "GET seal/plan.{ending}",
     },
@@ -62,12 +73,15 @@ NEEDED: dict[Right, set[str]] = {
         "PUT runs/{run}/exclusion",
         "DELETE runs/{run}/exclusion",
         "POST reports",
+        "POST rehearsals",
         "PUT archive",
     },
     "edit": {"DELETE ", "POST versions", "POST runs/{run}/erase", "POST copies", "POST seal"},
     "export": {
         "GET runs",
         "GET runs/{run}",
+        "GET runs/{run}/replay",
+        "GET runs/{run}/replay/trials/{trial_index}",
         "GET data/ratings.csv",
         "GET data/wide.csv",
         "GET data/runs.csv",
@@ -75,10 +89,15 @@ NEEDED: dict[Right, set[str]] = {
         "GET data/psych-ds.zip",
         "GET data/{table}.{ending}",
         "GET reports/{report}/{file}",
+        "POST capsules",
+        "GET capsules/{capsule}.zip",
+        "DELETE capsules/{capsule}",
     },
     "own": {
         "GET runs/{run}/identity",
+        "GET runs/{run}/subject-access",
         "GET data/identities.csv",
+        "GET links/signing",
         "GET grants",
         "PUT grants/{account}",
         "PUT workspace",
@@ -119,18 +138,32 @@ def foreign(client: TestClient, services: Services, study: StudyInDatabase) -> L
         session.add(Job(public_id="f" * 32, kind="report", study_id=found.id, status="done", message=""))
         # One under way, so that no test starts a real one.
         session.add(Job(public_id="e" * 32, kind="report", study_id=found.id, status="queued", message=""))
+        session.add(Job(public_id="d" * 32, kind="capsule", study_id=found.id, status="queued", message=""))
+    account = owner.get("/session").json()["account"]["id"]
+    with services.database.write() as session:
+        row = AccountLogin(
+            account_id=account, provider="uni", issuer="https://x", subject="1", label="Ada L."
+        )
+        session.add(row)
+        session.flush()
+        login = row.id
+        session.add(Job(public_id="b" * 32, kind="rehearsal", study_id=found.id, status="queued", message=""))
     folder = services.settings.data_folder / "reports" / ("f" * 32)
     folder.mkdir(parents=True)
     (folder / "report.html").write_text("their report")
-    account = owner.get("/session").json()["account"]["id"]
+    upload = owner.client.post(f"{ADMIN}/uploads").json()["id"]
     addresses = {
         "study": study.name, "run": person.run_id, "link": link, "report": "f" * 32, "file": "report.html",
         "number": "1", "workspace": "default", "account": "the owner", "account_id": str(account),
         "session_id": str(owner.get("/sessions").json()[0]["id"]), "token_id": str(token),
         "invitation_id": str(invitation), "table": "ratings", "ending": "sav", "language": "R",
+        "upload": upload, "capsule": "d" * 32, "sha256": "c" * 64,
+        "provider": "uni", "login_id": str(login), "trial_index": "0", "rehearsal": "b" * 32,
     }  # fmt: skip
     title = study.experiment.title
-    return Laboratory(study, addresses, (title, person.run_id, link, "Mrs Miller", "for Zoe", "their report"))
+    return Laboratory(
+        study, addresses, (title, person.run_id, link, "Mrs Miller", "for Zoe", "their report", "Ada L.")
+    )
 
 
 @pytest.fixture

@@ -103,6 +103,23 @@ def test_wrong_declaration_is_one_clear_line(tiny_character: Path, old: str, new
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        # As an older format, a later one, and no format at all.
+        (b'name = "old"\nlevels = ["open.png", "shut.png"]\n', "label: Field required; .* another version"),
+        (b'format = 9\nname = "new"\nlabel = "New"\n', "Field required; .* bake it again"),
+        (b"\xff\xfe", "no text in UTF-8; bake it again"),
+        (b"", "Field required"),
+    ],
+)
+def test_an_atlas_of_another_format_is_one_clear_line(tmp_path: Path, content: bytes, message: str) -> None:
+    (tmp_path / "character.toml").write_bytes(content)
+    with pytest.raises(InputError, match=message) as caught:
+        load_atlas(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
 def test_folder_without_declaration_is_no_character(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is no character"):
         load_atlas(tmp_path)

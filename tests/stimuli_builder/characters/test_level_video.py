@@ -7,12 +7,14 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.colour import srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, read_declaration
 from stimuli_builder.characters.example import CLOSURES, CROP, draw_crop
 from stimuli_builder.characters.facekit.development import psnr_db
 from stimuli_builder.characters.level_video import decode_level_video, write_level_video
 from stimuli_builder.characters.writing import write_declaration
 from stimuli_builder.clips.characters import find_character
+from stimuli_builder.clips.levels import quantised
 
 
 def textured(closure: float) -> np.ndarray:
@@ -68,6 +70,44 @@ def test_clips_read_a_character_kept_in_a_video(in_video: Path) -> None:
     assert len(levels.levels) == len(CLOSURES)
     assert psnr_db(levels.picture(1.0)[4:20, 4:44], textured(1.0)) > 40
     assert len(character.fingerprint) == 64
+
+
+@pytest.mark.parametrize("video", [True, False])
+def test_levels_at_their_own_size_are_the_atlas_to_the_code_value(
+    tiny_character: Path, request: pytest.FixtureRequest, video: bool
+) -> None:
+    """Against the atlas's pictures taken one by one, whether they are converted while decoded or not."""
+    folder = request.getfixturevalue("in_video") if video else tiny_character
+    levels, atlas = find_character(str(folder)).levels((48, 24)), load_atlas(folder)
+    frame = atlas.base_linear()
+    for index in range(len(CLOSURES)):
+        frame[atlas.crop] = srgb_to_linear(atlas.level_srgb(index))
+        np.testing.assert_array_equal(levels.levels[index], quantised(frame)[levels.window.slices])
+    frame[atlas.crop] = srgb_to_linear(atlas.level_srgb(0))
+    np.testing.assert_array_equal(levels.base, quantised(frame))
+
+
+@pytest.mark.parametrize("spare", [-1, 1])
+def test_a_video_of_another_length_than_the_levels(in_video: Path, spare: int) -> None:
+    """Too short it is refused; frames that no level names do not matter."""
+    closures = CLOSURES[:spare] if spare < 0 else [*CLOSURES, CLOSURES[-1]]
+    video = write_level_video(in_video, "levels.mkv", [textured(closure) for closure in closures])
+    declared = read_declaration(in_video).model_dump()
+    for level in declared["levels"]:
+        level["sha256"] = video.sha256
+    write_declaration(in_video, Declaration.model_validate(declared))
+    if spare < 0:
+        with pytest.raises(InputError, match="holds 3 of 40 x 16 px, the declaration asks for frame 3"):
+            find_character(str(in_video)).levels((48, 24))
+    else:
+        assert len(find_character(str(in_video)).levels((48, 24)).levels) == len(CLOSURES)
+
+
+def test_a_video_of_another_size_than_the_crop_is_refused(in_video: Path) -> None:
+    declared = read_declaration(in_video).model_dump() | {"crop": (4, 4, 38, 16)}
+    write_declaration(in_video, Declaration.model_validate(declared))
+    with pytest.raises(InputError, match="of 40 x 16 px, the declaration asks for frame 0 of 38 x 16 px"):
+        find_character(str(in_video)).levels((48, 24))
 
 
 def test_a_damaged_video_is_said_in_one_line(in_video: Path) -> None:

@@ -1,5 +1,6 @@
 """The shipped faces: whole, as they were pinned, still outside what a blink moves, and within their size."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -24,7 +25,17 @@ def test_experiments_1_to_3_have_their_face() -> None:
 
 def test_a_face_that_was_given_to_others_never_changes(face: Atlas) -> None:
     """Pictures that changed need another version, and a folder of their own: studies name the old one."""
-    assert PINNED[face.name] == {"version": face.declaration.version, "sha256": face.fingerprint()}
+    pinned = PINNED[face.name]
+    assert (pinned["version"], pinned["sha256"]) == (face.declaration.version, face.fingerprint())
+
+
+def test_what_clips_without_the_lower_lid_show_is_of_the_first_version(face: Atlas) -> None:
+    """A version may add poses of the lower lid; base and levels are those that the name was given with."""
+    declared, digest = face.declaration, hashlib.sha256()
+    for picture in (declared.base, declared.levels[0]):
+        digest.update((face.folder / picture.file).read_bytes())
+    assert {level.file for level in declared.levels} == {declared.levels[0].file}
+    assert PINNED[face.name]["levels"] == digest.hexdigest()
 
 
 def test_every_picture_is_whole_and_says_how_it_was_made(face: Atlas) -> None:

@@ -49,6 +49,17 @@ def test_the_manifest_holds_the_design(small: Small, built: Path) -> None:
     assert set(contents(built)) == {MANIFEST_NAME} | {clip.file for clip in manifest.clips}
 
 
+def test_a_list_of_characters_builds_the_clips_of_its_levels(small_text: str, tmp_path: Path) -> None:
+    head, _, rest = small_text.partition("[[factors.levels]]")
+    listed = f'{head}character = ["cartoon", "tiny"]\n[[factors]]{rest.partition("[[factors]]")[2]}'
+    written = small_text.replace('name = "own"', 'name = "tiny"')
+    studies = [make_small(tmp_path, text) for text in (listed, written)]
+    planned = [planned_clips(study.experiment, study.options) for study in studies]
+    assert {clip.settings.character for clip in planned[0]} == {"cartoon", "tiny"}
+    inputs = [[(clip.spec.cell, clip.job.input_hash) for clip in clips] for clips in planned]
+    assert inputs[0] == inputs[1]
+
+
 def test_both_characters_show_the_same_blinks(built: Path) -> None:
     clips = read_manifest(built).clips
     assert [clip.profile for clip in clips[:4]] == [clip.profile for clip in clips[4:]]
@@ -138,7 +149,7 @@ def test_processes_and_a_killed_worker_change_nothing(small: Small, built: Path,
 def test_a_dask_cluster_gives_the_same_clips(small: Small, built: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         small.build(tmp_path / "clips", Machines(dask=cluster.scheduler_address))
     assert contents(tmp_path / "clips") == contents(built)
@@ -245,6 +256,7 @@ def test_a_file_in_place_of_the_folder_is_refused(small: Small, tmp_path: Path) 
         ('character = "tiny"', 'character = "tinny"', "cell own/real, exemplar 1: no character 'tinny'"),
         ('character = "cartoon"', 'character = "cartoon", lower_lid = "both"', "no lower-lid layer"),
         ("height_px = 120", "height_px = 200", "120 px high"),
+        ("width_px = 320", "width_px = 480", "cell cartoon/real, .* cuts off what moves in a blink"),
         ('profile = "mine.csv"', 'profile = "yours.csv"', "yours.csv"),
     ],
 )

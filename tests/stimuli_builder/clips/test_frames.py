@@ -1,5 +1,7 @@
 """The pictures of a clip."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -108,6 +110,17 @@ def test_the_lower_lid_is_the_characters_own_layer(
     np.testing.assert_allclose((moved - still)[rows, columns] / 65535, expected, atol=1e-4)
 
 
+def test_the_lower_lid_is_read_once_it_moves(tmp_path: Path) -> None:
+    """A damaged pose is of no matter to clips that show none, and said by the first that does."""
+    folder = write_example_character(tmp_path / "tiny")
+    levels = find_character(str(folder)).levels((48, 24))
+    next(folder.glob("pose_*.webp")).write_bytes(b"no picture")
+    painter = FramePainter(levels)
+    assert list(painter.frames(curve_of(0, 1, 0), 30, True))
+    with pytest.raises(InputError, match=r"lower-lid pose .* is damaged"):
+        list(painter.frames(lower_curve(0, 0.5, 1), 30, True))
+
+
 def test_a_character_without_lower_lid_refuses_one(cartoon: LevelSet) -> None:
     with pytest.raises(InputError, match="no lower-lid layer"):
         list(FramePainter(cartoon).frames(lower_curve(0, 0, 0), 30, True))
@@ -125,7 +138,10 @@ def test_other_sizes_are_resampled_with_still_edges(
     assert np.abs(levels.levels[0][0].astype(int) - levels.levels[-1][0]).max() <= 66
 
 
-@pytest.mark.parametrize(("size", "line"), [((48, 40), "24 px high"), ((48, 10), "cuts off what moves")])
+@pytest.mark.parametrize(
+    ("size", "line"),
+    [((48, 40), "24 px high"), ((48, 10), "cuts off what moves in a blink of 'tiny', which is 24 px high")],
+)
 def test_a_size_that_cannot_show_the_blink_is_refused(
     tmp_path_factory: pytest.TempPathFactory, size: tuple[int, int], line: str
 ) -> None:

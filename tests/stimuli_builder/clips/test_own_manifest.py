@@ -1,13 +1,19 @@
 """`stimuli manifest`: clips of one's own become a set that a server takes."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from experiments.errors import InputError
 from experiments.load import load_experiment
-from experiments.manifest import check_files, read_manifest
+from experiments.manifest import check_files, check_originals, read_manifest
+from server.storage.clips import FolderStore
+from server.studies.importing import store_clips
 from stimuli_builder.cli import main
 from tests.helpers.tiny_clips import encoded_video
+from tests.helpers.videos import HEIGHT, WIDTH, write_sound, write_video
+from video_conversion.video_file import examine
 
 STUDY = """
 name = "robots"
@@ -30,6 +36,11 @@ debrief = "d"
 
 
 STUDY_FILE = "robots.toml"
+ODD: dict[str, dict[str, Any]] = {
+    ".webm": {"codec": "libvpx-vp9"},
+    ".mov": {"rotation_deg": 90},
+    ".mp4": {"sound": True},
+}
 
 
 @pytest.fixture
@@ -98,3 +109,60 @@ def test_levels_that_cannot_be_rendered_are_refused(
     assert stimuli(monkeypatch, "build", clips.parent / "robots.toml", "--out", out) != 0
     assert "'10' and '2' change nothing of the rendering" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_other_videos_are_converted_into_a_folder_that_a_server_takes(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
+) -> None:
+    for number, (ending, settings) in enumerate(ODD.items(), start=3):
+        write_video(clips / f"10_ä_{number}{ending}", **settings)
+        write_video(clips / f"2_ä_{number}{ending}", **settings)
+    before = {path.name: path.read_bytes() for path in clips.iterdir()}
+    assert stimuli(monkeypatch, "manifest", clips, "--pattern", "{speed}_ä_{exemplar}.mp4") == 0
+    assert "10 clips in 2 cells, 6 converted; wrote" in " ".join(capsys.readouterr().out.split())
+    assert {path.name: path.read_bytes() for path in clips.iterdir() if path.is_file()} == before
+    manifest = read_manifest(clips / "clips")
+    check_files(manifest, clips / "clips")
+    check_originals(manifest, clips / "clips")
+    assert [clip.source and clip.source.changes for clip in manifest.clips[:5]] == [
+        None, None, ("encoded as H.264, was vp9",), ("turned by 90 degrees to the left, as the file says",),
+        ("sound left out",),
+    ]  # fmt: skip
+    turned = manifest.clips[3]
+    assert (turned.width_px, turned.height_px) == (HEIGHT, WIDTH)
+    assert all(examine(clips / "clips" / clip.file).codec == "h264" for clip in manifest.clips)
+    store = FolderStore(clips.parent / "store")
+    assert store_clips(store, manifest, clips / "clips") == len({clip.sha256 for clip in manifest.clips})
+    assert all(store.size(source.sha256) == source.bytes for source in manifest.sources)
+
+
+def test_videos_that_cannot_be_clips_are_all_named_and_nothing_is_written(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
+) -> None:
+    write_sound(clips / "2_ä_2.mp4")
+    (clips / "10_ä_2.mp4").write_bytes(b"no video")
+    before = sorted(path.name for path in clips.iterdir())
+    assert stimuli(monkeypatch, "manifest", clips, "--pattern", "{speed}_ä_{exemplar}.mp4") != 0
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "2 of 4 videos cannot become clips; 10_ä_2.mp4: " in printed
+    assert "2_ä_2.mp4: it holds audio and no picture; expected a video" in printed
+    assert sorted(path.name for path in clips.iterdir()) == before
+
+
+def test_originals_stay_where_the_manifest_would_take_their_place(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
+) -> None:
+    write_video(clips / "2_ä_2.mp4", sound=True)
+    asked = ("manifest", clips, "--pattern", "{speed}_ä_{exemplar}.mp4", "--out", clips)
+    assert stimuli(monkeypatch, *asked) != 0
+    assert "1 of 4 videos have to be converted" in " ".join(capsys.readouterr().err.split())
+    assert not (clips / "manifest.json").exists()
+
+
+def test_an_original_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, clips: Path) -> None:
+    write_video(clips / "2_ä_2.mp4", sound=True)
+    assert stimuli(monkeypatch, "manifest", clips, "--pattern", "{speed}_ä_{exemplar}.mp4") == 0
+    made = clips / "clips"
+    (made / "2_ä_2.original.mp4").unlink()
+    with pytest.raises(InputError, match=r"original 2_ä_2\.original\.mp4, .* is missing"):
+        check_originals(read_manifest(made), made)

@@ -8,6 +8,7 @@ import pytest
 
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, file_sha256
+from stimuli_builder.clips.face_movement.amounts import PARTS, PREFIX
 from stimuli_builder.clips.verify import verify
 
 from .conftest import CURVE, Small, make_small
@@ -58,6 +59,16 @@ def test_wrong_numbers_are_found(small: Small, copied: Path, change: dict[str, o
     rewrite(copied, change)
     (finding,) = verify(copied, small.folder).findings[:1]
     assert problem in str(finding)
+
+
+def test_a_declared_amount_that_is_no_number_is_a_finding(small: Small, copied: Path) -> None:
+    clip = json.loads((copied / MANIFEST_NAME).read_text())["clips"][0]
+    rewrite(copied, {"inputs": clip["inputs"] | {f"{PREFIX}{PARTS[0]}_mm": "a lot"}})
+    verdict = verify(copied, small.folder)
+    (finding,) = verdict.findings
+    assert "cannot be read" in finding.problem
+    assert "'a lot'" in finding.problem
+    assert verdict.opening_checked == 7
 
 
 def test_a_blink_one_frame_late_is_found_in_the_pixels(small: Small, copied: Path) -> None:

@@ -129,6 +129,7 @@ def test_blinks_gather_at_turn_ends(tmp_path: Path) -> None:
         (["--duration", "5", "--state", "readin"], "did you mean 'reading'"),
         (["--duration", "5", "--format", "fbx"], "unknown --format 'fbx'"),
         (["--duration", "5", "--rate", "0"], "expected --rate"),
+        (["--duration", "86400", "--fps", "1000"], "expected at most 6000000 frames, got 86400000"),
         (["--duration", "5", "--left", "a", "--right", "a"], "each eye needs a shape of its own"),
     ],
 )
@@ -138,6 +139,25 @@ def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], told: str) 
     assert isinstance(done.exception, InputError)
     assert told in str(done.exception)
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"1\n00:00:01,000 --> 00:00:05,000\nGr\xfc\xdfe\n", "save them as UTF-8"),
+        (b"1\n00:00:xx --> 00:00:05,000\nhello\n", "expected subtitles with times, found none"),
+        (
+            b"1\n00:00:06,000 --> 00:00:05,000\nhello\n",
+            "a subtitle ends at 00:00:05.000, not after its start",
+        ),
+        (b"", "expected subtitles"),
+    ],
+)
+def test_subtitles_that_cannot_be_read_are_refused(tmp_path: Path, content: bytes, told: str) -> None:
+    path = tmp_path / "talk.srt"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=told):
+        speech_in_subtitles(path)
 
 
 def test_a_file_without_sound_is_refused(tmp_path: Path) -> None:

@@ -1,7 +1,9 @@
 """Tracking without labels: contours, training on detections, doubts, relabelling; the real detector."""
 
 import csv
+from itertools import islice
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.tracking.certainty import lid_difference, widths
 from stimuli_builder.tracking.detector.detection import along, eye_points
+from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.labelfree import (
     DETECTOR_SHARE,
     Survey,
@@ -23,7 +26,7 @@ from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.track import FROZEN, Tracker, track_video
-from stimuli_builder.video import scan_video
+from stimuli_builder.video import frames, rgb, scan_video
 
 
 @settings(deadline=None, max_examples=30)
@@ -192,9 +195,20 @@ def test_eyes_of_a_real_face_are_found_without_labels(detector, shared_data):
     assert len(seen.points) == seen.looked_at == info.frame_count
     away = [lid_difference(seen.points[n], points) for n, points in labels.frames.items()]
     # The labels are good to 1 to 2 px of eyes 30 px wide.
-    assert np.mean(away) < 0.045
+    assert np.mean(away) < 0.03
     closed = np.argmin([points[7, 1] - points[2:4, 1].mean() for points in seen.points.values()])
     assert abs(int(closed) - 27) <= 1
+
+
+def test_points_stay_where_they_are_when_a_picture_is_enlarged(detector, shared_data):
+    """Whatever a detector adds or takes away in pixels, half of them say, shrinks in an enlarged picture."""
+    pictures = islice(frames(shared_data / "face_video" / "single_face.mp4", read=rgb), 0, 72, 12)
+    moved = []
+    with open_detector(one_eye=False) as mesh:
+        for picture in pictures:
+            large = cv2.resize(picture, None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC)
+            moved.append((mesh.detect(large).points + 0.5) / 3 - 0.5 - mesh.detect(picture).points)
+    assert np.mean(moved, axis=(0, 1)) == pytest.approx([0, 0], abs=0.15)
 
 
 def test_of_a_long_video_every_nth_frame_is_looked_at(detector, shared_data, monkeypatch):

@@ -64,6 +64,6 @@ class Points(Scale):
     def said(self, language: str) -> str:
         """Every label where there are more than two."""
         points = (
-            f"{self.minimum + place} {label.get(language, '')}" for place, label in enumerate(self.labels)
+            f"{self.minimum + step} {label.get(language, '')}" for step, label in enumerate(self.labels)
         )
         return super().said(language) + (f" Labels: {', '.join(points)}." if self.labels else "")

@@ -1,4 +1,6 @@
 import { Stack, Title } from "@mantine/core";
+import { LoginsCard } from "./LoginsCard";
+import { MailCard } from "./MailCard";
 import { PasswordCard } from "./PasswordCard";
 import { SecondFactorCard } from "./SecondFactorCard";
 import { SessionsCard } from "./SessionsCard";
@@ -10,6 +12,8 @@ export function AccountPage() {
       <Title order={1}>My account</Title>
       <SecondFactorCard />
       <PasswordCard />
+      <MailCard />
+      <LoginsCard />
       <SessionsCard />
       <TokensCard />
     </Stack>

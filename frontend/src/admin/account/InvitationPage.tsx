@@ -8,6 +8,7 @@ import { api, Refused, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { EntryForm, EntryPage } from "./EntryPage";
 import { NameField, PasswordField } from "./fields";
+import { ProviderButtons } from "./ProviderButtons";
 import { useEntered } from "./useEntered";
 
 const CLOSED: Record<string, string> = {
@@ -63,10 +64,13 @@ function MakeAccount({ token, role }: { token: string; role: Schemas["Invitation
     onSuccess: useEntered(),
   });
   return (
-    <EntryForm sending={accept} button="Make the account">
-      <Text size="sm">{MAY[role]}</Text>
-      <NameField label="Name to sign in with" value={name} onChange={setName} />
-      <PasswordField label="Password" fresh value={password} onChange={setPassword} />
-    </EntryForm>
+    <>
+      <EntryForm sending={accept} button="Make the account">
+        <Text size="sm">{MAY[role]}</Text>
+        <NameField label="Name to sign in with" value={name} onChange={setName} />
+        <PasswordField label="Password" fresh value={password} onChange={setPassword} />
+      </EntryForm>
+      <ProviderButtons invitation={token} />
+    </>
   );
 }

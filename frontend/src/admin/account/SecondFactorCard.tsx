@@ -80,7 +80,13 @@ function Remove() {
       <Text w="100%" size="sm">
         On: signing in asks for the code of your authenticator app.
       </Text>
-      <PasswordField label="Password, to turn it off" required={false} value={password} onChange={setPassword} w={260} />
+      <PasswordField
+        label="Password, to turn it off (without one: a code)"
+        required={false}
+        value={password}
+        onChange={setPassword}
+        w={260}
+      />
       <Button variant="default" disabled={password === ""} onClick={() => remove.mutate(undefined)}>
         Turn off
       </Button>

@@ -1,26 +1,40 @@
-import { Alert, Text, TextInput } from "@mantine/core";
+import { Alert, Anchor, Text } from "@mantine/core";
 import { useMutation, useQuery } from "@tanstack/react-query";
-import { useSearch } from "@tanstack/react-router";
+import { Link, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, Refused, unwrap } from "../api";
 import { sessionQuery } from "../queries";
+import { CodeField, CodeForm } from "./CodeForm";
 import { EntryForm, EntryPage } from "./EntryPage";
 import { NameField, PasswordField } from "./fields";
+import { ProviderButtons, Refusal, waysQuery } from "./ProviderButtons";
 import { useEntered } from "./useEntered";
 
 export function SignInPage() {
+  const { code }: { code?: unknown } = useSearch({ strict: false });
+  return (
+    <EntryPage title="Palpebra">
+      <Refusal />
+      {code === "asked" ? <CodeForm /> : <ByPassword />}
+    </EntryPage>
+  );
+}
+
+function ByPassword() {
   const [name, setName] = useState("");
   const [password, setPassword] = useState("");
   const [code, setCode] = useState("");
+  const next = usePageAskedFor();
   const session = useQuery(sessionQuery);
+  const ways = useQuery(waysQuery);
   const signIn = useMutation({
     mutationFn: () => unwrap(api.POST("/api/admin/session", { body: { name, password, code: code === "" ? null : code } })),
-    onSuccess: useEntered(usePageAskedFor()),
+    onSuccess: useEntered(next),
   });
   const error = signIn.error;
   const asksCode = code !== "" || (error instanceof Refused && error.code === "second_factor_required");
   return (
-    <EntryPage title="Palpebra">
+    <>
       {session.data?.accounts_exist === false && (
         <Alert title="No account yet" mb="md">
           The first account is made with the one-time link that the server printed when it started. Lost it? Run{" "}
@@ -30,20 +44,18 @@ export function SignInPage() {
       <EntryForm sending={signIn} button="Sign in">
         <NameField label="Name" value={name} onChange={setName} />
         <PasswordField label="Password" value={password} onChange={setPassword} />
-        {asksCode && (
-          <TextInput
-            label="Code of your authenticator app, or a recovery code"
-            autoComplete="one-time-code"
-            autoFocus
-            value={code}
-            onChange={(event) => setCode(event.currentTarget.value)}
-          />
-        )}
+        {asksCode && <CodeField value={code} onChange={setCode} />}
       </EntryForm>
+      {ways.data?.resets_by_mail === true && (
+        <Anchor component={Link} to="/letter/forgotten" size="sm" display="block" ta="center" mt="sm">
+          Forgotten your password?
+        </Anchor>
+      )}
+      <ProviderButtons next={next} />
       <Text size="sm" c="dimmed" ta="center" mt="md">
         Participants do not sign in: they open the link they were given.
       </Text>
-    </EntryPage>
+    </>
   );
 }
 

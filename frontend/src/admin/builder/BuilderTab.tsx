@@ -8,9 +8,11 @@ import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { when } from "../ui/format";
-import { Workbench } from "./Workbench";
+import { onDemand } from "../ui/onDemand";
 import { isTable } from "./data";
 import { forgetWork, keptWork } from "./kept";
+
+const Workbench = onDemand(async () => (await import("./Workbench")).Workbench);
 
 export function BuilderTab() {
   const { study = "" } = useParams({ strict: false });
@@ -21,8 +23,8 @@ export function BuilderTab() {
 function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const { name, revision } = detail.summary;
   const [kept] = useState(() => {
-    const found = keptWork(name);
-    return found !== null && (found.data !== null || found.toml !== detail.toml) ? found : null;
+    const work = keptWork(name);
+    return work !== null && (work.data !== null || work.toml !== detail.toml) ? work : null;
   });
   const [from, setFrom] = useState({ toml: kept?.toml ?? detail.toml, data: kept?.data ?? null });
   const start = useQuery({

@@ -1,7 +1,6 @@
 /** Questionnaires: from the bank, from a file, or made anew. */
 
 import { Button, FileButton, Group, Menu, Stack, Text } from "@mantine/core";
-import { notifications } from "@mantine/notifications";
 import { downloadText } from "../ui/download";
 import { FORMS, inLanguages } from "./bank";
 import { isTable, listAt, textAt } from "./data";
@@ -9,6 +8,7 @@ import { Field } from "./fields/Field";
 import { named } from "./fields/new-names";
 import { EXPERIMENT } from "./schema";
 import { useBuilderHere } from "./useBuilder";
+import { notify } from "../ui/notify";
 
 export function Forms() {
   const builder = useBuilderHere();
@@ -18,7 +18,7 @@ export function Forms() {
     if (file === null) return;
     const form = formIn(await file.text());
     if (form === null)
-      notifications.show({
+      notify({
         title: "No form in this file",
         message: `Expected a form saved here (JSON with name, title and fields), got ${file.name}.`,
         color: "red",
@@ -50,9 +50,9 @@ export function Forms() {
             </Button>
           )}
         </FileButton>
-        {forms.map((form, place) => (
+        {forms.map((form, index) => (
           <Button
-            key={place}
+            key={index}
             size="xs"
             variant="default"
             onClick={() => downloadText(`${textAt(form, ["name"])}.json`, JSON.stringify(form, null, 2), "application/json")}
@@ -68,8 +68,8 @@ export function Forms() {
 
 function formIn(text: string): unknown {
   try {
-    const found: unknown = JSON.parse(text);
-    return isTable(found) && typeof found["name"] === "string" && Array.isArray(found["fields"]) ? found : null;
+    const parsed: unknown = JSON.parse(text);
+    return isTable(parsed) && typeof parsed["name"] === "string" && Array.isArray(parsed["fields"]) ? parsed : null;
   } catch {
     return null;
   }

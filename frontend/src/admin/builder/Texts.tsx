@@ -88,12 +88,12 @@ function OnePage(props: { path: Path; schema: Parameters<typeof editorOf>[0]; re
 }
 
 function Shown({ text }: { text: string }) {
-  const place = useRef<HTMLDivElement>(null);
+  const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const parts = markdown(text === "" ? "*No text.*" : text);
     // Inside this page they are no headings of it.
     for (const part of parts) if (/^H\d$/.test(part.tagName)) part.setAttribute("role", "presentation");
-    place.current?.replaceChildren(...parts);
+    box.current?.replaceChildren(...parts);
   }, [text]);
-  return <div className="prose" ref={place} />;
+  return <div className="prose" ref={box} />;
 }

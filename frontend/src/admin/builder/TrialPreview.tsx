@@ -32,8 +32,8 @@ export function TrialPreview() {
       </Group>
       <div className="preview-clip">clip</div>
       <Stack gap="lg" mt="md" align="center">
-        {asked.map((scale, place) => (
-          <OneScale key={place} scale={scale} language={language} />
+        {asked.map((scale, index) => (
+          <OneScale key={index} scale={scale} language={language} />
         ))}
       </Stack>
     </Paper>
@@ -61,9 +61,9 @@ function OneScale({ scale, language }: { scale: Data; language: string }) {
       {hasEnds && isSlider && <Slider min={minimum} max={maximum} defaultValue={minimum} label={null} thumbLabel="slider" />}
       {hasEnds && !isSlider && (
         <Group gap={4} justify="center" wrap="nowrap">
-          {Array.from({ length: points }, (_, place) => (
-            <span key={place} className="preview-key">
-              {minimum + place}
+          {Array.from({ length: points }, (_, index) => (
+            <span key={index} className="preview-key">
+              {minimum + index}
             </span>
           ))}
         </Group>

@@ -105,7 +105,7 @@ export const FORMS: readonly BankForm[] = [
       name: "sus",
       when: "after",
       title: say("How was the system?", "Wie war das System?"),
-      fields: SUS.map((label, place) => likert(`sus_${place + 1}`, label, 5)),
+      fields: SUS.map((label, index) => likert(`sus_${index + 1}`, label, 5)),
     },
   },
   {

@@ -57,7 +57,7 @@ export function withMoved(list: readonly unknown[], from: number, to: number): u
 }
 
 /** As the server names places: elements are counted from 1. */
-export function placeName(path: Path): string {
+export function pathName(path: Path): string {
   return path.map((part) => (typeof part === "number" ? part + 1 : part)).join(".");
 }
 
@@ -78,9 +78,9 @@ export function labelOf(key: string): string {
 }
 
 /** A name that none of `taken` has: "factor_2" after "factor". */
-export function freeName(wanted: string, taken: readonly string[]): string {
-  if (!taken.includes(wanted)) return wanted;
+export function freeName(stem: string, taken: readonly string[]): string {
+  if (!taken.includes(stem)) return stem;
   let number = 2;
-  while (taken.includes(`${wanted}_${number}`)) number += 1;
-  return `${wanted}_${number}`;
+  while (taken.includes(`${stem}_${number}`)) number += 1;
+  return `${stem}_${number}`;
 }

@@ -1,7 +1,7 @@
 /** States of a declaration under edit, with undo and redo. */
 
 import type { Data, Path } from "./data";
-import { placeName, withValue } from "./data";
+import { pathName, withValue } from "./data";
 
 interface State {
   data: Data;
@@ -28,7 +28,7 @@ export function begun(data: Data, toml: string): History {
 /** One key set to another value (undefined removes it); edits of one key in a row are one step. */
 export function edited(history: History, path: Path, value: unknown, at: number): History {
   const data = withValue(history.now.data, path, value) as Data;
-  return stepped(history, { data, toml: null, edited: placeName(path), at });
+  return stepped(history, { data, toml: null, edited: pathName(path), at });
 }
 
 /** The whole text written anew; `data` is what it says. */

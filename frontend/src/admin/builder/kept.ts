@@ -15,9 +15,9 @@ const key = (study: string) => `palpebra-builder:${study}`;
 
 export function keptWork(study: string): Kept | null {
   try {
-    const found: unknown = JSON.parse(localStorage.getItem(key(study)) ?? "null");
-    if (typeof found !== "object" || found === null) return null;
-    const { toml, data, revision, at } = found as Partial<Kept>;
+    const stored: unknown = JSON.parse(localStorage.getItem(key(study)) ?? "null");
+    if (typeof stored !== "object" || stored === null) return null;
+    const { toml, data, revision, at } = stored as Partial<Kept>;
     if (typeof toml !== "string" || typeof revision !== "number" || typeof at !== "string") return null;
     return { toml, data: isTable(data) ? data : null, revision, at };
   } catch {

@@ -182,8 +182,8 @@ export function starterOf(
 /** What an edit of the key at this path (without list numbers) does to answers that are there. */
 export function effectOf(path: string, trialKind: string): Effect | null {
   for (let at = path; at !== ""; at = at.slice(0, Math.max(0, at.lastIndexOf(".")))) {
-    const found = EFFECTS[at] ?? (at.startsWith("trial.") ? TRIAL_EFFECTS[trialKind]?.[at.slice(6)] : undefined);
-    if (found !== undefined) return found;
+    const effect = EFFECTS[at] ?? (at.startsWith("trial.") ? TRIAL_EFFECTS[trialKind]?.[at.slice(6)] : undefined);
+    if (effect !== undefined) return effect;
     if (at === "trial.kind") return "measured";
   }
   return null;

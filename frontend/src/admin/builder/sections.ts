@@ -51,9 +51,9 @@ const NAMED: readonly Section[] = [
   { id: "analysis", label: "Analysis", about: "The analysis, fixed before the data.", keys: ["analysis"] },
   {
     id: "dataset",
-    label: "Handing on",
-    about: "Who made the data and under which licence others may use them. Stands in Psych-DS datasets and capsules.",
-    keys: ["dataset"],
+    label: "Keeping and handing on",
+    about: "How long data of persons are kept, and who may use the data under which licence.",
+    keys: ["retention", "dataset"],
   },
 ];
 

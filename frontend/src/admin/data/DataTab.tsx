@@ -4,6 +4,7 @@ import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
 import { studyQuery, useMay } from "../queries";
 import { type DataOrigin, ORIGINS } from "../results/origins";
+import { CapsuleCard } from "./CapsuleCard";
 import { SealCard } from "./SealCard";
 
 const FILES: [file: string, title: string, words: string][] = [
@@ -67,6 +68,7 @@ export function DataTab() {
         description="CSV files begin with a mark by which Excel knows their letters, and no cell of them can run as a formula. Leave it off for R, Python and analysis run."
       />
       <SealCard study={study} />
+      <CapsuleCard study={study} origin={origin === "all" ? "participant" : origin} />
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
         {files.map(([file, title, words]) => (
           <Card withBorder key={file}>

@@ -1,7 +1,6 @@
 /** The plan of the study, sealed before its first participant. */
 
 import { Button, Card, FileInput, Group, Stack, Text, Title } from "@mantine/core";
-import { notifications } from "@mantine/notifications";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
@@ -10,6 +9,7 @@ import { Answer } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
 import { useChange } from "../ui/useChange";
+import { notify } from "../ui/notify";
 
 export function SealCard({ study }: { study: string }) {
   const seal = useQuery({
@@ -25,7 +25,7 @@ export function SealCard({ study }: { study: string }) {
         Design, exclusions, analysis plan and power, fixed with a hash before the first participant. Reports list each deviation from it.
       </Text>
       <Answer of={seal}>
-        {(found) => (found.sealed_at === null ? <Unsealed study={study} seal={found} /> : <Sealed study={study} seal={found} />)}
+        {(record) => (record.sealed_at === null ? <Unsealed study={study} seal={record} /> : <Sealed study={study} seal={record} />)}
       </Answer>
     </Card>
   );
@@ -89,15 +89,11 @@ function Unsealed({ study, seal }: Props) {
 async function readObject(file: File | null): Promise<Record<string, unknown> | null> {
   if (file === null) return null;
   try {
-    const found: unknown = JSON.parse(await file.text());
-    if (typeof found === "object" && found !== null && !Array.isArray(found)) return { ...found };
+    const parsed: unknown = JSON.parse(await file.text());
+    if (typeof parsed === "object" && parsed !== null && !Array.isArray(parsed)) return { ...parsed };
   } catch {
     // Said below, as for JSON of another kind.
   }
-  notifications.show({
-    title: "That did not work",
-    message: `${file.name}: expected the JSON of analysis power, got another file.`,
-    color: "red",
-  });
+  notify({ title: "That did not work", message: `${file.name}: expected the JSON of analysis power, got another file.`, color: "red" });
   return null;
 }

@@ -96,13 +96,13 @@ function usePicture(address: string): HTMLImageElement | null {
   useEffect(() => {
     const image = new Image();
     image.src = address;
-    let wanted = true;
+    let live = true;
     void image.decode().then(
-      () => wanted && setPicture(image),
-      () => wanted && setPicture(null),
+      () => live && setPicture(image),
+      () => live && setPicture(null),
     );
     return () => {
-      wanted = false;
+      live = false;
     };
   }, [address]);
   return picture;

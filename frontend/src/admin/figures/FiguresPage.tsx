@@ -4,9 +4,11 @@ import { Stack, Tabs, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
-import { ModelSliders } from "./ModelSliders";
-import { Playground } from "./Playground";
-import { Recorded } from "./Recorded";
+import { onDemand } from "../ui/onDemand";
+
+const ModelSliders = onDemand(async () => (await import("./ModelSliders")).ModelSliders);
+const Recorded = onDemand(async () => (await import("./Recorded")).Recorded);
+const Playground = onDemand(async () => (await import("./Playground")).Playground);
 
 export function FiguresPage() {
   const library = useQuery({

@@ -1,9 +1,8 @@
 import { Alert, Button, Card, Group, SimpleGrid, Slider, Stack, Text } from "@mantine/core";
 import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
-import { closurePlot } from "../studies/closurePlot";
+import { ClosureFigure } from "../ui/ClosureFigure";
 import { downloadText } from "../ui/download";
-import { PlotFigure } from "../ui/PlotFigure";
 import { Character } from "./Character";
 import { blinkOf, readModel } from "./model";
 import { curveCsv } from "./Recorded";
@@ -12,7 +11,6 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
   const model = useMemo(() => readModel(library.model), [library]);
   const [deviations, setDeviations] = useState<number[]>(() => model.coefficient_sd.map(() => 0));
   const { closure, valid } = useMemo(() => blinkOf(model, deviations), [model, deviations]);
-  const options = useMemo(() => closurePlot(closure, 220), [closure]);
   return (
     <SimpleGrid cols={{ base: 1, md: 2 }}>
       <Card withBorder>
@@ -30,7 +28,7 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
                 label={(value) => `${value.toFixed(1)} sd`}
                 thumbLabel={`Component ${mode + 1} in standard deviations`}
                 marks={[{ value: -1 }, { value: 0 }, { value: 1 }]}
-                onChange={(value) => setDeviations(deviations.map((before, place) => (place === mode ? value : before)))}
+                onChange={(value) => setDeviations(deviations.map((before, index) => (index === mode ? value : before)))}
               />
             </div>
           ))}
@@ -52,7 +50,7 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
       </Card>
       <Card withBorder className="first-when-narrow">
         <Character closure={closure} fps={model.fps} />
-        <PlotFigure options={options} label="Closure of this blink over time" />
+        <ClosureFigure closure={closure} height={220} label="Closure of this blink over time" />
         <Text size="sm">
           {((closure.length * 1000) / model.fps).toFixed(0)} ms, greatest closure {Math.max(...closure).toFixed(2)}
         </Text>

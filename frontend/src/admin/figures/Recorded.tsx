@@ -2,7 +2,7 @@ import * as Plot from "@observablehq/plot";
 import { Button, Card, Group, SegmentedControl, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
-import { closurePlot } from "../studies/closurePlot";
+import { ClosureFigure } from "../ui/ClosureFigure";
 import { downloadText } from "../ui/download";
 import { PlotFigure } from "../ui/PlotFigure";
 import { Character } from "./Character";
@@ -84,7 +84,7 @@ function alignedPlot(profiles: readonly Profile[], fps: number): Plot.PlotOption
   const rows = profiles.flatMap((profile) =>
     profile.closure.map((closure, frame) => ({
       id: profile.profile_id,
-      who: `person ${profile.person}`,
+      person: `person ${profile.person}`,
       time: ((frame - profile.minimum_index) * 1000) / fps,
       closure,
     })),
@@ -95,12 +95,11 @@ function alignedPlot(profiles: readonly Profile[], fps: number): Plot.PlotOption
     x: { label: "time (ms)" },
     y: { domain: [1, 0], label: "closure" },
     color: { legend: true, scheme: "observable10" },
-    marks: [Plot.line(rows, { x: "time", y: "closure", z: "id", stroke: "who", strokeOpacity: 0.6 })],
+    marks: [Plot.line(rows, { x: "time", y: "closure", z: "id", stroke: "person", strokeOpacity: 0.6 })],
   };
 }
 
 function One({ profile, chosen, onChoose }: { profile: Profile; chosen: boolean; onChoose: () => void }) {
-  const options = useMemo(() => closurePlot(profile.closure, 120, profile.closure_other), [profile]);
   const file = `${profile.profile_id}.csv`;
   return (
     <Card withBorder padding="sm">
@@ -110,7 +109,12 @@ function One({ profile, chosen, onChoose }: { profile: Profile; chosen: boolean;
       <Text size="xs" c="dimmed">
         {profile.profile_id}, {profile.source} ({profile.licence})
       </Text>
-      <PlotFigure options={options} label={`Closure of ${nameOf(profile)}${isPair(profile) ? "; the right eye dashed" : ""}`} />
+      <ClosureFigure
+        closure={profile.closure}
+        other={profile.closure_other}
+        height={120}
+        label={`Closure of ${nameOf(profile)}${isPair(profile) ? "; the right eye dashed" : ""}`}
+      />
       {isPair(profile) && (
         <Text size="xs" c="dimmed">
           left eye solid, right eye dashed
@@ -140,8 +144,8 @@ function One({ profile, chosen, onChoose }: { profile: Profile; chosen: boolean;
 
 /** A curve as the clip builder reads it: one closure sample a line, the right eye's beside it where there is one. */
 export function curveCsv(closure: readonly number[], other: readonly number[] = []): string {
-  const lines = closure.map((value, place) =>
-    [value, other[place]]
+  const lines = closure.map((value, index) =>
+    [value, other[index]]
       .filter((one) => one !== undefined)
       .map((one) => one.toFixed(6))
       .join(","),

@@ -39,9 +39,9 @@ export function readModel(json: Record<string, unknown>): BlinkModel {
 
 /** Closure per frame for coefficients in standard deviations; `valid` is false where the lids would overlap. */
 export function blinkOf(model: BlinkModel, deviations: readonly number[]): { closure: number[]; valid: boolean } {
-  const row = model.mean.map((mean, place) =>
+  const row = model.mean.map((mean, frame) =>
     model.components.reduce(
-      (sum, component, mode) => sum + (deviations[mode] ?? 0) * (model.coefficient_sd[mode] ?? 0) * (component[place] ?? 0),
+      (sum, component, mode) => sum + (deviations[mode] ?? 0) * (model.coefficient_sd[mode] ?? 0) * (component[frame] ?? 0),
       mean,
     ),
   );
@@ -57,8 +57,8 @@ export function blinkOf(model: BlinkModel, deviations: readonly number[]): { clo
 
 /** `values` at `length` equally spaced places, by straight lines between samples. */
 function resampled(values: readonly number[], length: number): number[] {
-  return Array.from({ length }, (_, place) => {
-    const at = (place * (values.length - 1)) / Math.max(1, length - 1);
+  return Array.from({ length }, (_, index) => {
+    const at = (index * (values.length - 1)) / Math.max(1, length - 1);
     const before = Math.floor(at);
     const left = values[before] ?? 0;
     return left + (at - before) * ((values[before + 1] ?? left) - left);

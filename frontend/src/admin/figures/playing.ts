@@ -7,9 +7,9 @@ export function framesAt(closure: readonly number[], fps: number, shownFps: numb
   return [0, ...inside, 0];
 }
 
-function valueAt(values: readonly number[], place: number): number {
+function valueAt(values: readonly number[], position: number): number {
   const last = values.length - 1;
-  const before = Math.min(last, Math.floor(place));
+  const before = Math.min(last, Math.floor(position));
   const [left = 0, right = 0] = [values[before], values[Math.min(last, before + 1)]];
-  return left + Math.min(1, place - before) * (right - left);
+  return left + Math.min(1, position - before) * (right - left);
 }

@@ -7,7 +7,7 @@ import { BlinkCard, BlinkList } from "./BlinkList";
 import { OpenFile } from "./OpenFile";
 import { TraceView } from "./TraceView";
 import { useBlinkReview } from "./useBlinkReview";
-import { useShortcuts } from "./useShortcuts";
+import { useShortcuts } from "../ui/useShortcuts";
 import { useUnsaved } from "../ui/useUnsaved";
 
 type Review = ReturnType<typeof useBlinkReview>;

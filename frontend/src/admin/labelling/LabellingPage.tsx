@@ -10,7 +10,7 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { OpenFile } from "./OpenFile";
 import { Stage } from "./Stage";
 import { useLabelling } from "./useLabelling";
-import { useShortcuts } from "./useShortcuts";
+import { useShortcuts } from "../ui/useShortcuts";
 import { useUnsaved } from "../ui/useUnsaved";
 
 type Labelling = ReturnType<typeof useLabelling>;
@@ -93,16 +93,16 @@ function Eyes({ work }: { work: Labelling }) {
 
 function Frame({ work }: { work: Labelling }) {
   if (work.video === null) return null;
-  const place = work.chosen.indexOf(work.current);
+  const position = work.chosen.indexOf(work.current);
   const frame = work.frames.get(work.current);
   return (
     <Card withBorder>
       <Group justify="space-between" mb="xs">
         <Group gap="xs">
-          <Button variant="default" onClick={() => work.step(-1)} disabled={place <= 0}>
+          <Button variant="default" onClick={() => work.step(-1)} disabled={position <= 0}>
             Previous
           </Button>
-          <Button variant="default" onClick={() => work.step(1)} disabled={place >= work.chosen.length - 1}>
+          <Button variant="default" onClick={() => work.step(1)} disabled={position >= work.chosen.length - 1}>
             Next
           </Button>
           <Text className="number">

@@ -2,9 +2,11 @@
 
 import { Button, Group, Text } from "@mantine/core";
 import { type PointerEvent, useEffect, useRef } from "react";
-import { EYE_POINTS, eyeCount, eyeOf, type Point, pointName, type Shape, type Size } from "../../labelling/points";
-import { useShortcuts } from "./useShortcuts";
+import { EYE_POINTS, eyeCount, eyeOf, nearestPoint, type Point, pointName, type Shape, type Size } from "../../labelling/points";
+import { useShortcuts } from "../ui/useShortcuts";
 import { toPicture, toScreen, useView, type View } from "./useView";
+
+const REACH_PX = 11;
 
 export type MoveKind = "point" | "eye" | "stretch";
 
@@ -44,14 +46,15 @@ export function Stage({ picture, size, shape, selected, onSelect, onMove }: Prop
 
   useShortcuts({ "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8), "0": fit, e: () => showShape(shape) });
 
-  const placeOf = (event: PointerEvent<SVGSVGElement>): Point => {
+  const pointOf = (event: PointerEvent<SVGSVGElement>): Point => {
     const box = event.currentTarget.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   };
   const press = (event: PointerEvent<SVGSVGElement>): void => {
-    const name = event.target instanceof Element ? event.target.getAttribute("data-point") : null;
-    const index = name === null ? null : Number(name);
-    const last = placeOf(event);
+    const last = pointOf(event);
+    // In a view of the whole frame points overlap: the nearest is meant, not the one that lies on top.
+    const onScreen = shape.map((point) => toScreen(view, point));
+    const index = nearestPoint(onScreen, last, REACH_PX);
     const point = index === null ? undefined : shape[index];
     const screen = point === undefined ? last : toScreen(view, point);
     drags.current += 1;
@@ -66,7 +69,7 @@ export function Stage({ picture, size, shape, selected, onSelect, onMove }: Prop
   const move = (event: PointerEvent<SVGSVGElement>): void => {
     const held = drag.current;
     if (held === null) return;
-    const now = placeOf(event);
+    const now = pointOf(event);
     if (held.index === null) pan(now[0] - held.last[0], now[1] - held.last[1]);
     else {
       const to = toPicture(view, [now[0] + held.offset[0], now[1] + held.offset[1]]);
@@ -152,12 +155,12 @@ function Points({ shape, view, selected, onSelect }: PointsProps) {
       ))}
       {shape.map((point, index) => {
         const [x, y] = toScreen(view, point);
-        const place = index % EYE_POINTS;
-        const kind = place === 0 || place === 5 ? "canthus" : place > 5 ? "lower" : "upper";
+        const eyePoint = index % EYE_POINTS;
+        const kind = eyePoint === 0 || eyePoint === 5 ? "canthus" : eyePoint > 5 ? "lower" : "upper";
         const [px, py] = point.map((value) => value.toFixed(1));
         return (
           <g key={index}>
-            <circle className="reach" data-point={index} cx={x} cy={y} r={11} />
+            <circle className="reach" cx={x} cy={y} r={REACH_PX} />
             <circle
               className={`point ${kind}${selected === index ? " chosen" : ""}`}
               data-point={index}

@@ -158,7 +158,7 @@ function Times({ window, fps, width }: { window: Window; fps: number; width: num
   const step = [1, 2, 5, 10].map((unit) => unit * power).find((unit) => unit >= rough) ?? rough;
   // A number half outside the figure cannot be read.
   const first = Math.ceil((window.from / fps + (16 * seconds) / width) / step);
-  const ticks = Array.from({ length: Math.floor(window.to / fps / step) - first + 1 }, (_, place) => (first + place) * step);
+  const ticks = Array.from({ length: Math.floor(window.to / fps / step) - first + 1 }, (_, index) => (first + index) * step);
   const digits = Math.max(0, -Math.floor(Math.log10(step)));
   return (
     <g aria-hidden="true">

@@ -81,10 +81,10 @@ export function useBlinkReview() {
   const openReview = (file: File): Promise<void> =>
     reading(file, (name, text) => {
       if (table === null) return;
-      const found = decide(table.blinks, parseReview(name, text), table.fps);
+      const review = decide(table.blinks, parseReview(name, text), table.fps);
       setReviewName(name);
-      setLost(found.lost);
-      begin(found.decisions);
+      setLost(review.lost);
+      begin(review.decisions);
     });
 
   const put = (next: Decisions, step: string | null = null): void => setHistory((before) => changed(before, next, step));
@@ -121,8 +121,8 @@ export function useBlinkReview() {
     openReview,
     choose,
     step: (by: 1 | -1) => {
-      const place = chosen === null ? (by === 1 ? -1 : blinks.length) : blinks.indexOf(chosen);
-      const next = blinks[place + by];
+      const position = chosen === null ? (by === 1 ? -1 : blinks.length) : blinks.indexOf(chosen);
+      const next = blinks[position + by];
       if (next !== undefined) choose(next);
     },
     decide: (blink: Blink, decision: Decision["decision"], reason: string) =>

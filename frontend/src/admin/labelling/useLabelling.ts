@@ -16,7 +16,7 @@ import {
 } from "../../labelling/labelled-frames";
 import { type Point, withEyeMoved, withEyeStretched, withPoint } from "../../labelling/points";
 import { type Start, startShape } from "../../labelling/start-shape";
-import { type OpenedVideo, openVideo } from "../../labelling/video";
+import type { OpenedVideo } from "../../labelling/video";
 import { downloadText } from "../ui/download";
 import type { MoveKind } from "./Stage";
 import { message, type Picture, usePicture } from "./usePicture";
@@ -54,17 +54,19 @@ export function useLabelling() {
     setProblem(null);
     setBusy("Opening the video");
     try {
+      // The readers of video files load when the first one is opened.
+      const { openVideo } = await import("../../labelling/video");
       const next = await openVideo(file);
       const candidates = candidateFrames(next.frameCount);
       const pictures = await next.thumbnails(candidates, (count) =>
         setBusy(`Looking for frames unlike one another: ${count} of ${candidates.length}`),
       );
-      const found = { candidates, pictures };
-      const numbers = chooseFrames(found, []);
+      const samples = { candidates, pictures };
+      const numbers = chooseFrames(samples, []);
       video?.close();
       greys.current.clear();
       setVideo(next);
-      setLooked(found);
+      setLooked(samples);
       setChosen(numbers);
       setCurrent(numbers[0] ?? 0);
       begin(NOTHING, eyes, { ...defaultMarkers(eyes), rest: {} });
@@ -102,12 +104,12 @@ export function useLabelling() {
   );
   useEffect(() => {
     if (video === null || picture === null || labelled) return;
-    let wanted = true;
+    let live = true;
     propose(video, picture)
-      .then((found) => wanted && setStart(found))
-      .catch((error: unknown) => wanted && setProblem(message(error)));
+      .then((proposal) => live && setStart(proposal))
+      .catch((error: unknown) => live && setProblem(message(error)));
     return () => {
-      wanted = false;
+      live = false;
     };
   }, [video, picture, current, labelled, eyes]);
 
@@ -133,9 +135,9 @@ export function useLabelling() {
 
   const goTo = (number: number): void => {
     if (video === null) return;
-    const place = Math.max(0, Math.min(video.frameCount - 1, number));
-    setChosen((before) => (before.includes(place) ? before : [...before, place].sort((a, b) => a - b)));
-    setCurrent(place);
+    const frameNumber = Math.max(0, Math.min(video.frameCount - 1, number));
+    setChosen((before) => (before.includes(frameNumber) ? before : [...before, frameNumber].sort((a, b) => a - b)));
+    setCurrent(frameNumber);
     setProblem(null);
   };
 

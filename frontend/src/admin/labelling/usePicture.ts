@@ -17,13 +17,13 @@ export function usePicture(video: OpenedVideo | null, current: number, tell: (pr
   const [shown, setShown] = useState<{ video: OpenedVideo; picture: Picture } | null>(null);
   useEffect(() => {
     if (video === null) return;
-    let wanted = true;
+    let live = true;
     video
       .frame(current)
-      .then((canvas) => wanted && setShown({ video, picture: { number: current, canvas } }))
-      .catch((error: unknown) => wanted && tell(message(error)));
+      .then((canvas) => live && setShown({ video, picture: { number: current, canvas } }))
+      .catch((error: unknown) => live && tell(message(error)));
     return () => {
-      wanted = false;
+      live = false;
     };
   }, [video, current, tell]);
   return shown?.video === video && shown.picture.number === current ? shown.picture : null;

@@ -72,7 +72,7 @@ function RunsTable({ study, rows, empty }: { study: string; rows: Run[]; empty: 
       empty={empty}
       paged={false}
       columns={[
-        { title: "Participant", wrap: true, cell: (run) => <Who study={study} run={run} /> },
+        { title: "Participant", wrap: true, cell: (run) => <ParticipantCell study={study} run={run} /> },
         { title: "Status", cell: (run) => (run.erased_at !== null ? "erased" : run.status.replace("_", " ")) },
         { title: "Answered", number: true, cell: (run) => `${run.answered} of ${run.trials}` },
         { title: "Plays not good", number: true, wide: true, cell: (run) => run.not_good },
@@ -84,7 +84,7 @@ function RunsTable({ study, rows, empty }: { study: string; rows: Run[]; empty: 
   );
 }
 
-function Who({ study, run }: { study: string; run: Run }) {
+function ParticipantCell({ study, run }: { study: string; run: Run }) {
   return (
     <Group gap={6}>
       <Anchor component={Link} to={`/studies/${study}/participants/${run.run}`}>

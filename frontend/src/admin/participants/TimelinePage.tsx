@@ -1,4 +1,4 @@
-import { Anchor, Card, Group, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Button, Card, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link, useParams } from "@tanstack/react-router";
 import { api, type Schemas, unwrap } from "../api";
@@ -57,7 +57,25 @@ export function TimelinePage() {
                 {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>
               <Group>
-                {owns && data.summary.erased_at === null && <IdentityButton study={study} run={run} />}
+                {data.summary.erased_at === null && (
+                  <Button component={Link} to={`/studies/${study}/participants/${run}/replay`} variant="default">
+                    Replay
+                  </Button>
+                )}
+                {owns && data.summary.erased_at === null && (
+                  <>
+                    <IdentityButton study={study} run={run} />
+                    <Button
+                      component="a"
+                      variant="default"
+                      href={`/api/admin/studies/${study}/runs/${run}/subject-access`}
+                      title="Everything stored of this person, as JSON"
+                      download
+                    >
+                      Subject access
+                    </Button>
+                  </>
+                )}
                 {mayChange && data.summary.erased_at === null && <RunActions study={study} summary={data.summary} mayErase={mayErase} />}
               </Group>
             </Group>
@@ -76,8 +94,8 @@ export function TimelinePage() {
                 <Title order={3} size="h5">
                   Events
                 </Title>
-                {data.events.map((event, place) => (
-                  <Text size="sm" key={`${event.received_at}${String(place)}`}>
+                {data.events.map((event, index) => (
+                  <Text size="sm" key={`${event.received_at}${String(index)}`}>
                     {when(event.received_at)}: {words(event.type)}
                   </Text>
                 ))}

@@ -1,12 +1,13 @@
 /** Every play of a run: what was shown, frame by frame, and what was answered. */
 
-import { Badge } from "@mantine/core";
+import { Anchor, Badge } from "@mantine/core";
+import { Link, useParams } from "@tanstack/react-router";
 import type { Schemas } from "../api";
 import { type Column, DataTable } from "../ui/DataTable";
 import { fixed, words } from "../ui/format";
+import { VERDICT_COLOURS } from "../ui/verdicts";
 
 type Trial = Schemas["TimelineTrial"];
-const COLOURS: Record<string, string> = { good: "teal.9", uncertain: "blue.9", flagged: "yellow.9", failed: "red.9" };
 
 const COLUMNS: Column<Trial>[] = [
   {
@@ -14,7 +15,7 @@ const COLUMNS: Column<Trial>[] = [
     number: true,
     cell: (trial) => (
       <>
-        {trial.trial_index}
+        <ReplayLink trial={trial.trial_index} />
         {trial.play > 1 && ` (play ${trial.play})`}{" "}
         {trial.kind !== "main" && (
           <Badge variant="default" size="sm">
@@ -34,7 +35,7 @@ const COLUMNS: Column<Trial>[] = [
   {
     title: "Shown",
     cell: (trial) => (
-      <Badge color={COLOURS[trial.verdict] ?? "gray.7"} size="sm" title={words(trial.verdict_rule)}>
+      <Badge color={VERDICT_COLOURS[trial.verdict] ?? "gray.7"} size="sm" title={words(trial.verdict_rule)}>
         {trial.verdict}
       </Badge>
     ),
@@ -47,6 +48,21 @@ const COLUMNS: Column<Trial>[] = [
   },
   { title: "Each frame drawn", wide: true, cell: (trial) => (trial.drawn === null ? "–" : <Ticks drawn={trial.drawn} />) },
 ];
+
+/** The trial's number, which leads to its replay. */
+function ReplayLink({ trial }: { trial: number }) {
+  const { study = "", run = "" } = useParams({ strict: false });
+  return (
+    <Anchor
+      component={Link}
+      to={`/studies/${study}/participants/${run}/replay`}
+      search={{ trial } as never}
+      title={`Replay trial ${trial}`}
+    >
+      {trial}
+    </Anchor>
+  );
+}
 
 /** The one number, or what was answered on each scale. */
 function given({ response, answer }: Trial): string {
@@ -76,9 +92,9 @@ function Ticks({ drawn }: { drawn: number[][] }) {
   const length = Math.max(1, (times.at(-1) ?? 0) - start);
   return (
     <svg viewBox="0 0 220 12" width={220} height={12} role="img" aria-label={`${times.length} frames in ${length.toFixed(0)} ms`}>
-      {times.map((time, place) => {
+      {times.map((time, index) => {
         const x = 1 + (218 * (time - start)) / length;
-        return <line key={place} x1={x} x2={x} y1={1} y2={11} stroke="currentColor" strokeWidth={1} />;
+        return <line key={index} x1={x} x2={x} y1={1} y2={11} stroke="currentColor" strokeWidth={1} />;
       })}
     </svg>
   );

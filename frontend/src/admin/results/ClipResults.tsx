@@ -2,26 +2,20 @@
 
 import { Card, Group, ScrollArea, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useMemo, useState } from "react";
+import { useState } from "react";
 import type { Schemas } from "../api";
 import { clipsQuery } from "../queries";
-import { ClipCard } from "../studies/ClipsTab";
+import { ClipCard } from "../clips/ClipCard";
 import { fixed } from "../ui/format";
-import { cellLabels, type Factors } from "./plots";
+import type { Factors } from "./plots";
+import { useCellLabels } from "./useCellLabels";
 
 type Clip = Schemas["ClipResult"];
 const keyOf = (clip: Clip) => `${clip.cell} ${String(clip.exemplar)} ${clip.clip_sha256}`;
 
 export function ClipResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
   const clips = useQuery(clipsQuery(study));
-  const labels = useMemo(
-    () =>
-      cellLabels(
-        data.clips.map(({ cell }) => cell),
-        factors,
-      ),
-    [data, factors],
-  );
+  const labels = useCellLabels(data.clips, factors);
   const [chosen, setChosen] = useState("");
   const current = data.clips.find((clip) => keyOf(clip) === chosen) ?? data.clips[0];
   const shown = clips.data?.find((clip) => clip.clip_sha256 === current?.clip_sha256 && clip.cell === current.cell);
@@ -65,7 +59,7 @@ export function ClipResults({ study, data, factors }: { study: string; data: Sch
           {shown === undefined ? (
             <Text c="dimmed">This clip is of an earlier version of the study.</Text>
           ) : (
-            <ClipCard key={shown.url} clip={shown} />
+            <ClipCard key={shown.url} study={study} clip={shown} />
           )}
         </Stack>
       </Group>
@@ -76,14 +70,14 @@ export function ClipResults({ study, data, factors }: { study: string; data: Sch
 /** How often each answer was given: small bars, with the counts for those who hear the page. */
 function Bars({ counts, bins }: { counts: number[]; bins: number[] }) {
   const most = Math.max(1, ...counts);
-  const label = counts.map((count, place) => `${bins[place] ?? ""}: ${count}`).join(", ");
+  const label = counts.map((count, bin) => `${bins[bin] ?? ""}: ${count}`).join(", ");
   return (
     <svg width={14 * counts.length} height={22} role="img" aria-label={label}>
       <title>{label}</title>
-      {counts.map((count, place) => (
+      {counts.map((count, bin) => (
         <rect
-          key={place}
-          x={14 * place}
+          key={bin}
+          x={14 * bin}
           y={21 - (20 * count) / most}
           width={11}
           height={(20 * count) / most + 1}

@@ -1,8 +1,9 @@
 /** Paired comparisons: what was chosen between cells, and how often each level was. */
 
-import { Card, SimpleGrid, Table, Text, Title } from "@mantine/core";
+import { Card, SimpleGrid, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
 import type { Schemas } from "../api";
+import { type Column, DataTable } from "../ui/DataTable";
 import { PlotFigure } from "../ui/PlotFigure";
 import { HowShown } from "./HowShown";
 import { choicePlot, comparedCells, levelPlot } from "./pair-plots";
@@ -40,33 +41,27 @@ export function PairResults({ data, factors }: { data: Data; factors: Factors })
         <Text size="sm">
           Left (or first) {share(data.left)}, right (or second) {share(data.right)}, neither {share(data.ties)}.
         </Text>
-        <Table.ScrollContainer minWidth={480}>
-          <Table>
-            <Table.Thead>
-              <Table.Tr>
-                {["First", "Second", "Comparisons", "First chosen", "Second chosen", "Neither"].map((head) => (
-                  <Table.Th key={head}>{head}</Table.Th>
-                ))}
-              </Table.Tr>
-            </Table.Thead>
-            <Table.Tbody>
-              {data.pairs.map((pair) => (
-                <Table.Tr key={`${pair.first} ${pair.second}`}>
-                  <Table.Td>{labels.get(pair.first)}</Table.Td>
-                  <Table.Td>{labels.get(pair.second)}</Table.Td>
-                  {[pair.n, pair.first_chosen, pair.second_chosen, pair.ties].map((count, place) => (
-                    <Table.Td key={place} className="number">
-                      {count}
-                    </Table.Td>
-                  ))}
-                </Table.Tr>
-              ))}
-            </Table.Tbody>
-          </Table>
-        </Table.ScrollContainer>
+        <DataTable
+          label="Each pair of cells"
+          rows={data.pairs}
+          rowKey={({ first, second }) => `${first} ${second}`}
+          columns={pairColumns(labels)}
+          empty="No comparisons."
+        />
       </Card>
     </>
   );
+}
+
+function pairColumns(labels: Map<string, string>): Column<Data["pairs"][number]>[] {
+  return [
+    { title: "First", cell: ({ first }) => labels.get(first) },
+    { title: "Second", cell: ({ second }) => labels.get(second) },
+    { title: "Comparisons", number: true, cell: ({ n }) => n },
+    { title: "First chosen", number: true, cell: ({ first_chosen }) => first_chosen },
+    { title: "Second chosen", number: true, cell: ({ second_chosen }) => second_chosen },
+    { title: "Neither", number: true, cell: ({ ties }) => ties },
+  ];
 }
 
 function LevelCard({ name, data, factors }: { name: string; data: Data; factors: Factors }) {

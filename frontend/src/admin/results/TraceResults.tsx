@@ -1,26 +1,21 @@
 /** Continuous ratings: the mean trace of each cell, and when its clips blink. */
 
-import { Card, SimpleGrid, Table, Text, Title } from "@mantine/core";
+import { Card, SimpleGrid, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
 import type { Schemas } from "../api";
+import { type Column, DataTable } from "../ui/DataTable";
 import { fixed } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { HowShown } from "./HowShown";
-import { cellLabels, type Factors } from "./plots";
+import type { Factors } from "./plots";
 import { cellTracePlot, tracesPlot } from "./trace-plots";
+import { useCellLabels } from "./useCellLabels";
 
 type Data = Schemas["TraceResults"];
 type Cell = Schemas["TraceCell"];
 
 export function TraceResults({ data, factors }: { data: Data; factors: Factors }) {
-  const labels = useMemo(
-    () =>
-      cellLabels(
-        data.cells.map(({ cell }) => cell),
-        factors,
-      ),
-    [data, factors],
-  );
+  const labels = useCellLabels(data.cells, factors);
   const together = useMemo(() => tracesPlot(data, labels), [data, labels]);
   return (
     <>
@@ -44,7 +39,7 @@ export function TraceResults({ data, factors }: { data: Data; factors: Factors }
         <Title order={2} size="h5" mb="xs">
           Cells
         </Title>
-        <Levels data={data} labels={labels} />
+        <DataTable label="Cells" rows={data.cells} rowKey={({ cell }) => cell} columns={levelColumns(labels)} empty="No traces." />
       </Card>
     </>
   );
@@ -69,31 +64,11 @@ function CellCard({ cell, data, label }: { cell: Cell; data: Data; label: string
   );
 }
 
-function Levels({ data, labels }: { data: Data; labels: Map<string, string> }) {
-  return (
-    <Table.ScrollContainer minWidth={320}>
-      <Table>
-        <Table.Thead>
-          <Table.Tr>
-            {["Cell", "People", "Traces", "Mean"].map((head) => (
-              <Table.Th key={head}>{head}</Table.Th>
-            ))}
-          </Table.Tr>
-        </Table.Thead>
-        <Table.Tbody>
-          {data.cells.map(({ cell, people, traces, level }) => (
-            <Table.Tr key={cell}>
-              <Table.Td>{labels.get(cell)}</Table.Td>
-              {[people, traces].map((count, place) => (
-                <Table.Td key={place} className="number">
-                  {count.toLocaleString()}
-                </Table.Td>
-              ))}
-              <Table.Td className="number">{fixed(level)}</Table.Td>
-            </Table.Tr>
-          ))}
-        </Table.Tbody>
-      </Table>
-    </Table.ScrollContainer>
-  );
+function levelColumns(labels: Map<string, string>): Column<Cell>[] {
+  return [
+    { title: "Cell", cell: ({ cell }) => labels.get(cell) },
+    { title: "People", number: true, cell: ({ people }) => people.toLocaleString() },
+    { title: "Traces", number: true, cell: ({ traces }) => traces.toLocaleString() },
+    { title: "Mean", number: true, cell: ({ level }) => fixed(level) },
+  ];
 }

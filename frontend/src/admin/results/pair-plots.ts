@@ -17,7 +17,7 @@ export function comparedCells({ pairs }: Data, factors: Factors): Map<string, st
 /** One row and column a cell, columns by the numbers of the rows: how often that of the row was chosen over that of the column. */
 export function choicePlot({ pairs }: Data, labels: Map<string, string>): Plot.PlotOptions {
   const names = [...labels.values()];
-  const numbers = new Map(names.map((name, place) => [name, String(place + 1)]));
+  const numbers = new Map(names.map((name, index) => [name, String(index + 1)]));
   const rows = pairs.flatMap(({ first, second, n, first_chosen, ties }) => {
     const share = (first_chosen + ties / 2) / n;
     const [one, other] = [labels.get(first) ?? first, labels.get(second) ?? second];

@@ -17,7 +17,7 @@ export function labelsOf(factors: Factors, name: string): { title: string; of: (
 /** Cells in declared order with the labels of the factors in which they differ. */
 export function cellLabels(cells: Iterable<string>, factors: Factors): Map<string, string> {
   const every = [...new Set(cells)].sort((one, other) => order(one, factors) - order(other, factors));
-  const varied = factors.map((_, place) => new Set(every.map((cell) => cell.split("/")[place])).size > 1);
+  const varied = factors.map((_, index) => new Set(every.map((cell) => cell.split("/")[index])).size > 1);
   return new Map(every.map((cell) => [cell, labelOf(cell, factors, varied)]));
 }
 
@@ -25,14 +25,14 @@ export function cellLabels(cells: Iterable<string>, factors: Factors): Map<strin
 function order(cell: string, factors: Factors): number {
   const levels = cell.split("/");
   return factors.reduce(
-    (sum, factor, place) => sum * factor.levels.length + factor.levels.findIndex(({ name }) => name === levels[place]),
+    (sum, factor, index) => sum * factor.levels.length + factor.levels.findIndex(({ name }) => name === levels[index]),
     0,
   );
 }
 
 function labelOf(cell: string, factors: Factors, varied: boolean[]): string {
-  const labels = cell.split("/").map((level, place) => labelsOf(factors, factors[place]?.name ?? "").of(level));
-  return labels.filter((_, place) => varied[place]).join(", ") || cell;
+  const labels = cell.split("/").map((level, index) => labelsOf(factors, factors[index]?.name ?? "").of(level));
+  return labels.filter((_, index) => varied[index]).join(", ") || cell;
 }
 
 /** Room and line width for labels on the left: they break into lines, so that a phone's width holds the figure too. */
@@ -87,9 +87,9 @@ export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotO
   );
   const names = [...labels.values()];
   const rows = cells.flatMap((cell) =>
-    cell.counts.map((count, place) => ({
+    cell.counts.map((count, bin) => ({
       cell: labels.get(cell.cell) ?? cell.cell,
-      response: bins[place] ?? 0,
+      response: bins[bin] ?? 0,
       share: cell.ratings === 0 ? 0 : count / cell.ratings,
     })),
   );
@@ -146,6 +146,6 @@ export function timePlot({ response_times }: AnyResults): Plot.PlotOptions {
 }
 
 export function delayPlot({ playback }: AnyResults): Plot.PlotOptions {
-  const bins = playback.key_to_first_frame_ms.map((count, place) => ({ from: 10 * place, count }));
+  const bins = playback.key_to_first_frame_ms.map((count, bin) => ({ from: 10 * bin, count }));
   return histogram(bins, 10, "ms, key to frame (last bin: 100+)", "plays");
 }

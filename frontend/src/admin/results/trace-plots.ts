@@ -15,12 +15,12 @@ interface Point {
 }
 
 export function pointsOf(cell: Cell, label: string): Point[] {
-  return cell.times_s.map((time_s, place) => ({
+  return cell.times_s.map((time_s, sample) => ({
     cell: label,
     time_s,
-    mean: cell.mean[place] ?? NaN,
-    low: cell.low?.[place],
-    high: cell.high?.[place],
+    mean: cell.mean[sample] ?? NaN,
+    low: cell.low?.[sample],
+    high: cell.high?.[sample],
   }));
 }
 
@@ -46,8 +46,8 @@ const GAP = 0.3;
 /** A tick a blink, in a row a clip below the scale. */
 export function ticksOf({ blinks_s }: Cell, { minimum, maximum }: Data): { time_s: number; from: number; to: number }[] {
   const row = (STRIP * (maximum - minimum)) / Math.max(1, blinks_s.length);
-  return blinks_s.flatMap((times, place) =>
-    times.map((time_s) => ({ time_s, from: minimum - (place + 1) * row, to: minimum - (place + GAP) * row })),
+  return blinks_s.flatMap((times, lane) =>
+    times.map((time_s) => ({ time_s, from: minimum - (lane + 1) * row, to: minimum - (lane + GAP) * row })),
   );
 }
 

@@ -17,6 +17,7 @@ const PAGES = [
   { to: "/blink-review", label: "Review blinks", role: "viewer", group: "Stimuli" },
   { to: "/workspaces", label: "Workspaces", role: "viewer", group: "This server" },
   { to: "/people", label: "People", role: "owner", group: "This server" },
+  { to: "/backups", label: "Backups", role: "owner", group: "This server" },
   { to: "/audit", label: "Audit log", role: "owner", group: "This server" },
   { to: "/account", label: "My account", role: "viewer", group: "This server" },
 ] as const;

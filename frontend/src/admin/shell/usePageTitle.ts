@@ -11,17 +11,19 @@ const PAGES: Record<string, string> = {
   labelling: "Label video",
   "blink-review": "Review blinks",
   people: "People",
+  workspaces: "Workspaces",
+  backups: "Backups",
   audit: "Audit log",
   account: "My account",
 };
 
 export function usePageTitle(pathname: string): void {
-  const [first = "", study = "", tab = "design", run] = pathname.split("/").slice(1);
+  const [first = "", study = "", tab = "design", run, part] = pathname.split("/").slice(1);
   const isStudy = first === "studies" && study !== "" && study !== "new";
   const title = useQuery({ ...studyQuery(study), enabled: isStudy }).data?.summary.title ?? study;
   const page = `${(tab || "design").charAt(0).toUpperCase()}${(tab || "design").slice(1)}`;
   const words = isStudy
-    ? [run === undefined ? page : `Run ${run.slice(0, 8)}`, title]
+    ? [run === undefined ? page : `${part === "replay" ? "Replay of run" : "Run"} ${run.slice(0, 8)}`, title]
     : [PAGES[study === "new" ? "new" : first] ?? "Not found"];
   useDocumentTitle([...words, "Palpebra"].join(" – "));
 }

@@ -1,26 +1,22 @@
 /** Further clips, or others in the place of those there are: saved as a new version. */
 
-import { Button, FileInput, Group, Stack, Text, TextInput } from "@mantine/core";
+import { Button, Group, Stack, Text, TextInput } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
+import { api, unwrap } from "../api";
 import { forgetWork, keptWork } from "../builder/kept";
+import { UploadClips } from "../clips/UploadClips";
+import { useUpload } from "../clips/useUpload";
 import { studyQuery } from "../queries";
 import { useChange } from "../ui/useChange";
-import { uploadFiles } from "./useCreate";
 
 export function AddClips({ study }: { study: string }) {
   const detail = useQuery(studyQuery(study)).data;
-  const [upload, setUpload] = useState<Schemas["UploadOut"] | null>(null);
-  const [pattern, setPattern] = useState("");
+  const sent = useUpload(`study ${study}`);
+  const upload = sent.received;
+  const [typed, setPattern] = useState<string | null>(null);
+  const pattern = typed ?? upload?.suggested_pattern ?? "";
   const kept = keptWork(study);
-  const send = useChange(uploadFiles, {
-    touches: [],
-    then: (received) => {
-      setUpload(received);
-      setPattern(received.suggested_pattern ?? "");
-    },
-  });
   const save = useChange(
     () => {
       const revision = detail?.summary.revision ?? 1;
@@ -35,7 +31,7 @@ export function AddClips({ study }: { study: string }) {
       ],
       done: "Saved as a new version.",
       before: () => forgetWork(study),
-      then: () => setUpload(null),
+      then: sent.forget,
     },
   );
   return (
@@ -47,26 +43,19 @@ export function AddClips({ study }: { study: string }) {
           the builder, leave it unsaved there, and come back: both are saved together.
           {kept !== null && " The unsaved work of the builder will be saved with them."}
         </Text>
-        <FileInput
-          label="Clips"
-          description="MP4 files with H.264, or a zip of them."
-          accept=".zip,.mp4,.m4v,.mov"
-          multiple
-          onChange={(files) => files.length > 0 && send.mutate(files)}
-          maw={500}
-        />
+        <UploadClips upload={sent} />
         {upload !== null && (
           <Group align="end">
             {!upload.has_manifest && (
               <TextInput
                 label="Pattern"
-                description={`${upload.files.length} clips received. Names of factors in braces.`}
+                description="Names of factors in braces."
                 value={pattern}
                 onChange={(event) => setPattern(event.currentTarget.value)}
                 w={340}
               />
             )}
-            <Button loading={save.isPending || send.isPending} disabled={detail === undefined} onClick={() => save.mutate(undefined)}>
+            <Button loading={save.isPending} disabled={detail === undefined} onClick={() => save.mutate(undefined)}>
               Save as a new version
             </Button>
           </Group>

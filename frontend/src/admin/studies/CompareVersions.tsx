@@ -37,10 +37,10 @@ function Compared({ study, old, latest }: { study: string; old: number; latest: 
   });
   return (
     <Answer of={comparison}>
-      {(found) => (
+      {(compared) => (
         <Stack gap="sm">
-          <Text size="sm">{verdict(found)}</Text>
-          {found.keys.map((key) => (
+          <Text size="sm">{verdict(compared)}</Text>
+          {compared.keys.map((key) => (
             <div key={key.path}>
               <Group gap="xs">
                 <code>{key.path}</code>
@@ -49,13 +49,13 @@ function Compared({ study, old, latest }: { study: string; old: number; latest: 
                 </Badge>
               </Group>
               <Text size="sm" className="difference">
-                {key.pieces.map((piece, place) => (
-                  <Words key={place} piece={piece} />
+                {key.pieces.map((piece, index) => (
+                  <Words key={index} piece={piece} />
                 ))}
               </Text>
             </div>
           ))}
-          {found.clips.length > 0 && <Clips found={found} />}
+          {compared.clips.length > 0 && <Clips comparison={compared} />}
         </Stack>
       )}
     </Answer>
@@ -77,20 +77,22 @@ function Words({ piece: { kind, text } }: { piece: Schemas["Piece"] }) {
 
 const CLIP_WORDS: Record<Schemas["ClipDifference"]["kind"], string> = { gone: "gone", new: "new", replaced: "has other bytes" };
 
-function Clips({ found }: { found: Schemas["Comparison"] }) {
+function Clips({ comparison }: { comparison: Schemas["Comparison"] }) {
   return (
     <div>
       <Text size="sm" fw={600}>
-        {found.clips_differing} clips differ, {found.clips_same} are the same
+        {comparison.clips_differing} clips differ, {comparison.clips_same} are the same
       </Text>
       <List size="sm">
-        {found.clips.map((clip) => (
+        {comparison.clips.map((clip) => (
           <List.Item key={`${clip.cell} ${String(clip.exemplar)}`} className="wrap-anywhere">
             {clip.cell}, no. {clip.exemplar}: {CLIP_WORDS[clip.kind]} ({files(clip)})
           </List.Item>
         ))}
       </List>
-      {found.clips.length < found.clips_differing && <Text size="sm">… and {found.clips_differing - found.clips.length} more.</Text>}
+      {comparison.clips.length < comparison.clips_differing && (
+        <Text size="sm">… and {comparison.clips_differing - comparison.clips.length} more.</Text>
+      )}
     </div>
   );
 }

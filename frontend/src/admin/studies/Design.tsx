@@ -49,8 +49,8 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
         Blocks
       </Title>
       <Group gap={6}>
-        {design.blocks.map((block, place) => (
-          <Badge key={`${block.label}-${String(place)}`} variant="default">
+        {design.blocks.map((block, index) => (
+          <Badge key={`${block.label}-${String(index)}`} variant="default">
             {block.label}: {block.trials} trials
           </Badge>
         ))}

@@ -1,18 +1,19 @@
-import { Button, FileInput, Select, Stack, Text, TextInput } from "@mantine/core";
+import { Button, Select, Stack, Text, TextInput } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { useChange } from "../ui/useChange";
+import { api, unwrap } from "../api";
+import { UploadClips } from "../clips/UploadClips";
+import { useUpload } from "../clips/useUpload";
 import { DefinitionEditor, useCheck } from "./DefinitionEditor";
-import { uploadFiles, useCreate } from "./useCreate";
+import { useCreate } from "./useCreate";
 
 export function FromDefinition({ name }: { name: string }) {
   const [toml, setToml] = useState("");
-  const [upload, setUpload] = useState<Schemas["UploadOut"] | null>(null);
+  const sent = useUpload("new definition");
+  const upload = sent.received;
   const [shipped, setShipped] = useState<string | null>(null);
   const experiments = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
-  const send = useChange(uploadFiles, { touches: [], then: setUpload });
-  const create = useCreate();
+  const create = useCreate(sent.forget);
   const [pattern, setPattern] = useState("");
   const levels = upload?.has_manifest === true ? null : { pattern };
   const usable = useCheck(toml)?.design != null;
@@ -26,21 +27,18 @@ export function FromDefinition({ name }: { name: string }) {
         value={shipped}
         onChange={(chosen) => {
           setShipped(chosen);
-          const found = experiments.data?.find((experiment) => experiment.name === chosen);
-          if (found !== undefined) setToml(found.toml);
+          const definition = experiments.data?.find((experiment) => experiment.name === chosen);
+          if (definition !== undefined) setToml(definition.toml);
         }}
         maw={400}
       />
       <DefinitionEditor toml={toml} onChange={setToml} />
-      <FileInput
+      <UploadClips
+        upload={sent}
         label="Clips built for it"
         description="A zip of the folder that `stimuli build` or `stimuli manifest` wrote, or of clips alone. Not needed where the clips of the experiment chosen above fit."
         accept=".zip"
-        clearable
-        onChange={(file) => file !== null && send.mutate([file])}
-        maw={500}
       />
-      {upload !== null && <Text size="sm">{upload.files.length} clips received.</Text>}
       {upload !== null && !upload.has_manifest && (
         <TextInput
           label="Pattern of the file names"
@@ -55,7 +53,7 @@ export function FromDefinition({ name }: { name: string }) {
       <Button
         style={{ alignSelf: "flex-start" }}
         disabled={name === "" || !usable || (upload === null && shipped === null)}
-        loading={create.isPending || send.isPending}
+        loading={create.isPending || sent.sending !== null || (sent.progress?.waiting ?? 0) > 0}
         onClick={() => create.mutate(upload === null ? { name, toml, shipped } : { name, toml, upload: upload.id, levels })}
       >
         Create

@@ -1,61 +1,39 @@
 /** A study from somebody's own clips: upload, say which levels each has, ask a question. */
 
-import { Alert, Button, FileInput, Progress, SegmentedControl, Select, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
+import { Button, SegmentedControl, Select, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import type { Schemas } from "../api";
-import { useChange } from "../ui/useChange";
+import { UploadClips } from "../clips/UploadClips";
+import { useUpload } from "../clips/useUpload";
 import { TEMPLATES } from "./templates";
-import { uploadFiles, useCreate } from "./useCreate";
+import { useCreate } from "./useCreate";
 
 export function FromOwnClips({ name }: { name: string }) {
-  const [upload, setUpload] = useState<Schemas["UploadOut"] | null>(null);
-  const send = useChange(uploadFiles, { touches: [], then: setUpload });
+  const upload = useUpload("new study");
+  const { received } = upload;
   return (
     <Stack>
-      <FileInput
-        label="Clips"
-        description="MP4 files, or a zip of them; a CSV of levels may be among them."
-        accept=".zip,.mp4,.m4v,.mov,.webm,.csv"
-        multiple
-        onChange={(files) => files.length > 0 && send.mutate(files)}
-        maw={500}
-      />
-      {send.isPending && <Progress value={100} animated aria-label="Uploading and looking into the clips" />}
-      {upload !== null && <Received upload={upload} />}
-      {upload !== null && upload.files.length > 0 && <Levels name={name} upload={upload} />}
+      <UploadClips upload={upload} />
+      {received !== null && received.files.length > 0 && (
+        <Levels key={received.id} name={name} upload={received} onCreated={upload.forget} />
+      )}
     </Stack>
   );
 }
 
-function Received({ upload }: { upload: Schemas["UploadOut"] }) {
-  const wrong = upload.files.filter((file) => file.problem !== null && file.problem !== undefined);
-  const [first] = upload.files;
-  return (
-    <>
-      <Text>
-        {upload.files.length} clips received
-        {first?.frames != null && `; the first has ${first.frames} frames at ${first.fps} fps, ${first.width_px} x ${first.height_px}`}.
-      </Text>
-      {wrong.length > 0 && (
-        <Alert color="red" variant="light" title={`${wrong.length} files cannot be used`}>
-          {wrong.slice(0, 10).map((file) => (
-            <Text key={file.name} size="sm">
-              {file.name}: {file.problem}
-            </Text>
-          ))}
-        </Alert>
-      )}
-    </>
-  );
+interface LevelsProps {
+  name: string;
+  upload: Schemas["UploadOut"];
+  onCreated: () => void;
 }
 
-function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }) {
+function Levels({ name, upload, onCreated }: LevelsProps) {
   const [by, setBy] = useState("pattern");
   const [pattern, setPattern] = useState(upload.suggested_pattern ?? "");
   const [csv, setCsv] = useState(`file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`);
   const [template, setTemplate] = useState(TEMPLATES[0]);
   const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
-  const create = useCreate();
+  const create = useCreate(onCreated);
   const field = (key: keyof typeof asked, label: string) => (
     <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
   );
@@ -130,10 +108,13 @@ function Levels({ name, upload }: { name: string; upload: Schemas["UploadOut"] }
   );
 }
 
+/** Files of several formats follow one pattern. */
+const stemOf = (name: string) => name.replace(/\.[A-Za-z0-9]{1,4}$/, "");
+
 /** What the pattern reads from the first names. */
 function Example({ pattern, files }: { pattern: string; files: string[] }) {
   const fields = [...pattern.matchAll(/\{([A-Za-z]\w*)\}/g)].map((match) => match[1] ?? "");
-  const source = pattern
+  const source = stemOf(pattern)
     .split(/\{[A-Za-z]\w*\}/)
     .map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"))
     .join("([^/]+?)");
@@ -151,12 +132,12 @@ function Example({ pattern, files }: { pattern: string; files: string[] }) {
       </Table.Thead>
       <Table.Tbody>
         {files.slice(0, 4).map((file) => {
-          const found = matcher.exec(file);
+          const match = matcher.exec(stemOf(file));
           return (
             <Table.Tr key={file}>
               <Table.Td>{file}</Table.Td>
-              {fields.map((field, place) => (
-                <Table.Td key={field}>{found?.[place + 1] ?? "does not fit"}</Table.Td>
+              {fields.map((field, index) => (
+                <Table.Td key={field}>{match?.[index + 1] ?? "does not fit"}</Table.Td>
               ))}
             </Table.Tr>
           );

@@ -9,6 +9,7 @@ import { PagedAnswer } from "../ui/PagedAnswer";
 import { useChange } from "../ui/useChange";
 import { NewLinks } from "./NewLinks";
 import { addressFor } from "./recruit";
+import { SigningButton } from "./SigningButton";
 
 export function LinksTab() {
   const { study = "" } = useParams({ strict: false });
@@ -19,13 +20,13 @@ export function LinksTab() {
     initialPageParam: null as string | null,
     getNextPageParam: (last) => last.next,
   });
-  const recruiter = useQuery(studyQuery(study)).data?.recruiter ?? null;
+  const detail = useQuery(studyQuery(study)).data;
   const rows = links.data?.pages.flatMap((page) => page.links) ?? [];
   return (
     <Stack>
       <NewLinks study={study} />
       <PagedAnswer of={links} shown={rows.length} total={links.data?.pages.at(-1)?.total} more="More links">
-        <LinkTable study={study} rows={rows} recruiter={recruiter} />
+        <LinkTable study={study} rows={rows} recruiter={detail?.recruiter ?? null} owns={detail?.summary.rights.includes("own") ?? false} />
       </PagedAnswer>
       <Button
         component="a"
@@ -44,9 +45,10 @@ interface TableProps {
   study: string;
   rows: Schemas["LinkOut"][];
   recruiter: Record<string, unknown> | null;
+  owns: boolean;
 }
 
-function LinkTable({ study, rows, recruiter }: TableProps) {
+function LinkTable({ study, rows, recruiter, owns }: TableProps) {
   const revoke = useChange(
     (link: string) => unwrap(api.DELETE("/api/admin/studies/{study}/links/{link}", { params: { path: { study, link } } })),
     { touches: [["links", study]], done: "The link is withdrawn." },
@@ -72,13 +74,16 @@ function LinkTable({ study, rows, recruiter }: TableProps) {
         {
           title: "Action",
           cell: (row) => (
-            <ConfirmButton
-              size="compact-xs"
-              label="Withdraw"
-              question="Nobody can begin by this link any more; those who have begun may finish."
-              confirm="Withdraw"
-              onConfirm={() => revoke.mutate(row.id)}
-            />
+            <Group gap={6} wrap="nowrap">
+              {owns && Boolean(row.recruiter?.["signature_parameter"]) && <SigningButton study={study} link={row.id} />}
+              <ConfirmButton
+                size="compact-xs"
+                label="Withdraw"
+                question="Nobody can begin by this link any more; those who have begun may finish."
+                confirm="Withdraw"
+                onConfirm={() => revoke.mutate(row.id)}
+              />
+            </Group>
           ),
         },
       ]}

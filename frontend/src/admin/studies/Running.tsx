@@ -4,6 +4,7 @@ import { Button, Card, Group, NumberInput, Select, SimpleGrid, Stack, Switch, Te
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { useChange } from "../ui/useChange";
+import { SigningButton } from "./SigningButton";
 
 type Kind = NonNullable<Schemas["Recruiter"]["kind"]>;
 const KINDS: Kind[] = ["prolific", "sona", "mturk", "generic"];
@@ -15,6 +16,8 @@ const FIELDS = {
   redirect_screened_out: ["Address for who is screened out", "empty: none, on Prolific by the code"],
   redirect_declined: ["Address for who takes no part", "empty: none, on Prolific its start page"],
   id_parameter: ["Address parameter of their id", "empty: the recruiter's usual one"],
+  signature_parameter: ["Address parameter of its signature", "empty: addresses are not signed"],
+  secret_name: ["Name of the signing secret", "another name makes another secret"],
 } as const;
 type Field = keyof typeof FIELDS;
 
@@ -30,6 +33,8 @@ function textsOf(recruiter: Record<string, unknown> | null): Record<Field | "red
     redirect_declined: text("redirect_declined"),
     code_failed_check: text("code_failed_check"),
     id_parameter: text("id_parameter"),
+    signature_parameter: text("signature_parameter"),
+    secret_name: text("secret_name"),
     redirect_url: text("redirect_url"),
   };
 }
@@ -67,6 +72,7 @@ export function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
           />
         </Group>
         {kind !== null && <RecruiterFields texts={texts} onChange={setTexts} />}
+        {Boolean(detail.recruiter?.["signature_parameter"]) && <SigningButton study={name} />}
         <Button onClick={() => save.mutate(undefined)} loading={save.isPending}>
           Save
         </Button>

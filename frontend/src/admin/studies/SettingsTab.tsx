@@ -6,11 +6,14 @@ import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
+import { onDemand } from "../ui/onDemand";
 import { CompareVersions } from "./CompareVersions";
 import { LifeCycle } from "./LifeCycle";
 import { PageLanguages } from "./PageLanguages";
+import { RetentionCard } from "./RetentionCard";
 import { Running } from "./Running";
-import { Sharing } from "./Sharing";
+
+const Sharing = onDemand(async () => (await import("./Sharing")).Sharing);
 
 export function SettingsTab() {
   const { study = "" } = useParams({ strict: false });
@@ -21,6 +24,7 @@ export function SettingsTab() {
           <Running detail={detail} />
           <Versions detail={detail} />
           <CompareVersions detail={detail} />
+          <RetentionCard study={detail.summary.name} />
           <PageLanguages />
           {detail.summary.rights.includes("own") && <Sharing summary={detail.summary} />}
           <LifeCycle detail={detail} />

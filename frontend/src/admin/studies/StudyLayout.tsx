@@ -14,6 +14,7 @@ const TABS = [
   ["design", "Design"],
   ["build", "Build"],
   ["clips", "Clips"],
+  ["rehearsal", "Rehearsal"],
   ["links", "Links"],
   ["monitor", "Monitor"],
   ["results", "Results"],

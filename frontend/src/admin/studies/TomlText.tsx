@@ -12,7 +12,7 @@ interface Props {
 }
 
 export function TomlText({ toml, onChange, problems, rows = 28 }: Props) {
-  const place = useRef<HTMLTextAreaElement>(null);
+  const area = useRef<HTMLTextAreaElement>(null);
   const goTo = (line: number) => {
     const start =
       toml
@@ -20,13 +20,13 @@ export function TomlText({ toml, onChange, problems, rows = 28 }: Props) {
         .slice(0, line - 1)
         .join("\n").length + (line > 1 ? 1 : 0);
     const end = toml.indexOf("\n", start);
-    place.current?.focus();
-    place.current?.setSelectionRange(start, end === -1 ? toml.length : end);
+    area.current?.focus();
+    area.current?.setSelectionRange(start, end === -1 ? toml.length : end);
   };
   return (
     <div>
       <Textarea
-        ref={place}
+        ref={area}
         className="editor"
         aria-label="Definition"
         autosize

@@ -22,6 +22,8 @@ export function addressFor(url: string, recruiter: Record<string, unknown> | nul
   const own = recruiter?.["id_parameter"];
   const name = typeof own === "string" && own !== "" ? own : first[0];
   // Written as it stands: the recruiter looks for its signs, and replaces them before anybody opens the address.
-  const query = [[name, first[1]], ...others].map(([key, value]) => `${key}=${value}`).join("&");
+  const signed = recruiter?.["signature_parameter"];
+  const signature = typeof signed === "string" && signed !== "" ? [[signed, "SIGNATURE"]] : [];
+  const query = [[name, first[1]], ...others, ...signature].map(([key, value]) => `${key}=${value}`).join("&");
   return `${url}?${query}`;
 }

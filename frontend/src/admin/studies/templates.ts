@@ -36,6 +36,13 @@ export const TEMPLATES: readonly [Words, ...Words[]] = [
     ends: false,
   },
   {
+    value: "dcr",
+    label: "Degradation (DCR)",
+    about: "ITU-T P.910: the reference, then the clip, from Very annoying to Imperceptible.",
+    question: "How impaired is the second clip, compared with the first?",
+    ends: false,
+  },
+  {
     value: "pairs",
     label: "Paired comparisons",
     about: "Two clips beside one another: which of them? Every clip meets every other of the same exemplar number.",

@@ -20,6 +20,10 @@ export function ErrorAlert({ error, retry }: { error: Error; retry?: () => void 
 export function Answer<T>({ of, children }: { of: UseQueryResult<T>; children: (data: T) => ReactNode }) {
   if (of.data !== undefined) return <>{children(of.data)}</>;
   if (of.error !== null) return <ErrorAlert error={of.error} retry={() => void of.refetch()} />;
+  return <Waiting />;
+}
+
+export function Waiting() {
   return (
     <Center py="xl">
       <Loader aria-label="Loading" />

@@ -66,7 +66,7 @@ export function DataTable<Row>({ columns, rows, rowKey, empty, label, dense = fa
   );
 }
 
-export function Pages(props: { total: number; value: number; onChange: (page: number) => void }) {
+function Pages(props: { total: number; value: number; onChange: (page: number) => void }) {
   return <Pagination size="sm" {...props} getControlProps={(control) => ({ "aria-label": `${control} page` })} />;
 }
 

@@ -9,7 +9,7 @@ const WIDEST_PX = 720;
 
 export function PlotFigure({ options, label }: { options: Plot.PlotOptions; label: string }) {
   const { ref: measured, width: room } = useElementSize();
-  const place = useRef<HTMLDivElement>(null);
+  const figureBox = useRef<HTMLDivElement>(null);
   const width = Math.min(WIDEST_PX, Math.floor(room));
   useEffect(() => {
     if (width === 0) return;
@@ -20,12 +20,12 @@ export function PlotFigure({ options, label }: { options: Plot.PlotOptions; labe
     for (const group of figure.querySelectorAll("[aria-label]")) group.removeAttribute("aria-label");
     figure.setAttribute("role", "img");
     figure.setAttribute("aria-label", label);
-    place.current?.replaceChildren(figure);
+    figureBox.current?.replaceChildren(figure);
     return () => figure.remove();
   }, [options, label, width]);
   return (
     <div className="plot" ref={measured}>
-      <div ref={place} />
+      <div ref={figureBox} />
     </div>
   );
 }

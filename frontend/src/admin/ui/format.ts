@@ -34,8 +34,8 @@ export function words(key: string): string {
 /** "Chrome on Linux" from what a browser says of itself. */
 export function browserName(agent: string): string {
   const names = ["Edg", "OPR", "Firefox", "Chrome", "Safari"];
-  const found = names.find((name) => agent.includes(`${name}/`));
-  const shown = { Edg: "Edge", OPR: "Opera" }[found ?? ""] ?? found;
+  const browser = names.find((name) => agent.includes(`${name}/`));
+  const shown = { Edg: "Edge", OPR: "Opera" }[browser ?? ""] ?? browser;
   const system = ["Android", "iPhone", "iPad", "Windows", "Mac OS", "Linux"].find((name) => agent.includes(name));
   return shown === undefined ? agent.slice(0, 60) || "unknown" : `${shown}${system === undefined ? "" : ` on ${system}`}`;
 }

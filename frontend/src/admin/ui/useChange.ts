@@ -1,7 +1,7 @@
 /** A change on the server: what it touches is loaded again, and a refusal is told. */
 
-import { notifications } from "@mantine/notifications";
 import { type QueryKey, useMutation, useQueryClient } from "@tanstack/react-query";
+import { notify } from "./notify";
 
 interface Options<T> {
   touches: QueryKey[];
@@ -18,9 +18,9 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
     onSuccess: async (result) => {
       before?.();
       await Promise.all(touches.map((queryKey) => queries.invalidateQueries({ queryKey })));
-      if (done !== undefined) notifications.show({ message: done, color: "teal" });
+      if (done !== undefined) notify({ message: done, color: "teal" });
       then?.(result);
     },
-    onError: (error) => notifications.show({ title: "That did not work", message: error.message, color: "red" }),
+    onError: (error) => notify({ title: "That did not work", message: error.message, color: "red" }),
   });
 }

@@ -1,4 +1,4 @@
-/** A VRM avatar that blinks by the engine: drop a .vrm file onto the page. */
+/** A VRM avatar that blinks by the engine: choose a .vrm file, or drop it onto the page. */
 import "./page.css";
 import { type VRM, VRMLoaderPlugin } from "@pixiv/three-vrm";
 import { AmbientLight, Box3, DirectionalLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
@@ -38,7 +38,7 @@ function blink(vrm: VRM, time_s: number): void {
   vrm.update(1 / 60);
 }
 
-function start(canvas: HTMLCanvasElement, said: HTMLElement): void {
+function start(canvas: HTMLCanvasElement, said: HTMLElement, chooser: HTMLInputElement | null): void {
   const renderer = new WebGLRenderer({ canvas, antialias: true });
   renderer.setSize(640, 480, false);
   renderer.setClearColor(0x808080);
@@ -55,7 +55,7 @@ function start(canvas: HTMLCanvasElement, said: HTMLElement): void {
   };
   const open = (model: ArrayBuffer): void => {
     take(model).then(
-      () => (said.textContent = "Blinking as a listener. Drop a .vrm file here to see yours."),
+      () => (said.textContent = "Blinking as a listener. Choose a .vrm file, or drop it here, to see yours."),
       (error: unknown) => (said.textContent = `This model cannot be used: ${error instanceof Error ? error.message : String(error)}`),
     );
   };
@@ -64,6 +64,7 @@ function start(canvas: HTMLCanvasElement, said: HTMLElement): void {
     event.preventDefault();
     void event.dataTransfer?.files[0]?.arrayBuffer().then(open);
   });
+  chooser?.addEventListener("change", () => void chooser.files?.[0]?.arrayBuffer().then(open));
   open(sampleHead());
   requestAnimationFrame(tick);
 }
@@ -76,12 +77,12 @@ function influence(vrm: VRM, name: string): number {
       morphTargetDictionary?: Record<string, number>;
       morphTargetInfluences?: number[];
     };
-    const place = places?.[name];
-    if (place !== undefined) value = values?.[place] ?? value;
+    const index = places?.[name];
+    if (index !== undefined) value = values?.[index] ?? value;
   });
   return value;
 }
 
 const canvas = document.querySelector("canvas");
 const said = document.querySelector<HTMLElement>("#said");
-if (canvas !== null && said !== null) start(canvas, said);
+if (canvas !== null && said !== null) start(canvas, said, document.querySelector("input"));

@@ -1,5 +1,5 @@
 /** A head of few shapes as a VRM 1.0 file, so that the page has somebody before a model is dropped onto it. */
-import { type BufferGeometry, PlaneGeometry, SphereGeometry } from "three";
+import { type BufferGeometry, MathUtils, SphereGeometry } from "three";
 
 const FLOAT = 5126;
 const UNSIGNED_INT = 5125;
@@ -23,12 +23,16 @@ const BONES = [
 interface Part {
   geometry: BufferGeometry;
   colour: readonly [number, number, number];
-  /** How far the lids' upper edge comes down, in m: their one morph target. */
-  closes?: number;
+  /** The same vertices with the eye shut: the part's one morph target. */
+  shut?: BufferGeometry;
   name: string;
 }
 
 const at = (geometry: BufferGeometry, x: number, y: number, z: number): BufferGeometry => geometry.translate(x, y, z);
+
+/** An upper lid: a cap over the eye, from its top down to so many degrees. */
+const lid = (x: number, down_deg: number): BufferGeometry =>
+  at(new SphereGeometry(0.029, 32, 16, 0, 2 * Math.PI, 0, MathUtils.degToRad(down_deg)), x, 0.02, 0.09);
 
 const PARTS: readonly Part[] = [
   { name: "skull", geometry: new SphereGeometry(0.11, 32, 24), colour: [0.87, 0.68, 0.56] },
@@ -37,7 +41,7 @@ const PARTS: readonly Part[] = [
     return [
       { name: `eye${side}`, geometry: at(new SphereGeometry(0.022, 24, 16), x, 0.02, 0.09), colour: [0.95, 0.95, 0.95] },
       { name: `iris${side}`, geometry: at(new SphereGeometry(0.011, 16, 12), x, 0.02, 0.103), colour: [0.2, 0.35, 0.3] },
-      { name: `blink${side}`, geometry: at(new PlaneGeometry(0.05, 0.012), x, 0.05, 0.116), colour: [0.8, 0.58, 0.47], closes: 0.045 },
+      { name: `blink${side}`, geometry: lid(x, 66), shut: lid(x, 134), colour: [0.8, 0.58, 0.47] },
     ];
   }),
 ];
@@ -48,11 +52,11 @@ export function sampleHead(): ArrayBuffer {
   const meshes = PARTS.map((part, material) => writer.mesh(part, material));
   const head = BONES.indexOf("head");
   const nodes = [
-    ...BONES.map((name, place) => ({ name, ...(place === 0 ? { children: BONES.slice(1).map((_, n) => n + 1) } : {}) })),
+    ...BONES.map((name, index) => ({ name, ...(index === 0 ? { children: BONES.slice(1).map((_, n) => n + 1) } : {}) })),
     ...PARTS.map(({ name }, mesh) => ({ name, mesh })),
   ];
   Object.assign(nodes[head] ?? {}, { children: PARTS.map((_, n) => BONES.length + n) });
-  const lid = (side: "Left" | "Right") => ({
+  const closing = (side: "Left" | "Right") => ({
     morphTargetBinds: [{ node: BONES.length + PARTS.findIndex(({ name }) => name === `blink${side}`), index: 0, weight: 1 }],
   });
   return writer.file({
@@ -71,7 +75,7 @@ export function sampleHead(): ArrayBuffer {
         specVersion: "1.0",
         meta: { name: "Sample head", authors: ["Palpebra"], licenseUrl: "https://vrm.dev/licenses/1.0/" },
         humanoid: { humanBones: Object.fromEntries(BONES.map((name, node) => [name, { node }])) },
-        expressions: { preset: { blinkLeft: lid("Left"), blinkRight: lid("Right") } },
+        expressions: { preset: { blinkLeft: closing("Left"), blinkRight: closing("Right") } },
       },
     },
   });
@@ -84,16 +88,16 @@ class Writer {
   private readonly accessors: object[] = [];
   private length = 0;
 
-  mesh({ geometry, closes, name }: Part, material: number): object {
+  mesh({ geometry, shut, name }: Part, material: number): object {
     const positions = geometry.getAttribute("position").array as Float32Array;
     const normals = geometry.getAttribute("normal").array as Float32Array;
     const index = Uint32Array.from(geometry.getIndex()?.array ?? []);
     const attributes = { POSITION: this.vectors(positions), NORMAL: this.vectors(normals) };
     const indices = this.add(index, ELEMENT_ARRAY_BUFFER, { componentType: UNSIGNED_INT, count: index.length, type: "SCALAR" });
     const primitive = { attributes, indices, material };
-    if (closes === undefined) return { name, primitives: [primitive] };
-    const low = Math.min(...positions.filter((_, place) => place % 3 === 1));
-    const shift = positions.map((value, place) => (place % 3 === 1 && Math.abs(value - low) < 1e-6 ? -closes : 0));
+    if (shut === undefined) return { name, primitives: [primitive] };
+    const ends = shut.getAttribute("position").array;
+    const shift = positions.map((value, index) => (ends[index] ?? value) - value);
     return { name, primitives: [{ ...primitive, targets: [{ POSITION: this.vectors(shift) }] }], extras: { targetNames: [name] } };
   }
 
@@ -106,7 +110,7 @@ class Writer {
     );
     const bytes = new Uint8Array(12 + 8 + json.length + 8 + this.length);
     const header = new DataView(bytes.buffer);
-    [0x46546c67, 2, bytes.length, json.length, 0x4e4f534a].forEach((value, place) => header.setUint32(place * 4, value, true));
+    [0x46546c67, 2, bytes.length, json.length, 0x4e4f534a].forEach((value, word) => header.setUint32(word * 4, value, true));
     bytes.set(json, 20);
     header.setUint32(20 + json.length, this.length, true);
     header.setUint32(24 + json.length, 0x004e4942, true);
@@ -120,7 +124,7 @@ class Writer {
 
   private vectors(values: Float32Array): number {
     const extent = (pick: (...numbers: number[]) => number) =>
-      [0, 1, 2].map((axis) => pick(...values.filter((_, place) => place % 3 === axis)));
+      [0, 1, 2].map((axis) => pick(...values.filter((_, coordinate) => coordinate % 3 === axis)));
     return this.add(values, ARRAY_BUFFER, {
       componentType: FLOAT,
       count: values.length / 3,

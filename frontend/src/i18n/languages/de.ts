@@ -104,9 +104,10 @@ export const messages: Messages = {
   practice_done: {
     by: "trials",
     one: "Von jetzt an zählen Ihre Antworten. Es ist {trials} Film.",
-    other: "Von jetzt an zählen Ihre Antworten. Es sind {trials} Filme, in Teilen von etwa {block} mit Pausen dazwischen.",
+    other: "Von jetzt an zählen Ihre Antworten. Es sind {trials} Filme.",
   },
-  feedback_good: "Gut: Sie haben bis zum Ende zugesehen und dann geantwortet.",
+  practice_parts: "Sie kommen in Teilen von etwa {block}, mit Pausen dazwischen.",
+  feedback_good: "Gut: So geht es.",
   feedback_key: "Sie haben eine Taste gedrückt, während der Film lief. Sehen Sie bis zum Ende zu; dann erscheint die Skala.",
   feedback_focus: "Die Seite wurde verlassen, während der Film lief. Bitte bleiben Sie auf der Seite.",
   feedback_slow: {
@@ -122,7 +123,7 @@ export const messages: Messages = {
   ready_again_touch: "Zum Wiederholen tippen ({view} von {views})",
   ready_touch: "Zum Starten des Films tippen",
   ready_replay: "Dieser Film lief vorhin nicht flüssig. Hier ist er noch einmal.",
-  start_clip: "Film starten",
+  start: "Starten",
   decoding: "Der Film wird vorbereitet …",
   trial_of: "{number} von {total}",
   clip_name: "Der Film",

@@ -103,9 +103,10 @@ export const messages = {
   practice_done: {
     by: "trials",
     one: "From now on your answers count. There is {trials} clip.",
-    other: "From now on your answers count. There are {trials} clips, in parts of about {block} with breaks between them.",
+    other: "From now on your answers count. There are {trials} clips.",
   },
-  feedback_good: "Good: you watched to the end and then answered.",
+  practice_parts: "They come in parts of about {block}, with breaks between them.",
+  feedback_good: "Good: that is how it works.",
   feedback_key: "You pressed a key while the clip was running. Watch it to the end; the scale appears then.",
   feedback_focus: "The page was left while the clip was running. Please stay on the page.",
   feedback_slow: {
@@ -121,7 +122,7 @@ export const messages = {
   ready_again_touch: "Tap to see it again ({view} of {views})",
   ready_touch: "Tap to start the clip",
   ready_replay: "This clip did not run smoothly before. Here it is once more.",
-  start_clip: "Start the clip",
+  start: "Start",
   decoding: "Preparing the clip …",
   trial_of: "{number} of {total}",
   clip_name: "The clip",

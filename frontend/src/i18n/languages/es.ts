@@ -104,9 +104,10 @@ export const messages: Messages = {
   practice_done: {
     by: "trials",
     one: "A partir de ahora sus respuestas cuentan. Hay {trials} vídeo.",
-    other: "A partir de ahora sus respuestas cuentan. Hay {trials} vídeos, en partes de unos {block} con descansos entre ellas.",
+    other: "A partir de ahora sus respuestas cuentan. Hay {trials} vídeos.",
   },
-  feedback_good: "Bien: ha mirado hasta el final y después ha respondido.",
+  practice_parts: "Vienen en partes de unos {block}, con descansos entre ellas.",
+  feedback_good: "Bien: así se hace.",
   feedback_key: "Ha pulsado una tecla durante el vídeo. Mírelo hasta el final; la escala aparece entonces.",
   feedback_focus: "Se ha salido de la página durante el vídeo. Quédese en la página, por favor.",
   feedback_slow: {
@@ -121,7 +122,7 @@ export const messages: Messages = {
   ready_again_touch: "Toque para verlo otra vez ({view} de {views})",
   ready_touch: "Toque para iniciar el vídeo",
   ready_replay: "Este vídeo no se vio con fluidez antes. Aquí está otra vez.",
-  start_clip: "Iniciar el vídeo",
+  start: "Iniciar",
   decoding: "Preparando el vídeo …",
   trial_of: "{number} de {total}",
   clip_name: "El vídeo",

@@ -109,10 +109,10 @@ export const messages: Messages = {
   practice_done: {
     by: "trials",
     one: "À partir de maintenant, vos réponses comptent. Il y a {trials} vidéo.",
-    other:
-      "À partir de maintenant, vos réponses comptent. Il y a {trials} vidéos, en parties d’environ {block} avec des pauses entre elles.",
+    other: "À partir de maintenant, vos réponses comptent. Il y a {trials} vidéos.",
   },
-  feedback_good: "Bien : vous avez regardé jusqu’à la fin, puis répondu.",
+  practice_parts: "Elles viennent en parties d’environ {block}, avec des pauses entre elles.",
+  feedback_good: "Bien : c’est ainsi que l’on fait.",
   feedback_key: "Vous avez appuyé sur une touche pendant la vidéo. Regardez-la jusqu’à la fin ; l’échelle apparaît alors.",
   feedback_focus: "La page a été quittée pendant la vidéo. Veuillez rester sur la page.",
   feedback_slow: {
@@ -127,7 +127,7 @@ export const messages: Messages = {
   ready_again_touch: "Touchez pour la revoir ({view} sur {views})",
   ready_touch: "Touchez pour lancer la vidéo",
   ready_replay: "Cette vidéo n’était pas fluide tout à l’heure. La voici encore une fois.",
-  start_clip: "Lancer la vidéo",
+  start: "Lancer",
   decoding: "Préparation de la vidéo …",
   trial_of: "{number} sur {total}",
   clip_name: "La vidéo",

@@ -105,9 +105,10 @@ export const messages: Messages = {
   practice_done: {
     by: "trials",
     one: "Da ora le Sue risposte contano. C’è {trials} video.",
-    other: "Da ora le Sue risposte contano. Ci sono {trials} video, in parti di circa {block} con pause tra l’una e l’altra.",
+    other: "Da ora le Sue risposte contano. Ci sono {trials} video.",
   },
-  feedback_good: "Bene: ha guardato fino alla fine e poi ha risposto.",
+  practice_parts: "Sono in parti di circa {block}, con pause tra l’una e l’altra.",
+  feedback_good: "Bene: si fa così.",
   feedback_key: "Ha premuto un tasto durante il video. Lo guardi fino alla fine; la scala appare allora.",
   feedback_focus: "La pagina è stata lasciata durante il video. Resti sulla pagina, per favore.",
   feedback_slow: {
@@ -122,7 +123,7 @@ export const messages: Messages = {
   ready_again_touch: "Tocchi per rivederlo ({view} di {views})",
   ready_touch: "Tocchi per avviare il video",
   ready_replay: "Prima questo video non è stato fluido. Eccolo ancora una volta.",
-  start_clip: "Avvia il video",
+  start: "Avvia",
   decoding: "Preparazione del video …",
   trial_of: "{number} di {total}",
   clip_name: "Il video",

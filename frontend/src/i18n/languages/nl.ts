@@ -102,9 +102,10 @@ export const messages: Messages = {
   practice_done: {
     by: "trials",
     one: "Vanaf nu tellen uw antwoorden. Er is {trials} filmpje.",
-    other: "Vanaf nu tellen uw antwoorden. Er zijn {trials} filmpjes, in delen van ongeveer {block} met pauzes ertussen.",
+    other: "Vanaf nu tellen uw antwoorden. Er zijn {trials} filmpjes.",
   },
-  feedback_good: "Goed: u keek tot het einde en antwoordde daarna.",
+  practice_parts: "Ze komen in delen van ongeveer {block}, met pauzes ertussen.",
+  feedback_good: "Goed: zo gaat het.",
   feedback_key: "U drukte op een toets terwijl het filmpje liep. Kijk tot het einde; dan verschijnt de schaal.",
   feedback_focus: "De pagina werd verlaten terwijl het filmpje liep. Blijf op de pagina, alstublieft.",
   feedback_slow: {
@@ -119,7 +120,7 @@ export const messages: Messages = {
   ready_again_touch: "Tik om het nog eens te zien ({view} van {views})",
   ready_touch: "Tik om het filmpje te starten",
   ready_replay: "Dit filmpje liep eerder niet vloeiend. Hier is het nog een keer.",
-  start_clip: "Filmpje starten",
+  start: "Starten",
   decoding: "Het filmpje wordt voorbereid …",
   trial_of: "{number} van {total}",
   clip_name: "Het filmpje",

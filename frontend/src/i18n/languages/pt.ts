@@ -103,9 +103,10 @@ export const messages: Messages = {
   practice_done: {
     by: "trials",
     one: "A partir de agora as suas respostas contam. Há {trials} vídeo.",
-    other: "A partir de agora as suas respostas contam. Há {trials} vídeos, em partes de cerca de {block} com pausas entre elas.",
+    other: "A partir de agora as suas respostas contam. Há {trials} vídeos.",
   },
-  feedback_good: "Bem: viu até ao fim e depois respondeu.",
+  practice_parts: "Vêm em partes de cerca de {block}, com pausas entre elas.",
+  feedback_good: "Bem: é assim que se faz.",
   feedback_key: "Premiu uma tecla durante o vídeo. Veja-o até ao fim; a escala aparece então.",
   feedback_focus: "A página foi deixada durante o vídeo. Fique na página, por favor.",
   feedback_slow: {
@@ -120,7 +121,7 @@ export const messages: Messages = {
   ready_again_touch: "Toque para o ver de novo ({view} de {views})",
   ready_touch: "Toque para iniciar o vídeo",
   ready_replay: "Este vídeo não correu bem há pouco. Aqui está mais uma vez.",
-  start_clip: "Iniciar o vídeo",
+  start: "Iniciar",
   decoding: "A preparar o vídeo …",
   trial_of: "{number} de {total}",
   clip_name: "O vídeo",

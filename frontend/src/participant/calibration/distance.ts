@@ -36,17 +36,17 @@ export interface Distance {
 /** The median of the rounds, or as typed in, where the window is too narrow at once. */
 export async function measureDistance(session: Session, display: HTMLElement, px_per_mm: number): Promise<Distance> {
   if (distanceFrom(window.innerWidth - SIDES_PX, px_per_mm) < NEEDED_MM) return typed(session, display);
-  const found: number[] = [];
-  for (let remark = ""; found.length < ROUNDS;) {
-    const separation = await oneRound(session, display, px_per_mm, found.length + 1, remark);
+  const distances_mm: number[] = [];
+  for (let remark = ""; distances_mm.length < ROUNDS;) {
+    const separation = await oneRound(session, display, px_per_mm, distances_mm.length + 1, remark);
     if (separation === "type") return typed(session, display);
     const distance = separation === null ? 0 : distanceFrom(separation, px_per_mm);
     const counts = distance >= NEAREST_MM && distance <= FURTHEST_MM;
-    if (counts) found.push(distance);
+    if (counts) distances_mm.push(distance);
     remark = counts ? "" : session.t("distance_missed");
   }
-  const viewing_distance_mm = Math.round(found.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0);
-  const distance_spread_mm = Math.round(deviation(found) * 10) / 10;
+  const viewing_distance_mm = Math.round(distances_mm.sort((a, b) => a - b)[Math.floor(ROUNDS / 2)] ?? 0);
+  const distance_spread_mm = Math.round(deviation(distances_mm) * 10) / 10;
   return { viewing_distance_mm, distance_method: "blind_spot", distance_spread_mm, distance_typed_mm: null };
 }
 

@@ -2,6 +2,7 @@
 import type { CalibrationState, TrialInfo } from "../../api/schema";
 import { h } from "../../ui/element";
 import { showPage, statusLine, alertLine } from "../../ui/page";
+import { measureRefreshRate } from "../screen/refresh-rate";
 import { calibrationBody, clipWidth, type Distance, isPlausible, type Measured, NO_DISTANCE } from "../screen/size";
 import { choose, noDevice, saveShown, screenOut, stopButton } from "../screens/support";
 import type { Session } from "../session";
@@ -75,7 +76,11 @@ export async function calibrate(session: Session, display: HTMLElement, eyebrow:
     if (holds) return keep(session, display, { ...before, occasion, recheck_percent }, true);
     await tell(session, display, "recheck_title", session.t("recheck_differs", { percent: Math.round(recheck_percent) }));
   }
-  if (occasion === "screen_changed") await tell(session, display, "screen_changed_title", session.t("screen_changed"));
+  if (occasion === "screen_changed") {
+    await tell(session, display, "screen_changed_title", session.t("screen_changed"));
+    // Beside the card, which takes longer: the other screen may refresh at another rate.
+    void measureRefreshRate().then((rate) => (session.screen.refresh_rate_hz = rate));
+  }
   const measured = await measureUntilItFits(session, display, eyebrow);
   if (!measured) return { px_per_mm: null, method: "", checked: false };
   const known = before?.viewing_distance_mm != null ? distanceOf(before) : null;

@@ -20,7 +20,7 @@ export function setSurround(background: string): void {
 }
 
 export function luminance(colour: string): number {
-  const parts = [1, 3, 5].map((place) => parseInt(colour.slice(place, place + 2), 16) / 255);
+  const parts = [1, 3, 5].map((digit) => parseInt(colour.slice(digit, digit + 2), 16) / 255);
   const [r = 0, g = 0, b = 0] = parts.map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }

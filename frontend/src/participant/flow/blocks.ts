@@ -30,10 +30,12 @@ export function practiceNodes(session: Session): Node[] {
   const { run, t } = session;
   const trials = run.trials.filter((one) => one.kind === "practice" && !one.answered);
   if (trials.length === 0) return [];
-  const first = run.blocks[0]?.block ?? null;
+  const head = run.blocks[0];
+  const first = head?.block ?? null;
   const text = run.texts.practice || `# ${t("practice_title")}`;
   const total = counted(run).length;
-  const remarks = t("practice_done", { trials: total, block: run.blocks[0]?.trials ?? total });
+  const remarks = [t("practice_done", { trials: total })];
+  if (head && run.blocks.length > 1) remarks.push(t("practice_parts", { block: head.trials }));
   return [
     trial(textPage(session), { eyebrow: "", text, action: t("continue"), remarks: "" }),
     {
@@ -43,7 +45,7 @@ export function practiceNodes(session: Session): Node[] {
         fetchAhead(session, trials, first);
       },
     },
-    trial(textPage(session), { eyebrow: "", text: `# ${t("practice_done_title")}`, action: t("start_study"), remarks }),
+    trial(textPage(session), { eyebrow: "", text: `# ${t("practice_done_title")}`, action: t("start_study"), remarks: remarks.join(" ") }),
   ];
 }
 
@@ -91,11 +93,11 @@ function fetchAhead(session: Session, trials: TrialInfo[], next: number | null):
 }
 
 function trialNodes(session: Session, trials: TrialInfo[], after: Node[] = []): Node[] {
-  return trials.flatMap((one, place) => {
-    const next = trials[place + 1] ?? null;
+  return trials.flatMap((one, index) => {
+    const next = trials[index + 1] ?? null;
     const node = trialNode(session, one.kind, () => ({ trial: one, play: 1, next }));
     // An adaptive series may have ended before this trial has its turn.
-    const clips = preloadNode(session, trials.slice(place, place + (place === 0 ? CLIPS_FIRST : 1)));
+    const clips = preloadNode(session, trials.slice(index, index + (index === 0 ? CLIPS_FIRST : 1)));
     return [{ timeline: [...checks(session), clips, node, ...after], conditional_function: () => !one.answered }];
   });
 }
@@ -134,7 +136,7 @@ function repetitions(session: Session, block: number): Node[] {
 
 /** What waits to be shown again, as long as something does; `after` each of them. */
 function onceMore(session: Session, block: number, after: Node[] = []): Node {
-  const wanted = (): boolean => session.replays.peek(block) !== null;
+  const replayDue = (): boolean => session.replays.peek(block) !== null;
   const again = trialNode(session, "main", () => {
     const next = session.replays.peek(block);
     if (!next) throw new Error("expected a clip to show again, found none");
@@ -146,5 +148,5 @@ function onceMore(session: Session, block: number, after: Node[] = []): Node {
     timeline: [trial(preloadPage(session), { eyebrow: "", trials: waited })],
     conditional_function: () => !session.clips.hasAll(sourcesOf(waited())),
   };
-  return { timeline: [...checks(session), clips, again, taken, ...after], conditional_function: wanted, loop_function: wanted };
+  return { timeline: [...checks(session), clips, again, taken, ...after], conditional_function: replayDue, loop_function: replayDue };
 }

@@ -35,24 +35,24 @@ export async function abilities(storage: boolean): Promise<Abilities> {
   };
 }
 
-export function findings(found: Abilities, gates: Gates): GateFinding[] {
+export function findings(device: Abilities, gates: Gates): GateFinding[] {
   const list: GateFinding[] = [];
   const add = (reason: MessageKey, closed: boolean, values = {}): void => void list.push({ reason, closed, values });
-  if (!found.secure) add("gate_insecure", true);
-  else if (!found.video) add("gate_browser", true);
-  if (found.touch_only && !gates.allow_touch) add("gate_touch", true);
-  if (tooSmall(found, gates)) {
+  if (!device.secure) add("gate_insecure", true);
+  else if (!device.video) add("gate_browser", true);
+  if (device.touch_only && !gates.allow_touch) add("gate_touch", true);
+  if (tooSmall(device, gates)) {
     add("gate_screen", true, {
       width: gates.minimum_width_px,
       height: gates.minimum_height_px,
-      have_width: found.screen_width_px,
-      have_height: found.screen_height_px,
+      have_width: device.screen_width_px,
+      have_height: device.screen_height_px,
     });
   }
-  if (found.secure && found.video && !found.web_codecs) add("gate_video", false);
+  if (device.secure && device.video && !device.web_codecs) add("gate_video", false);
   // A study's own clips may be VP9 or AV1, so the participant may try.
-  if (found.secure && found.video && !found.h264) add("gate_h264", false);
-  if (!found.storage) add("gate_storage", false);
+  if (device.secure && device.video && !device.h264) add("gate_h264", false);
+  if (!device.storage) add("gate_storage", false);
   return list.sort((a, b) => Number(b.closed) - Number(a.closed));
 }
 
@@ -95,9 +95,9 @@ export function lackOfRoom(gates: Gates, now: Measures): GateFinding | null {
 
 type Values = GateFinding["values"];
 
-function tooSmall(found: Abilities, gates: Gates): boolean {
-  const long = Math.max(found.screen_width_px, found.screen_height_px);
-  const short = Math.min(found.screen_width_px, found.screen_height_px);
+function tooSmall(device: Abilities, gates: Gates): boolean {
+  const long = Math.max(device.screen_width_px, device.screen_height_px);
+  const short = Math.min(device.screen_width_px, device.screen_height_px);
   // A tablet held upright can be turned, so only the two sides count.
   return (
     long < Math.max(gates.minimum_width_px, gates.minimum_height_px) || short < Math.min(gates.minimum_width_px, gates.minimum_height_px)

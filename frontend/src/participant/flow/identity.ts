@@ -111,7 +111,7 @@ export class Identity {
 function uuid(): string {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   // Version 4 and variant 1 have their bits in bytes 6 and 8.
-  const marked = bytes.map((byte, place) => (place === 6 ? (byte & 0x0f) | 0x40 : place === 8 ? (byte & 0x3f) | 0x80 : byte));
+  const marked = bytes.map((byte, index) => (index === 6 ? (byte & 0x0f) | 0x40 : index === 8 ? (byte & 0x3f) | 0x80 : byte));
   return Array.from(marked, (byte) => byte.toString(16).padStart(2, "0"))
     .join("")
     .replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");

@@ -29,9 +29,9 @@ export class KeptVisit {
   /** The visit kept here; null where there is none, or where the server must be asked before going on. */
   read(now: number = Date.now()): Kept | null {
     try {
-      const found = JSON.parse(this.storage?.getItem(this.key) ?? "null") as Kept | null;
-      const until = Date.parse(found?.run.resumable_until ?? "");
-      this.kept = found && now < until ? completed(found) : null;
+      const stored = JSON.parse(this.storage?.getItem(this.key) ?? "null") as Kept | null;
+      const until = Date.parse(stored?.run.resumable_until ?? "");
+      this.kept = stored && now < until ? completed(stored) : null;
     } catch {
       this.kept = null;
     }

@@ -75,12 +75,12 @@ export function showClosedGate(
   t: Translate,
   link_token: string,
   closed: GateFinding,
-  found: Abilities,
+  device: Abilities,
   back: Back,
 ): void {
   showNotice(root, { title: t("gate_title"), text: t(closed.reason, closed.values), back });
   // Nothing waits for this: the participant reads the page, the experimenter the count.
-  void request("POST", "/api/unsupported", { body: { link_token, reason: closed.reason, data: found } }).catch(() => {});
+  void request("POST", "/api/unsupported", { body: { link_token, reason: closed.reason, data: device } }).catch(() => {});
 }
 
 /** The link, or what an earlier visit kept of it and its run where the server does not answer. */
@@ -100,8 +100,8 @@ export async function reach(
 }
 
 /** End a run because this browser cannot show the study, where the study screens devices. */
-export async function screenOutDevice(run_token: string, closed: GateFinding, found: Abilities): Promise<void> {
-  const body = { reason: closed.reason, data: found };
+export async function screenOutDevice(run_token: string, closed: GateFinding, device: Abilities): Promise<void> {
+  const body = { reason: closed.reason, data: device };
   // Asked twice, where the first answer was lost, the run is closed already.
   await call("POST", "/api/run/screen-out", { token: run_token, body }).catch((error: unknown) => {
     if (!(error instanceof Refused && error.code === "run_closed")) throw error;

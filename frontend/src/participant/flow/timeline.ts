@@ -32,7 +32,7 @@ function beginning(session: Session): Node[] {
     steps.push((eyebrow) => stageNode(session, "instructions", introduction(session, eyebrow)));
   }
   const total = steps.length;
-  return steps.map((make, place) => make(t("step", { step: place + 1, steps: total })));
+  return steps.map((make, index) => make(t("step", { step: index + 1, steps: total })));
 }
 
 function screenNode(session: Session, eyebrow: string): Node {
@@ -61,9 +61,9 @@ function introduction(session: Session, eyebrow: string): Node {
 function middle(session: Session): Node[] {
   const practice = practiceNodes(session);
   const open = session.run.blocks.filter(({ block }) => blockIsOpen(session, block));
-  const blocks = open.flatMap(({ block }, place): Node[] => [
-    ...(place > 0 ? restNodes(session, block) : []),
-    ...blockNodes(session, block, open[place + 1]?.block ?? null),
+  const blocks = open.flatMap(({ block }, index): Node[] => [
+    ...(index > 0 ? restNodes(session, block) : []),
+    ...blockNodes(session, block, open[index + 1]?.block ?? null),
   ]);
   return [...practice, ...blocks];
 }

@@ -55,8 +55,8 @@ export function drawFrame(context: Canvas, clip: SingleClip | Composed, index: n
   const pieces = "parts" in clip ? clip.parts : [{ clip, at: { x: 0, y: 0, width, height } }];
   const pictures = pieces.map((piece) => pictureOf(piece.clip, Math.min(index, countOf(piece.clip) - 1)));
   if (pictures.includes(undefined)) return false;
-  pieces.forEach(({ at }, place) => {
-    const picture = pictures[place];
+  pieces.forEach(({ at }, pieceIndex) => {
+    const picture = pictures[pieceIndex];
     if (picture) context.drawImage(picture, at.x, at.y, at.width, at.height);
   });
   return true;

@@ -79,7 +79,7 @@ function late({ drawn, fps }: Showing, refresh_ms: number): number {
 }
 
 function gapsOf(drawn: Showing["drawn"]): number[] {
-  return drawn.slice(1).map(([, at_ms], place) => at_ms - (drawn[place]?.[1] ?? at_ms));
+  return drawn.slice(1).map(([, at_ms], index) => at_ms - (drawn[index]?.[1] ?? at_ms));
 }
 
 const distinct = (drawn: Showing["drawn"]): number => new Set(drawn.map(([index]) => index)).size;

@@ -67,7 +67,7 @@ export class EvennessMeter {
   }
 
   read(): Evenness {
-    const periods = this.refreshes_ms.slice(1).map((at_ms, place) => at_ms - (this.refreshes_ms[place] ?? at_ms));
+    const periods = this.refreshes_ms.slice(1).map((at_ms, index) => at_ms - (this.refreshes_ms[index] ?? at_ms));
     const refresh_ms = periods.sort((a, b) => a - b)[Math.floor(periods.length / 2)] ?? null;
     return { clock_gap_ms: this.gap_ms, clock_late_ms: this.late_ms, refresh_ms };
   }

@@ -78,7 +78,7 @@ export class WorkerPlayer implements ClipPlayer {
     return new Promise((resolve, reject) => {
       this.waiting.set(name, { resolve, reject });
       if (limit_ms === Infinity) return;
-      setTimeout(() => this.settle(name, new ClipBroken(`no answer from the decoder in ${limit_ms} ms`)), limit_ms);
+      setTimeout(() => this.settle(name, new ClipBroken(`no answer in ${limit_ms} ms`)), limit_ms);
     });
   }
 

@@ -33,11 +33,11 @@ export class ClipCache {
 
   /** Fetch what is missing; resolves with the clips that could not be had, after all others are here. */
   async load(sources: ClipSource[], report: (progress: Progress) => void = () => {}, signal?: AbortSignal): Promise<ClipUnavailable[]> {
-    const wanted = [...new Map(sources.map((source) => [source.clip_sha256, source])).values()];
-    const queue = [...wanted];
+    const distinct = [...new Map(sources.map((source) => [source.clip_sha256, source])).values()];
+    const queue = [...distinct];
     const failed: ClipUnavailable[] = [];
     let done = 0;
-    report({ done, total: wanted.length, failed });
+    report({ done, total: distinct.length, failed });
     const worker = async (): Promise<void> => {
       for (let next = queue.shift(); next; next = queue.shift()) {
         await this.one(next, signal).then(
@@ -47,7 +47,7 @@ export class ClipCache {
             failed.push(error);
           },
         );
-        report({ done, total: wanted.length, failed });
+        report({ done, total: distinct.length, failed });
       }
     };
     await Promise.all(Array.from({ length: AT_ONCE }, worker));

@@ -22,7 +22,7 @@ export function measureRefreshRate(): Promise<number | null> {
 
 /** Null where there are too few stamps to tell, for instance in a hidden page. Missed refreshes are left out. */
 export function refreshRate(stamps: readonly number[]): number | null {
-  const gaps = stamps.slice(1).map((stamp, place) => stamp - (stamps[place] ?? stamp));
+  const gaps = stamps.slice(1).map((stamp, index) => stamp - (stamps[index] ?? stamp));
   const median = [...gaps].sort((a, b) => a - b)[Math.floor(gaps.length / 2)];
   if (gaps.length < 10 || !median) return null;
   // Time stamps may be rounded to a whole millisecond, so that the mean tells more than the median.

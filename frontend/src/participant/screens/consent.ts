@@ -6,7 +6,7 @@ import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
 import { wayBack } from "../flow/link";
 import { showNotice } from "./notice";
 import type { Session } from "../session";
-import { saveShown } from "./support";
+import { isSaving, saveShown, setSaving } from "./support";
 
 interface Parameters {
   eyebrow: string;
@@ -39,10 +39,11 @@ function showConsent(session: Session, display: HTMLElement, eyebrow: string, do
   const status = statusLine();
   const box = h("input", { type: "checkbox", id: uniqueId("agree"), "aria-describedby": alert.id });
   const go = button(t("continue"), () => {
+    if (isSaving(go)) return;
     alert.textContent = box.checked ? "" : t("consent_needed");
     if (!box.checked) return box.focus();
-    go.disabled = true;
-    void saveShown(session, status, session.api.consent()).then((outcome) => (outcome.accepted ? done() : (go.disabled = false)));
+    setSaving(go, true);
+    void saveShown(session, status, session.api.consent()).then((outcome) => (outcome.accepted ? done() : setSaving(go, false)));
   });
   const agree = h("label", { class: "tick", for: box.id }, box, h("span", {}, t("consent_agree")));
   showPage(display, {

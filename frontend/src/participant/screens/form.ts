@@ -8,7 +8,7 @@ import { plugin, OBJECT, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 import { typeOf } from "./fields/field";
 import { fieldView, type FieldView, type FormAnswers } from "./question";
-import { saveShown, stopButton } from "./support";
+import { isSaving, saveShown, setSaving, stopButton } from "./support";
 
 interface Parameters {
   eyebrow: string;
@@ -45,13 +45,14 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
   const views = form.fields.map((field) => fieldView(field, language, t));
   const [alert, status] = [alertLine(), statusLine()];
   const go = button(t("continue"), () => {
+    if (isSaving(go)) return;
     const bad = views.filter((view) => view.check() !== null);
     alert.textContent = bad.length ? t("form_fix") : "";
     if (bad.length) return bad[0]?.focus();
-    go.disabled = true;
+    setSaving(go, true);
     const answers = answersOf(views);
     void saveShown(session, status, session.api.form(form.name, answers)).then((outcome) => {
-      if (!outcome.accepted) return void (go.disabled = false);
+      if (!outcome.accepted) return setSaving(go, false);
       placed(session.run, outcome.body);
       done({ answers });
     });

@@ -24,7 +24,7 @@ export function showNotice(root: HTMLElement, notice: Notice): HTMLElement {
   const display = emptied(root);
   const { back } = notice;
   const leads = back ? h("a", { class: "button quiet", href: back.href, rel: "noreferrer" }, back.label) : null;
-  const buttons = (notice.actions ?? []).map(({ label, press }, place) => button(label, press, place ? "quiet" : "primary"));
+  const buttons = (notice.actions ?? []).map(({ label, press }, index) => button(label, press, index ? "quiet" : "primary"));
   showPage(display, {
     title: notice.title,
     body: [h("p", { role: "alert" }, notice.text), ...(notice.more ?? [])],

@@ -19,14 +19,15 @@ interface Data {
   waited_ms: number;
 }
 
-type WithClips = Pick<TrialInfo, "clip_sha256" | "clip_url"> & Partial<Pick<TrialInfo, "clips">>;
+type WithClips = Pick<TrialInfo, "clip_sha256"> & Partial<Pick<TrialInfo, "clips">>;
 
 /** Every clip of these trials. A visit that an earlier page has kept knows one clip a trial. */
 export function sourcesOf(trials: readonly WithClips[]): ClipSource[] {
-  return trials.flatMap(({ clips, clip_sha256, clip_url }) => {
-    if (clips) return clips.map((clip) => ({ clip_sha256: clip.clip_sha256, clip_url: clip.clip_url }));
-    return clip_sha256 && clip_url ? [{ clip_sha256, clip_url }] : [];
-  });
+  return trials.flatMap(({ clips, clip_sha256 }) =>
+    (clips ?? [{ clip_sha256 }]).flatMap(({ clip_sha256: sha256 }) =>
+      sha256 ? [{ clip_sha256: sha256, clip_url: `/clips/${sha256}.mp4` }] : [],
+    ),
+  );
 }
 
 export function preloadPage(session: Session): PluginClass<Parameters> {

@@ -19,14 +19,16 @@ export function settle(session: Session): PluginClass<Parameters> {
     parameters: { limit_ms: { type: INT, description: "longest wait in ms; what comes later joins the next block" } },
     data: { settled: { type: BOOL, description: "true where the server had everything" } },
     async show(display, { limit_ms }) {
-      const say = setTimeout(
-        () => {
-          showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, trouble(session))] });
-        },
-        SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8),
-      );
+      let said: string | null = null;
+      const tell = (): void => {
+        const why = trouble(session);
+        // What is written again may be spoken again.
+        if (why !== said) showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, why)] });
+        said = why;
+      };
+      const say = setInterval(tell, SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8));
       const settled = await session.outbox.drained(limit_ms);
-      clearTimeout(say);
+      clearInterval(say);
       return { settled };
     },
     simulate: async ({ limit_ms }) => ({ settled: await session.outbox.drained(limit_ms) }),

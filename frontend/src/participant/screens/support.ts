@@ -29,7 +29,7 @@ export function choose<Value>(session: Session, footer: HTMLElement, choices: Ch
       done();
       resolve(value);
     };
-    const buttons = choices.map(({ label, value, kind }, place) => button(label, () => take(value), kind ?? (place ? "quiet" : "primary")));
+    const buttons = choices.map(({ label, value, kind }, index) => button(label, () => take(value), kind ?? (index ? "quiet" : "primary")));
     footer.append(...buttons);
     listenKeys((event) => {
       if (event.key !== "Enter" && !(withSpace && isStartKey(event))) return;
@@ -59,6 +59,13 @@ export async function saveShown(session: Session, status: HTMLElement, saving: P
   status.textContent = outcome.accepted ? "" : session.t("not_saved", { message: outcome.refused.message });
   return outcome;
 }
+
+/** A button whose press is being saved. It stays enabled for the browser: a disabled one loses the focus to the page. */
+export function setSaving(go: HTMLButtonElement, saving: boolean): void {
+  go.setAttribute("aria-disabled", String(saving));
+}
+
+export const isSaving = (go: HTMLButtonElement): boolean => go.getAttribute("aria-disabled") === "true";
 
 /** Change a line only where it says something else: what is written again may be spoken again. */
 function say(line: HTMLElement, text: string): void {

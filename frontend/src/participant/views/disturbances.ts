@@ -30,20 +30,30 @@ export function visibleShare({ left, top, right, bottom }: Box, width: number, h
   return Math.min(1, (across * down) / area);
 }
 
-/** True where the screen refreshed at another, lower rate than was measured at the run's start. */
+/** True where the screen refreshed at another, lower rate than was measured, at the run's start or on the screen that it moved to. */
 export function refreshDropped(refresh_ms: number | null, expected_ms: number): boolean {
   return refresh_ms !== null && refresh_ms > expected_ms * DROPPED;
 }
 
 const zoom = (): number => window.devicePixelRatio * (window.visualViewport?.scale ?? 1);
+/** The same on a screen that is turned, another on most other screens. */
+const sides = (): number => screen.width + screen.height;
+
+/** The window for which the clip's place was laid out: what changes before the start key disturbs the view as well. */
+export interface Layout {
+  zoom: number;
+  sides: number;
+  fullscreenElement: Element | null;
+}
+
+export const layout = (): Layout => ({ zoom: zoom(), sides: sides(), fullscreenElement: document.fullscreenElement });
 
 /** Watch the window around `clip` from now until `stop`. It listens only: asking at each refresh costs frames. */
-export function watchDisturbances(clip: HTMLElement): { stop: () => Disturbed } {
+export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: () => Disturbed } {
   const counts: Record<string, number> = {};
   const own = new AbortController();
   const { signal } = own;
   const focus = watchFocus();
-  const zoom_before = zoom();
   let visible_share = 1;
   let small = false;
   let zoomed = false;
@@ -56,15 +66,18 @@ export function watchDisturbances(clip: HTMLElement): { stop: () => Disturbed } 
     const share = visibleShare(box, window.innerWidth, window.innerHeight);
     if (share < WHOLE_SHARE && visible_share >= WHOLE_SHARE) add("clip_cut_off");
     visible_share = Math.min(visible_share, share);
-    const is_zoomed = Math.abs(zoom() - zoom_before) > SAME_ZOOM;
+    const is_zoomed = Math.abs(zoom() - before.zoom) > SAME_ZOOM || sides() !== before.sides;
     if (is_zoomed && !zoomed) add("zoomed");
     zoomed = is_zoomed;
+    if (before.fullscreenElement && !document.fullscreenElement) add("full_screen_left");
+    // Kept with the layout: a trial's later clips and plays do not count the same leaving again.
+    before.fullscreenElement = document.fullscreenElement;
   };
   look();
   window.addEventListener("resize", look, { signal });
   window.addEventListener("scroll", look, { signal, passive: true });
   window.visualViewport?.addEventListener("resize", look, { signal });
-  document.addEventListener("fullscreenchange", () => !document.fullscreenElement && add("full_screen_left"), { signal });
+  document.addEventListener("fullscreenchange", look, { signal });
   return {
     stop() {
       look();

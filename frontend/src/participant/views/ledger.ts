@@ -4,6 +4,7 @@
  * another view.
  */
 import type { TrialInfo, ViewIn, ViewState } from "../../api/schema";
+import { ticketOf } from "../evidence/evidence";
 import { disturbancesOf } from "../playback/record";
 import type { Shown } from "../trials/shared/showing";
 import type { Session } from "../session";
@@ -39,6 +40,7 @@ export function beginView(session: Session, trial: TrialInfo, play: number): Ope
     play,
     started_at_client: new Date().toISOString(),
     screen: { ...session.screen.record(), width_px: window.innerWidth, height_px: window.innerHeight },
+    evidence: ticketOf(session, trial, play),
   };
   return {
     kept: send(session, view),
@@ -80,7 +82,7 @@ function seenClips(trial: TrialInfo, shown: readonly RolesShown[]): NonNullable<
     const showing = shown.find(({ roles }) => roles.includes(role))?.showing;
     const start = showing?.key_at_ms ?? 0;
     const log = (showing?.drawn ?? []).map(([index, at_ms]): [number, number] => [Math.min(index, frames - 1), at_ms - start]);
-    const first = log.filter(([index], place) => place === 0 || log[place - 1]?.[0] !== index);
+    const first = log.filter(([index], row) => row === 0 || log[row - 1]?.[0] !== index);
     return { role, clip_sha256, drawn: first.map(([index, ms]): [number, number] => [index, round(ms)]) };
   });
 }
@@ -95,6 +97,23 @@ export function viewsBefore(trial: TrialInfo, play: number): RolesShown[][] {
 /** True where the last of these was shown by an earlier page. */
 export function isFromBefore(showings: readonly Pick<Shown, "disturbances">[]): boolean {
   return Boolean(showings.at(-1)?.disturbances[RELOADED]);
+}
+
+interface Span {
+  began_at_ms: number | undefined;
+  ended_at_ms: number | undefined;
+}
+
+/** When the last showing drew its first and its last frame; not known of another page's, whose clips no key of this page follows. */
+export function spanOf(showings: readonly Shown[]): Span {
+  const last = isFromBefore(showings) ? undefined : showings.at(-1);
+  return { began_at_ms: last?.drawn[0]?.[1], ended_at_ms: last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms };
+}
+
+/** Response times from what was shown to the answer, in ms. */
+export function timesOf({ began_at_ms, ended_at_ms }: Span, answered_at_ms: number) {
+  const since = (start: number | undefined): number | null => (start === undefined ? null : round(answered_at_ms - start));
+  return { rt: since(ended_at_ms), rt_from_first_frame: since(began_at_ms) };
 }
 
 function restored(view: ViewState): RolesShown[] {
@@ -118,7 +137,7 @@ function restored(view: ViewState): RolesShown[] {
 export async function settleInterrupted(session: Session, file: (trial: TrialInfo, play: number) => Promise<void>): Promise<void> {
   for (const trial of session.run.trials) {
     for (const { id, number, play, started_at_client } of trial.views.filter(({ ended }) => !ended)) {
-      const start = { id, trial_index: trial.trial_index, number, play, started_at_client };
+      const start = { id, trial_index: trial.trial_index, number, play, started_at_client, evidence: ticketOf(session, trial, play) };
       await send(session, { ...start, ...INTERRUPTED });
       if (trial.kind !== "practice" && trial.plays_done < play) await file(trial, play);
     }

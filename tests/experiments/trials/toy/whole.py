@@ -40,7 +40,7 @@ from server.results.repository import Pool  # noqa: E402
 from server.settings import Settings  # noqa: E402
 from server.simulation.person import Person, Rater  # noqa: E402
 from server.studies.lookup import active_definition, active_version, find_study  # noqa: E402
-from tests.experiments.trials.toy.api import Api  # noqa: E402
+from tests.helpers.simulated import Api  # noqa: E402
 from tests.helpers.studies import SHORT, add_study  # noqa: E402
 
 TEXT = SHORT[: SHORT.index("[trial]")] + TOY.example + SHORT[SHORT.index("[[exclusions]]") :]
@@ -59,7 +59,7 @@ def main(folder: Path) -> dict[str, Any]:
     link = study.link(synthetic=True)
     with TestClient(create_app(settings)) as client:
         for seed in range(PEOPLE):
-            assert Person(Api(client), Rater(seed, 1, {})).take_part(link)  # type: ignore[arg-type]
+            assert Person(Api(client), Rater(seed, 1, {})).take_part(link)
     found: dict[str, Any] = {"plan": list(TOY.plan(study.experiment))}
     with services.database.read() as session:
         stored = find_study(session, "short", OPERATOR, "view")

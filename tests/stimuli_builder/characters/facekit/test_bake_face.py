@@ -2,6 +2,7 @@
 
 import errno
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,24 @@ def test_the_plan_bisects_and_renders_each_level_once(kit: FaceKit, scene: FaceS
     assert sorted(planned[1:]) == closures_of(17)
 
 
+def test_denser_ends_are_rendered_last_and_used(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
+    bake = bake_of(kit, scene, replace(order(tmp_path, 33, 9), denser_ends=True))
+    planned = [shot.pose.closure for shot in bake.shots]
+    assert planned[10:] == [0.0625, 0.9375]
+    pretend_rendered(bake, 12)
+    bake.write()
+    atlas = load_atlas(tmp_path / "out")
+    assert len(atlas.closures) == 33
+    assert atlas.declaration.provenance["rendered_closures"] == [
+        0.0,
+        0.0625,
+        *closures_of(9)[1:-1],
+        0.9375,
+        1.0,
+    ]
+    assert "--rendered 9 --denser-ends" in atlas.declaration.provenance["command"]
+
+
 def test_boxes_hold_all_that_moves(scene: FaceScene) -> None:
     opened, shut = (scene.shapes(LidPose(closure))[0].arrays()["vertices"] for closure in (0.0, 1.0))
     moved = np.abs(opened - shut).max(1) > 0.01
@@ -106,7 +125,7 @@ def test_everything_moves_in_one_fixed_topology(scene: FaceScene) -> None:
 def test_a_finished_bake_writes_a_character_without_blender(
     kit: FaceKit, scene: FaceScene, tmp_path: Path
 ) -> None:
-    bake = bake_of(kit, scene, order(tmp_path))
+    bake = bake_of(kit, scene, replace(order(tmp_path), name="face-12", seed=12))
     pretend_rendered(bake, 4)
     bake.run(lambda *_: None)
     atlas = load_atlas(tmp_path / "out")
@@ -117,6 +136,7 @@ def test_a_finished_bake_writes_a_character_without_blender(
     np.testing.assert_array_equal(atlas.level_srgb(0).shape[:2], atlas.base_linear()[atlas.crop].shape[:2])
     provenance = atlas.declaration.provenance
     assert provenance["rendered_closures"] == [0.0, 0.5, 1.0]
+    assert provenance["command"].startswith("stimuli bake face --seed 12 --framing eyes --size 240x90 ")
     assert "ICT-FaceKit" in provenance["geometry"]
     assert atlas.declaration.inter_ocular_mm == 60.0
     assert "Permission is hereby granted" in (tmp_path / "out" / "ICT-FaceKit-LICENSE.txt").read_text()
@@ -148,6 +168,24 @@ def test_an_interrupted_bake_says_what_lacks_and_keeps_what_is_there(
         bake.write()
     assert len(list(bake.work.glob("*.npz"))) == 2
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off", b"no picture"])
+def test_a_damaged_shot_is_named_and_the_others_stay(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path, content: bytes
+) -> None:
+    bake = bake_of(kit, scene, order(tmp_path))
+    pretend_rendered(bake, 4)
+    bake.shots[3].file.write_bytes(content)
+    with pytest.raises(
+        InputError, match=r"level_0\.500000\.npz is damaged: delete it and bake again"
+    ) as caught:
+        bake.write()
+    assert "\n" not in str(caught.value)
+    np.savez(bake.shots[3].file, left=np.zeros((3, 4, 3), np.float16))
+    with pytest.raises(InputError, match="holds other boxes than this bake's"):
+        bake.write()
+    assert bake.shots[2].file.exists()
 
 
 def test_another_face_size_quality_or_light_is_other_work(kit: FaceKit, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ interface Props {
 export function ElementButtons({ path, title, count }: Props) {
   const builder = useBuilderHere();
   const list = path.slice(0, -1);
-  const place = Number(path.at(-1));
+  const position = Number(path.at(-1));
   const change = (to: (elements: unknown[]) => unknown[]) => builder.set(list, to(listAt(builder.data, list)));
   const button = (word: string, does: () => void, disabled = false) => (
     <Button size="compact-xs" variant="default" disabled={disabled} aria-label={`${word} ${title}`} onClick={does}>
@@ -23,10 +23,10 @@ export function ElementButtons({ path, title, count }: Props) {
   );
   return (
     <Group gap={4} wrap="nowrap">
-      {button("Up", () => change((elements) => withMoved(elements, place, place - 1)), place === 0)}
-      {button("Down", () => change((elements) => withMoved(elements, place, place + 1)), place === count - 1)}
-      {button("Copy", () => change((elements) => elements.toSpliced(place + 1, 0, named(elements[place], elements))))}
-      {button("Remove", () => change((elements) => elements.toSpliced(place, 1)))}
+      {button("Up", () => change((elements) => withMoved(elements, position, position - 1)), position === 0)}
+      {button("Down", () => change((elements) => withMoved(elements, position, position + 1)), position === count - 1)}
+      {button("Copy", () => change((elements) => elements.toSpliced(position + 1, 0, named(elements[position], elements))))}
+      {button("Remove", () => change((elements) => elements.toSpliced(position, 1)))}
     </Group>
   );
 }

@@ -2,7 +2,7 @@
 
 import { Group, TextInput } from "@mantine/core";
 import { languageName } from "../../ui/format";
-import { isTable, type Path, placeName, textAt } from "../data";
+import { isTable, type Path, pathName, textAt } from "../data";
 import type { Editor } from "../schema";
 import { useBuilderHere } from "../useBuilder";
 import { ElementButtons } from "./ElementButtons";
@@ -28,8 +28,8 @@ export function Row({ path, editor, element, count }: Props) {
   const [key = "name"] = editor.keys.map(([name]) => name).filter((name) => name !== "label");
   const name = textAt(element, [key]);
   const label = isTable(element) ? element["label"] : "";
-  const place = placeName(path);
-  const problem = builder.problems.find((one) => one.path === `${place}.${key}` || one.path === place)?.message ?? null;
+  const row = pathName(path);
+  const problem = builder.problems.find((one) => one.path === `${row}.${key}` || one.path === row)?.message ?? null;
   // A label that says no more than the name follows it.
   const rename = (text: string) =>
     builder.set(path, { ...(isTable(element) ? element : {}), [key]: text, label: following(label, name, text) });

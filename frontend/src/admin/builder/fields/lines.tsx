@@ -14,17 +14,17 @@ export function Translations(props: FieldProps) {
     const lines = entered === "" ? [] : entered.split("\n");
     const others = texts.map((text) => (isTable(text) ? text : {}));
     const length = builder.languages.length === 1 ? lines.length : Math.max(lines.length, lines.length === 0 ? 0 : others.length);
-    const next: Data[] = Array.from({ length }, (_, place) => ({ ...others[place], [language]: lines[place] ?? "" }));
+    const next: Data[] = Array.from({ length }, (_, index) => ({ ...others[index], [language]: lines[index] ?? "" }));
     set(next.length === 0 ? undefined : next);
   };
   return (
     <Stack gap={4}>
-      {builder.languages.map((language, place) => (
+      {builder.languages.map((language, index) => (
         <Textarea
           key={language}
           label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
-          description={place === 0 ? `${help} Here: one a line.` : undefined}
-          error={place === 0 ? problem : null}
+          description={index === 0 ? `${help} Here: one a line.` : undefined}
+          error={index === 0 ? problem : null}
           autosize
           minRows={2}
           maxRows={12}

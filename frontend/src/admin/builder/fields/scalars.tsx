@@ -107,12 +107,12 @@ export function Translated(props: FieldProps) {
   const texts = isTable(value) ? value : {};
   return (
     <Stack gap={4}>
-      {builder.languages.map((language, place) => (
+      {builder.languages.map((language, index) => (
         <Textarea
           key={language}
           label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
-          description={place === 0 ? help : undefined}
-          error={place === 0 ? problem : null}
+          description={index === 0 ? help : undefined}
+          error={index === 0 ? problem : null}
           required={required}
           autosize
           minRows={1}

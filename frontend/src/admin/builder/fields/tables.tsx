@@ -2,7 +2,7 @@
 
 import { Alert, Button, Fieldset, Menu, Select, Stack, Switch, Text } from "@mantine/core";
 import { languageName } from "../../ui/format";
-import { isTable, labelOf, listAt, type Path, placeName, tableAt, textAt } from "../data";
+import { isTable, labelOf, listAt, type Path, pathName, tableAt, textAt } from "../data";
 import { type Editor, editorOf, mayBeNull, resolved, type Schema, starter, starterOf, withoutNull } from "../schema";
 import { useBuilderHere } from "../useBuilder";
 import { ElementButtons } from "./ElementButtons";
@@ -94,8 +94,8 @@ export function Elements(props: FieldProps) {
         {help}
       </Text>
       <Stack gap="xs">
-        {elements.map((element, place) => (
-          <Element key={place} path={[...props.path, place]} schema={editor.of} element={element} count={elements.length} />
+        {elements.map((element, index) => (
+          <Element key={index} path={[...props.path, index]} schema={editor.of} element={element} count={elements.length} />
         ))}
         <Add path={props.path} of={editor.of} />
         <Problems path={props.path} />
@@ -116,7 +116,7 @@ function Element({ path, schema, element, count }: ElementProps) {
   const inner = editorOf(schema);
   if (inner.kind === "table" && fitsRow(inner)) return <Row path={path} editor={inner} element={element} count={count} />;
   const title = titleOf(element) || `${labelOf(String(path.at(-2) ?? "")).toLowerCase()} ${Number(path.at(-1)) + 1}`;
-  const wrong = builder.problems.some((problem) => `${problem.path}.`.startsWith(`${placeName(path)}.`));
+  const wrong = builder.problems.some((problem) => `${problem.path}.`.startsWith(`${pathName(path)}.`));
   return (
     <details className="element" open={wrong || count <= 3 || undefined}>
       <summary>
@@ -198,7 +198,7 @@ export function ByLanguage(props: FieldProps) {
 /** What is wrong with a table as a whole. */
 function Problems({ path }: { path: Path }) {
   const builder = useBuilderHere();
-  const wrong = builder.problems.filter((problem) => problem.path === placeName(path));
+  const wrong = builder.problems.filter((problem) => problem.path === pathName(path));
   if (wrong.length === 0) return null;
   return (
     <Alert color="red" variant="light" mt="xs">

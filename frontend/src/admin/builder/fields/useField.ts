@@ -1,6 +1,6 @@
 /** What every editor of a key needs: its value, its label and help, what is wrong with it, and the way to set it. */
 
-import { keyName, labelOf, type Path, placeName, valueAt } from "../data";
+import { keyName, labelOf, type Path, pathName, valueAt } from "../data";
 import { effectOf, resolved, type Schema } from "../schema";
 import { useBuilderHere } from "../useBuilder";
 
@@ -12,7 +12,6 @@ export interface FieldProps {
 
 export function useField({ path, schema, required = false }: FieldProps) {
   const builder = useBuilderHere();
-  const place = placeName(path);
   const name = String(path.at(-1) ?? "");
   const measured = effectOf(keyName(path), builder.trialKind) === "measured";
   const help = (resolved(schema).description ?? "").replaceAll("`", "").replaceAll(/\s+/g, " ");
@@ -21,10 +20,9 @@ export function useField({ path, schema, required = false }: FieldProps) {
     fallback: resolved(schema).default,
     label: labelOf(name),
     help: `${help}${measured ? " A change begins a new data series." : ""}`.trim(),
-    problem: builder.problems.find((one) => one.path === place)?.message ?? null,
+    problem: builder.problems.find((one) => one.path === pathName(path))?.message ?? null,
     set: (value: unknown) => builder.set(path, value),
     required,
-    place,
     builder,
   };
 }

@@ -5,8 +5,8 @@ import type { TypeOfField } from "./field";
 
 export const type: TypeOfField<"likert"> = {
   control({ field: { points, low, high }, language, id: name }) {
-    const inputs = Array.from({ length: points }, (_, place) => h("input", { type: "radio", name, value: place + 1 }));
-    const steps = inputs.map((input, place) => h("label", { class: "step" }, input, h("span", {}, place + 1)));
+    const inputs = Array.from({ length: points }, (_, index) => h("input", { type: "radio", name, value: index + 1 }));
+    const steps = inputs.map((input, index) => h("label", { class: "step" }, input, h("span", {}, index + 1)));
     const node = h(
       "div",
       { class: "likert" },

@@ -8,7 +8,7 @@ type Options = Extract<FormField, { type: "choice" }>["options"];
 /** The boxes, and the values of those that are ticked. */
 export function ticked(options: Options, type: "radio" | "checkbox", language: string, name: string): [HTMLElement, () => string[]] {
   const inputs = options.map(({ value }) => h("input", { type, name, value }));
-  const rows = options.map(({ label }, place) => h("label", { class: "tick" }, inputs[place], h("span", {}, pick(label, language))));
+  const rows = options.map(({ label }, index) => h("label", { class: "tick" }, inputs[index], h("span", {}, pick(label, language))));
   const chosen = (): string[] => inputs.filter((input) => input.checked).map((input) => input.value);
   return [h("div", { class: "choices" }, ...rows), chosen];
 }

@@ -5,6 +5,7 @@ import type { Session } from "../../session";
 import { declaredRating } from "./declared";
 import { onlyResponse } from "./answer";
 import { askScales, type Rated } from "./scale";
+import { ratingBody } from "../rating";
 import { saveRating } from "../save-rating";
 import { askAttention } from "../shared/attention";
 
@@ -20,16 +21,7 @@ export async function check(session: Session, display: HTMLElement, trial: Trial
 }
 
 export function store(session: Session, trial: TrialInfo, rated: Rated, rt: number): Promise<void> {
-  return saveRating(session, trial, {
-    trial_index: trial.trial_index,
-    play: 1,
-    answer: { kind: "clip_rating", answers: rated.answers },
-    rt,
-    rt_from_first_frame: null,
-    time_elapsed: session.clock.elapsed(),
-    changes: rated.changes,
-    comment: null,
-    answered_at_client: new Date().toISOString(),
-    playback: playbackRecord(null, [], session.screen.record()),
-  });
+  const playback = playbackRecord(null, [], session.screen.record());
+  const answer = { kind: "clip_rating", answers: rated.answers } as const;
+  return saveRating(session, trial, ratingBody(session, trial, 1, answer, playback, { rt, changes: rated.changes }));
 }

@@ -4,7 +4,7 @@ import { INT, OBJECT, plugin, type PluginClass, pressWhile, trial } from "../../
 import { absoluteNow } from "../../playback/protocol";
 import type { Session } from "../../session";
 import type { TrialKind } from "../kind";
-import { placeIn } from "../shared/place";
+import { parametersOf } from "../shared/parameters";
 import { declaredRating } from "./declared";
 import { clipRating, unrated } from "./screen";
 import { loadWidgets } from "./widget";
@@ -32,14 +32,10 @@ function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
 export const kind: TrialKind = {
   node: (session, what) => {
     // Asked for now, so that no scale waits; what cannot be had is asked for again where it is shown.
-    void loadWidgets(declaredRating(session).scales).catch(() => {});
-    return trial(clipRating(session), {
-      trial: () => what().trial,
-      play: () => what().play,
-      next: () => what().next,
-      number: () => placeIn(session, what().trial).number,
-      total: () => placeIn(session, what().trial).total,
-    });
+    const { scales, reference } = declaredRating(session);
+    void loadWidgets(scales).catch(() => {});
+    const other = reference && import("./degradation").then(({ watchBothAndRate }) => watchBothAndRate);
+    return trial(clipRating(session, other), parametersOf(session, what));
   },
   attention: (session, what) => trial(attentionCheck(session), { trial: () => what().trial }),
   unrated,

@@ -35,13 +35,13 @@ const REST_MS = 500;
 type Shared = Pick<ScaleOptions, "language" | "t" | "signal">;
 
 /** The declared scales on one screen, or a screen each in their order, with the comment on the last. */
-export async function askInOrder(place: HTMLElement, trial: ShownClipRating, shared: Shared): Promise<Rated> {
+export async function askInOrder(container: HTMLElement, trial: ShownClipRating, shared: Shared): Promise<Rated> {
   const { scales, arrangement, comment } = trial;
-  if (arrangement === "one_screen" || scales.length < 2) return askScales(place, { ...trial, ...shared });
+  if (arrangement === "one_screen" || scales.length < 2) return askScales(container, { ...trial, ...shared });
   const all: Rated = { answers: {}, at_ms: {}, answered_at_ms: 0, changes: 0, comment: null };
   for (const [number, scale] of scales.entries()) {
     const screen = { ...trial, ...shared, scales: [scale], comment: comment && number === scales.length - 1 };
-    const rated = await withOwnKeys(shared.signal, (signal) => askScales(place, { ...screen, signal }));
+    const rated = await withOwnKeys(shared.signal, (signal) => askScales(container, { ...screen, signal }));
     Object.assign(all.answers, rated.answers);
     Object.assign(all.at_ms, rated.at_ms);
     Object.assign(all, { answered_at_ms: rated.answered_at_ms, changes: all.changes + rated.changes, comment: rated.comment });
@@ -60,10 +60,10 @@ async function withOwnKeys<T>(signal: AbortSignal, ask: (signal: AbortSignal) =>
   }
 }
 
-/** Show the scales in `place`; resolves with the answers. Their times are those of the presses that chose them. */
-export async function askScales(place: HTMLElement, options: ScaleOptions): Promise<Rated> {
+/** Show the scales in `container`; resolves with the answers. Their times are those of the presses that chose them. */
+export async function askScales(container: HTMLElement, options: ScaleOptions): Promise<Rated> {
   await loadWidgets(options.scales);
-  return new Promise((resolve) => new ScalesView(place, options, resolve));
+  return new Promise((resolve) => new ScalesView(container, options, resolve));
 }
 
 interface Block {
@@ -84,7 +84,7 @@ class ScalesView {
   private over = false;
 
   constructor(
-    place: HTMLElement,
+    container: HTMLElement,
     private readonly options: ScaleOptions,
     private readonly resolve: (rated: Rated) => void,
   ) {
@@ -95,7 +95,7 @@ class ScalesView {
     const asks = confirm || comment || scales.length > 1 || this.blocks.some(({ widget }) => !widget.settles);
     this.confirm = asks ? button(t("confirm"), () => this.finish()) : null;
     if (this.confirm) this.confirm.disabled = true;
-    place.replaceChildren(...this.layout());
+    container.replaceChildren(...this.layout());
     listenKeys((event) => this.pressed(event), signal);
     // The scale has the focus, so that Tab and screen readers go on from here, yet no key looks chosen.
     if (this.blocks[0]) this.goTo(this.blocks[0]);

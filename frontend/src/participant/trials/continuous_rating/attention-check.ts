@@ -11,7 +11,7 @@ import { declaredContinuous } from "./declared";
 
 export async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<{ chosen: number }> {
   const { check_scale, pointer_delay_ms } = declaredContinuous(session);
-  const numbers = Array.from({ length: check_scale.maximum }, (_, place) => String(place + 1));
+  const numbers = Array.from({ length: check_scale.maximum }, (_, index) => String(index + 1));
   const { answer, rt } = await askAttention(session, display, trial, (below, question, signal) =>
     askAnswer(below, {
       choices: numbers.map((name) => ({ name, number: Number(name), label: "" })),

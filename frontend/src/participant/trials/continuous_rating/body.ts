@@ -2,7 +2,7 @@
 import type { TrialInfo } from "../../../api/schema";
 import type { PlaybackRecord } from "../../playback/record";
 import type { Session } from "../../session";
-import type { RatingBody } from "../rating";
+import { ratingBody, type RatingBody } from "../rating";
 
 type ContinuousAnswer = Extract<RatingBody["answer"], { kind: "continuous_rating" }>;
 
@@ -14,16 +14,5 @@ export function continuousBody(
   playback: PlaybackRecord,
   rt: number | null = null,
 ): RatingBody {
-  return {
-    trial_index: trial.trial_index,
-    play,
-    answer: { kind: "continuous_rating", ...answer },
-    rt,
-    rt_from_first_frame: null,
-    time_elapsed: session.clock.elapsed(),
-    changes: answer.moves ?? 0,
-    comment: null,
-    answered_at_client: new Date().toISOString(),
-    playback,
-  };
+  return ratingBody(session, trial, play, { kind: "continuous_rating", ...answer }, playback, { rt, changes: answer.moves ?? 0 });
 }

@@ -3,7 +3,7 @@ import type { TrialInfo } from "../../../api/schema";
 import { INT, OBJECT, plugin, type PluginClass, pressWhile, trial } from "../../jspsych";
 import type { Session } from "../../session";
 import type { TrialKind } from "../kind";
-import { placeIn } from "../shared/place";
+import { parametersOf } from "../shared/parameters";
 import { continuousRating, unrated } from "./screen";
 
 /** What it draws comes beside the first trial, which does not wait for it, and is here when a check is. */
@@ -24,14 +24,7 @@ function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
 }
 
 export const kind: TrialKind = {
-  node: (session, what) =>
-    trial(continuousRating(session), {
-      trial: () => what().trial,
-      play: () => what().play,
-      next: () => what().next,
-      number: () => placeIn(session, what().trial).number,
-      total: () => placeIn(session, what().trial).total,
-    }),
+  node: (session, what) => trial(continuousRating(session), parametersOf(session, what)),
   attention: (session, what) => trial(continuousCheck(session), { trial: () => what().trial }),
   unrated,
 };

@@ -1,13 +1,15 @@
-/** The trace of a simulated participant: the middle throughout, with a playback of method none. */
+/** A simulated participant: what is stored is like any other, with a playback of method none; what is done on the page, what people do. */
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
+import { actWhileShown } from "../shared/act-while-shown";
+import type { TrialParameters } from "../shared/parameters";
 import { continuousBody } from "./body";
 import { declaredContinuous } from "./declared";
-import type { ContinuousData, ContinuousParameters } from "./screen";
+import type { ContinuousData } from "./screen";
 import { stepFrames } from "./trace";
 
-export async function simulatedTrace(session: Session, { trial, play }: ContinuousParameters): Promise<ContinuousData> {
+export async function simulatedTrace(session: Session, { trial, play }: TrialParameters): Promise<ContinuousData> {
   const { minimum, maximum, sample_hz } = declaredContinuous(session);
   const step_frames = stepFrames(trial.fps ?? 30, sample_hz);
   const length = Math.floor(((trial.frames ?? 1) - 1) / step_frames) + 1;
@@ -19,4 +21,9 @@ export async function simulatedTrace(session: Session, { trial, play }: Continuo
     continuousBody(session, trial, play, answer, playbackRecord(trial.clip_sha256, [], session.screen.record())),
   );
   return { samples: length, moves: 0, frames_missing: 0, again: play > 1 };
+}
+
+/** Presses whatever goes on; the slider stays where it is. */
+export function actTrace(display: HTMLElement): void {
+  actWhileShown(display, () => display.querySelector<HTMLButtonElement>(".primary")?.click());
 }

@@ -30,13 +30,13 @@ export function traceOf(
   step: number,
 ): number[] {
   const values: number[] = [];
-  let place = 0;
+  let index = 0;
   let current = moves[0]?.value ?? 0;
   for (let frame = 0; frame < frames; frame += step) {
     const at_ms = timeOf(frame, drawn, fps);
-    for (let next = moves[place]; next && next.at_ms <= at_ms; next = moves[place]) {
+    for (let next = moves[index]; next && next.at_ms <= at_ms; next = moves[index]) {
       current = next.value;
-      place += 1;
+      index += 1;
     }
     values.push(current);
   }

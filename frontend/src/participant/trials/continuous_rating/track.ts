@@ -77,13 +77,13 @@ function hold(input: HTMLInputElement, a_ms: number, noted: (at_ms: number) => v
   document.addEventListener(
     "keydown",
     (event) => {
-      const wanted = DIRECTION[event.key];
-      if (wanted === undefined) return;
+      const pressed = DIRECTION[event.key];
+      if (pressed === undefined) return;
       event.preventDefault();
-      if (wanted === direction) return;
+      if (pressed === direction) return;
       advance(event.timeStamp);
       const resting = direction === 0;
-      direction = wanted;
+      direction = pressed;
       if (resting) requestAnimationFrame(tick);
     },
     { signal },

@@ -3,21 +3,19 @@ import type { ShownCheck, TrialInfo } from "../../../api/schema";
 import { h } from "../../../ui/element";
 import { markdown } from "../../../ui/markdown";
 import { button, showPage } from "../../../ui/page";
-import { ClipBroken } from "../../playback/player";
 import { playbackRecord } from "../../playback/record";
-import { clipHeight, clipWidth } from "../../screen/size";
-import { sourcesOf } from "../../screens/preload";
 import { choose, screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
-import { beginView, isFromBefore, viewsBefore } from "../../views/ledger";
+import { beginView, spanOf, timesOf, viewsBefore } from "../../views/ledger";
 import type { RatingBody } from "../rating";
 import { saveRating } from "../save-rating";
 import { sayAlreadySeen } from "../shared/already-seen";
 import { askAnswer, type Chosen } from "../shared/ask-answer";
-import { showBroken } from "../shared/broken";
-import { placeIn } from "../shared/place";
+import { unlessBroken } from "../shared/broken";
+import { numbering } from "../shared/parameters";
+import { prepareClip, release } from "../shared/prepare";
 import { showOnce, type Shown, waitForStart } from "../shared/showing";
-import { stage, type Stage } from "../shared/stage";
+import { clipSize, stage, type Stage } from "../shared/stage";
 import { checkBody, unrated } from "./body";
 
 /** Thrown to leave the clip, or the question, for the other way. */
@@ -31,15 +29,12 @@ const ARROWS: Keyed = { ArrowLeft: 1, ArrowRight: 2, ArrowUp: 3, ArrowDown: 4 };
 const POINTER_DELAY_MS = 300;
 
 export async function showCheck(session: Session, display: HTMLElement, trial: TrialInfo): Promise<CheckData> {
-  const body = await watchAndAnswer(session, display, trial).catch(async (error: unknown) => {
-    if (error instanceof OtherWayTaken) return otherWay(session, display, trial);
-    if (!(error instanceof ClipBroken)) throw error;
-    session.events.add("clip_unavailable", { clip_sha256: trial.clip_sha256, reason: error.message });
-    await showBroken(session, display);
-    return unrated(session, trial, 1);
-  });
+  const broken = unlessBroken(session, display, trial, () => unrated(session, trial, 1));
+  const body = await watchAndAnswer(session, display, trial).catch((error: unknown) =>
+    error instanceof OtherWayTaken ? otherWay(session, display, trial) : broken(error),
+  );
   await saveRating(session, trial, body);
-  if (trial.clip_sha256) session.player.release(trial.clip_sha256);
+  release(session, trial, null);
   return { check: body.answer.kind === "check" ? body.answer.check : null };
 }
 
@@ -51,12 +46,12 @@ function asked(session: Session, trial: TrialInfo): ShownCheck {
 }
 
 async function watchAndAnswer(session: Session, display: HTMLElement, trial: TrialInfo): Promise<RatingBody> {
-  const place = placeFor(session, display, trial);
-  const other = way(session, place);
+  const clipStage = stageFor(session, display, trial);
+  const other = way(session, clipStage);
   const before = viewsBefore(trial, 1).at(-1)?.[0]?.showing;
-  if (before) sayAlreadySeen(session, place);
-  const shown = before ?? (await watch(session, place, trial, other));
-  const chosen = await Promise.race([ask(session, place, trial, other.signal), other.left]);
+  if (before) sayAlreadySeen(session, clipStage);
+  const shown = before ?? (await watch(session, clipStage, trial, other));
+  const chosen = await Promise.race([ask(session, clipStage, trial, other.signal), other.left]);
   return bodyOf(session, trial, shown, chosen);
 }
 
@@ -68,7 +63,7 @@ interface Way {
 }
 
 /** The quiet button of the other way, where the study offers one. */
-function way(session: Session, place: Stage): Way {
+function way(session: Session, clipStage: Stage): Way {
   const taken = new AbortController();
   const left = new Promise<never>((_, reject) => {
     taken.signal.addEventListener("abort", () => reject(new OtherWayTaken()));
@@ -76,50 +71,36 @@ function way(session: Session, place: Stage): Way {
   left.catch(() => {});
   const offered = session.run.checks?.other_way;
   const leave = offered ? button(offered.label, () => taken.abort(), "plain") : null;
-  if (leave) place.element.append(h("div", { class: "other-way" }, leave));
+  if (leave) clipStage.element.append(h("div", { class: "other-way" }, leave));
   return { left, signal: taken.signal, button: leave };
 }
 
-function placeFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
-  const wanted = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
-  const width = Math.min(wanted, window.innerWidth);
-  const place = stage(session.player.element, width, clipHeight(trial, width), session.t("clip_name"));
-  display.replaceChildren(place.element);
-  return place;
+function stageFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
+  const { width, height } = clipSize(session, trial);
+  const clipStage = stage(session.player.element, width, height, session.t("clip_name"));
+  display.replaceChildren(clipStage.element);
+  return clipStage;
 }
 
-async function watch(session: Session, place: Stage, trial: TrialInfo, other: Way): Promise<Shown> {
-  const sha256 = await prepare(session, trial);
+async function watch(session: Session, clipStage: Stage, trial: TrialInfo, other: Way): Promise<Shown> {
+  const sha256 = await prepareClip(session, trial, clipStage);
   const { t } = session;
   const touch = matchMedia("(pointer: coarse)").matches;
-  const note = t("trial_of", { ...placeIn(session, trial) });
-  const start = waitForStart(session, place, t(touch ? "ready_touch" : "ready"), note, POINTER_DELAY_MS, other.signal);
+  const note = t("trial_of", { ...numbering(session, trial) });
+  const start = waitForStart(session, clipStage, t(touch ? "ready_touch" : "ready"), note, POINTER_DELAY_MS, other.signal);
   const key_at_ms = await Promise.race([start, other.left]);
   const ledger = beginView(session, trial, 1);
-  const shown = await ledger.unlessBroken(showOnce(session, place, sha256, key_at_ms, 0, ledger.kept));
+  const shown = await ledger.unlessBroken(showOnce(session, clipStage, sha256, key_at_ms, 0, ledger.kept));
   void ledger.end([{ roles: ["shown"], showing: shown }]);
   if (shown.focus_lost > 0) session.events.add("focus_lost", { trial_index: trial.trial_index });
   return shown;
 }
 
-/** Fetch and decode the clip, and blank its place. Throws ClipBroken. */
-async function prepare(session: Session, trial: TrialInfo): Promise<string> {
-  const sha256 = trial.clip_sha256 ?? "";
-  if (!session.clips.get(sha256)) await session.clips.load(sourcesOf([trial]));
-  const bytes = session.clips.get(sha256);
-  if (!bytes) throw new ClipBroken("the clip could not be loaded");
-  await session.player.prepare(sha256, bytes, trial.fps).catch((error: unknown) => {
-    throw error instanceof ClipBroken ? error : new ClipBroken(String(error));
-  });
-  session.player.blank(sha256);
-  return sha256;
-}
-
-async function ask(session: Session, place: Stage, trial: TrialInfo, left: AbortSignal): Promise<Chosen<string>> {
+async function ask(session: Session, clipStage: Stage, trial: TrialInfo, left: AbortSignal): Promise<Chosen<string>> {
   const { question, choices } = asked(session, trial);
   const { signal, done } = screenSignal(session);
   left.addEventListener("abort", done);
-  const chosen = await askAnswer<string>(place.below, {
+  const chosen = await askAnswer<string>(clipStage.below, {
     choices: choices.map((label, index) => ({ name: String(index + 1), number: index + 1, label })),
     keyed: (key) => keyed(key, trial, choices.length),
     layout: trial.check === "digit" ? "digits" : "choices",
@@ -138,9 +119,7 @@ function keyed(key: string, { check }: TrialInfo, choices: number): string | nul
 }
 
 function bodyOf(session: Session, trial: TrialInfo, shown: Shown, { name, answered_at_ms }: Chosen<string>): RatingBody {
-  const since = (start: number | undefined): number | null =>
-    start === undefined || isFromBefore([shown]) ? null : Math.round((answered_at_ms - start) * 100) / 100;
-  const times = { rt: since(shown.drawn.at(-1)?.[1] ?? shown.ended_at_ms), rt_from_first_frame: since(shown.drawn[0]?.[1]) };
+  const times = timesOf(spanOf([shown]), answered_at_ms);
   const playback = playbackRecord(trial.clip_sha256, [shown], session.screen.record());
   return checkBody(session, trial, { check: Number(name), other_way: false }, playback, times);
 }

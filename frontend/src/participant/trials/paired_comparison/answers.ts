@@ -24,11 +24,11 @@ const LABELS: Record<Arrangement, [MessageKey, MessageKey]> = {
   one_after_the_other: ["pair_first", "pair_second"],
 };
 
-/** Show the answers in `place`; resolves with the one given. Its time is that of the press. */
-export async function askWinner(place: HTMLElement, options: AnswerOptions): Promise<Compared> {
+/** Show the answers in `container`; resolves with the one given. Its time is that of the press. */
+export async function askWinner(container: HTMLElement, options: AnswerOptions): Promise<Compared> {
   const { trial, arrangement, language, t, signal, question } = options;
   const [one, other] = LABELS[arrangement];
-  const { name, answered_at_ms } = await askAnswer<Winner>(place, {
+  const { name, answered_at_ms } = await askAnswer<Winner>(container, {
     choices: [
       { name: "left", number: 1, label: t(one) },
       { name: "right", number: 2, label: t(other) },

@@ -3,11 +3,11 @@ import type { TrialInfo } from "../../../api/schema";
 import { OBJECT, plugin, STRING, type PluginClass, pressWhile } from "../../jspsych";
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
+import { ratingBody } from "../rating";
 import { saveRating } from "../save-rating";
 import { askAttention } from "../shared/attention";
 import { winnerOf, type Winner } from "./answer-keys";
 import { askWinner } from "./answers";
-import { comparisonBody } from "./body";
 import { declaredPairs } from "./declared";
 
 interface Parameters {
@@ -44,6 +44,6 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
 }
 
 function store(session: Session, trial: TrialInfo, winner: Winner, rt: number): Promise<void> {
-  const given = { winner, arrangement: null, rt, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
-  return saveRating(session, trial, comparisonBody(trial, 1, given, playbackRecord(null, [], session.screen.record())));
+  const answer = { kind: "paired_comparison", winner, arrangement: null } as const;
+  return saveRating(session, trial, ratingBody(session, trial, 1, answer, playbackRecord(null, [], session.screen.record()), { rt }));
 }

@@ -1,12 +1,9 @@
 /** Where two clips stand on their one canvas, in pixels of the clips, and how large that canvas is on the screen. */
 import type { ShownPairedComparison } from "../../../api/schema";
+import type { Size } from "../shared/stage";
 
 export type Arrangement = ShownPairedComparison["presentation"]["arrangement"];
-export interface Size {
-  width: number;
-  height: number;
-}
-export interface Place extends Size {
+export interface ClipBox extends Size {
   x: number;
   y: number;
 }
@@ -17,9 +14,9 @@ export interface Layout {
   /** The same on the screen, in CSS px. */
   shown: Size;
   /** Left and right (upper and lower) clip; in turn, the same place twice. */
-  places: [Place, Place];
+  boxes: [ClipBox, ClipBox];
   /** Where a single clip stands, such as a reference. */
-  single: Place;
+  single: ClipBox;
 }
 
 /** Nothing is measured where calibration is off: a usual screen then. */
@@ -56,7 +53,7 @@ function arranged(arrangement: Arrangement, pixels: Size, shown: Size, gap_px: n
     arrangement,
     canvas,
     shown: { width: canvas.width / scale, height: canvas.height / scale },
-    places: [
+    boxes: [
       { x: 0, y: 0, ...pixels },
       { x: beside, y: below, ...pixels },
     ],

@@ -1,15 +1,15 @@
 /** Two clips made ready on one canvas, and shown: at once by one clock, or in turn with the declared gap. */
 import type { TrialClip, TrialInfo } from "../../../api/schema";
-import { h } from "../../../ui/element";
 import { pick } from "../../../i18n";
 import { ClipBroken, type Part } from "../../playback/player";
-import { sourcesOf } from "../../screens/preload";
 import type { Session } from "../../session";
+import { release, whileDecoding } from "../shared/prepare";
+import { decodeAll } from "../shared/decode-all";
 import { showOnce } from "../shared/showing";
 import type { Stage } from "../shared/stage";
 import type { RolesShown } from "../../views/ledger";
 import { declaredPairs } from "./declared";
-import type { Layout, Place } from "./layout";
+import type { Layout, ClipBox } from "./layout";
 
 /** One step of a trial: what the canvas shows, and for how long it stays plain before. */
 interface Step {
@@ -19,35 +19,21 @@ interface Step {
   label: string;
 }
 
-const SOON_MS = 150;
-
 /** Fetch, decode and compose everything the trial shows. Throws ClipBroken. */
-export async function preparePair(session: Session, trial: TrialInfo, layout: Layout, place: Stage): Promise<Step[]> {
-  const say = setTimeout(() => place.below.replaceChildren(h("p", { role: "status" }, session.t("decoding"))), SOON_MS);
-  try {
-    await Promise.all(trial.clips.map((clip) => decoded(session, trial, clip)));
+export function preparePair(session: Session, trial: TrialInfo, layout: Layout, stage: Stage): Promise<Step[]> {
+  return whileDecoding(session, stage, async () => {
+    await decodeAll(session, trial);
     const steps = await Promise.all(planned(session, trial, layout).map(({ step, parts }) => composed(session, layout, step, parts)));
     const first = steps[0];
     if (first) session.player.blank(first.id);
     return steps;
-  } catch (error) {
-    throw error instanceof ClipBroken ? error : new ClipBroken(String(error));
-  } finally {
-    clearTimeout(say);
-  }
-}
-
-async function decoded(session: Session, trial: TrialInfo, clip: TrialClip): Promise<void> {
-  if (!session.clips.get(clip.clip_sha256)) await session.clips.load(sourcesOf([trial]));
-  const bytes = session.clips.get(clip.clip_sha256);
-  if (!bytes) throw new ClipBroken("the clip could not be loaded");
-  await session.player.prepare(clip.clip_sha256, bytes, clip.fps);
+  });
 }
 
 function planned(session: Session, trial: TrialInfo, layout: Layout): { step: Step; parts: Part[] }[] {
   const { presentation, reference } = declaredPairs(session);
   const named = (role: string): TrialClip[] => trial.clips.filter((clip) => clip.role === role);
-  const part = (clip: TrialClip, at: Place): Part => ({ sha256: clip.clip_sha256, ...at });
+  const part = (clip: TrialClip, at: ClipBox): Part => ({ sha256: clip.clip_sha256, ...at });
   const single = (clip: TrialClip, gap_ms: number, label: string): { step: Step; parts: Part[] } => ({
     step: { id: `${trial.trial_index} ${clip.role}`, roles: [clip.role], gap_ms, label },
     parts: [part(clip, layout.single)],
@@ -62,7 +48,7 @@ function planned(session: Session, trial: TrialInfo, layout: Layout): { step: St
   const [left, right] = [...named("left"), ...named("right")];
   if (!left || !right) throw new ClipBroken("expected a left and a right clip");
   const step = { id: `${trial.trial_index} pair`, roles: ["left", "right"], gap_ms: after_ms, label: "" };
-  return [...before, { step, parts: [part(left, layout.places[0]), part(right, layout.places[1])] }];
+  return [...before, { step, parts: [part(left, layout.boxes[0]), part(right, layout.boxes[1])] }];
 }
 
 async function composed(session: Session, { canvas }: Layout, step: Step, parts: Part[]): Promise<Step> {
@@ -73,7 +59,7 @@ async function composed(session: Session, { canvas }: Layout, step: Step, parts:
 /** Show every step; a view's times count from the press that started it. */
 export async function showAll(
   session: Session,
-  place: Stage,
+  stage: Stage,
   steps: Step[],
   key_at_ms: number,
   kept: Promise<void>,
@@ -81,10 +67,10 @@ export async function showAll(
   const shown = [];
   for (const { id, roles, gap_ms, label } of steps) {
     if (gap_ms > 0) {
-      place.setPlaying(true);
+      stage.setPlaying(true);
       await new Promise((resolve) => setTimeout(resolve, gap_ms));
     }
-    const showing = await showOnce(session, place, id, key_at_ms, 0, kept, label);
+    const showing = await showOnce(session, stage, id, key_at_ms, 0, kept, label);
     if (showing.focus_lost > 0) session.events.add("focus_lost", { roles });
     shown.push({ roles, showing });
   }
@@ -93,10 +79,7 @@ export async function showAll(
 
 /** Forget the pair's pictures; clips that the next trial shows again stay decoded. */
 export function releasePair(session: Session, trial: TrialInfo, next: TrialInfo | null): void {
-  const kept = new Set(next?.clips.map(({ clip_sha256 }) => clip_sha256));
-  for (const { clip_sha256, role } of trial.clips) {
-    session.player.release(`${trial.trial_index} ${role}`);
-    if (!kept.has(clip_sha256)) session.player.release(clip_sha256);
-  }
+  release(session, trial, next);
+  for (const { role } of trial.clips) session.player.release(`${trial.trial_index} ${role}`);
   session.player.release(`${trial.trial_index} pair`);
 }

@@ -1,14 +1,12 @@
 /** The place of a pair on the screen; where it does not fit, the participant is asked for a larger window. */
 import type { TrialInfo } from "../../../api/schema";
-import { clipHeight, clipWidth } from "../../screen/size";
 import { askRoom } from "../../screens/screen-setup";
 import type { Session } from "../../session";
-import { stopButton } from "../../screens/support";
-import { stage, type Stage } from "../shared/stage";
+import { clipSize, showStage, type Stage } from "../shared/stage";
 import { declaredPairs } from "./declared";
-import { layoutOf, roomNeeded, type Layout, type Size } from "./layout";
+import { layoutOf, roomNeeded, type Layout } from "./layout";
 
-export async function stageFor(session: Session, display: HTMLElement, trial: TrialInfo): Promise<{ place: Stage; layout: Layout }> {
+export async function stageFor(session: Session, display: HTMLElement, trial: TrialInfo): Promise<{ stage: Stage; layout: Layout }> {
   const { presentation } = declaredPairs(session);
   const { px_per_mm } = session.screen;
   const shown = clipSize(session, trial);
@@ -17,18 +15,8 @@ export async function stageFor(session: Session, display: HTMLElement, trial: Tr
     const room = { width: window.innerWidth, height: window.innerHeight };
     const layout = layoutOf(presentation, pixels, shown, room, px_per_mm);
     if (layout) {
-      const place = stage(session.player.element, layout.shown.width, layout.shown.height, session.t("pair_name"));
-      place.element.append(stopButton(session));
-      display.replaceChildren(place.element);
-      return { place, layout };
+      return { stage: showStage(session, display, layout.shown, "pair_name"), layout };
     }
     await askRoom(session, display, "", roomNeeded(presentation, shown, px_per_mm));
   }
-}
-
-/** One clip at actual size; only where calibration is optional can it be too wide: it is then as wide as the window. */
-function clipSize(session: Session, trial: TrialInfo): Size {
-  const wanted = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
-  const width = Math.min(wanted, window.innerWidth);
-  return { width, height: clipHeight(trial, width) };
 }

@@ -2,50 +2,36 @@
 import type { TrialInfo } from "../../../api/schema";
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
-import { BOOL, FLOAT, INT, OBJECT, plugin, STRING, type PluginClass } from "../../jspsych";
-import { ClipBroken } from "../../playback/player";
+import { BOOL, FLOAT, plugin, STRING, type PluginClass } from "../../jspsych";
 import { playbackRecord } from "../../playback/record";
 import { screenSignal } from "../../screens/support";
 import type { Session } from "../../session";
-import { showBroken } from "../shared/broken";
+import { unlessBroken } from "../shared/broken";
 import { procedureFeedback } from "../shared/feedback";
 import { sayAlreadySeen } from "../shared/already-seen";
 import { waitForStart } from "../shared/showing";
 import type { Stage } from "../shared/stage";
-import type { RatingBody } from "../rating";
+import { ratingBody, type RatingBody } from "../rating";
 import { saveRating } from "../save-rating";
 import { askWinner, type Compared } from "./answers";
 import { clipsOf } from "../shared/roles";
-import { comparisonBody } from "./body";
-import { beginView, isFromBefore, type RolesShown, viewsBefore } from "../../views/ledger";
+import { PARAMETERS, type TrialParameters } from "../shared/parameters";
+import { beginView, type RolesShown, spanOf, timesOf, viewsBefore } from "../../views/ledger";
 import { declaredPairs } from "./declared";
 import type { Arrangement, Layout } from "./layout";
 import { preparePair, releasePair, showAll } from "./pair-player";
 import { stageFor } from "./pair-stage";
 
-export interface ComparisonParameters {
-  trial: TrialInfo;
-  play: number;
-  next: TrialInfo | null;
-  number: number;
-  total: number;
-}
 export interface ComparisonData {
   winner: string | null;
   rt: number | null;
   again: boolean;
 }
 
-export function comparison(session: Session): PluginClass<ComparisonParameters> {
-  return plugin<ComparisonParameters, ComparisonData>({
+export function comparison(session: Session): PluginClass<TrialParameters> {
+  return plugin<TrialParameters, ComparisonData>({
     name: "paired-comparison",
-    parameters: {
-      trial: { type: OBJECT, description: "the assigned trial" },
-      play: { type: INT, description: "1, or more where a failed pair is shown again" },
-      next: { type: OBJECT, description: "the trial after this one" },
-      number: { type: INT, description: "place of this trial among those counted, from 1" },
-      total: { type: INT, description: "how many there are" },
-    },
+    parameters: PARAMETERS,
     data: {
       winner: { type: STRING, description: "left, right or tie; null where the pair could not be shown" },
       rt: { type: FLOAT, description: "from the last frame to the answer, ms" },
@@ -53,19 +39,15 @@ export function comparison(session: Session): PluginClass<ComparisonParameters> 
     },
     show: (display, parameters) => runTrial(session, display, parameters),
     simulate: async (parameters) => (await import("./simulate")).simulatedComparison(session, parameters),
-    act: actTrial,
+    act: async (display) => (await import("./simulate")).actComparison(display),
   });
 }
 
-async function runTrial(session: Session, display: HTMLElement, parameters: ComparisonParameters): Promise<ComparisonData> {
+async function runTrial(session: Session, display: HTMLElement, parameters: TrialParameters): Promise<ComparisonData> {
   const { trial, play, next } = parameters;
-  const body = await watchAndCompare(session, display, parameters).catch(async (error: unknown) => {
-    if (!(error instanceof ClipBroken)) throw error;
-    const clips = trial.clips.map(({ clip_sha256 }) => clip_sha256);
-    session.events.add("clip_unavailable", { clip_sha256: clips[0], clips, reason: error.message });
-    await showBroken(session, display);
-    return unrated(session, trial, play);
-  });
+  const body = await watchAndCompare(session, display, parameters).catch(
+    unlessBroken(session, display, trial, () => unrated(session, trial, play)),
+  );
   await saveRating(session, trial, body);
   releasePair(session, trial, next);
   const winner = body.answer.kind === "paired_comparison" ? body.answer.winner : null;
@@ -74,35 +56,35 @@ async function runTrial(session: Session, display: HTMLElement, parameters: Comp
 
 /** What is stored of a showing without an answer. */
 export function unrated(session: Session, trial: TrialInfo, play: number): RatingBody {
-  const given = { winner: null, arrangement: null, rt: null, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
-  return comparisonBody(trial, play, given, playbackRecord(null, [], session.screen.record()));
+  const answer = { kind: "paired_comparison", winner: null, arrangement: null } as const;
+  return ratingBody(session, trial, play, answer, playbackRecord(null, [], session.screen.record()));
 }
 
-async function watchAndCompare(session: Session, display: HTMLElement, parameters: ComparisonParameters): Promise<RatingBody> {
+async function watchAndCompare(session: Session, display: HTMLElement, parameters: TrialParameters): Promise<RatingBody> {
   const { trial, play } = parameters;
-  const { place, layout } = await stageFor(session, display, trial);
+  const { stage, layout } = await stageFor(session, display, trial);
   const before = viewsBefore(trial, play).at(-1);
-  if (before) sayAlreadySeen(session, place);
-  const shown = before ?? (await watch(session, place, layout, parameters));
-  const compared = await compare(session, place, layout.arrangement);
+  if (before) sayAlreadySeen(session, stage);
+  const shown = before ?? (await watch(session, stage, layout, parameters));
+  const compared = await compare(session, stage, layout.arrangement);
   const body = bodyOf(session, parameters, layout.arrangement, shown, compared);
   const showings = shown.map(({ showing }) => showing);
-  if (trial.kind === "practice") await procedureFeedback(session, place, { trial, play, showings, rt_ms: body.rt ?? 0 });
+  if (trial.kind === "practice") await procedureFeedback(session, stage, { trial, play, showings, rt_ms: body.rt ?? 0 });
   return body;
 }
 
-async function watch(session: Session, place: Stage, layout: Layout, parameters: ComparisonParameters): Promise<RolesShown[]> {
+async function watch(session: Session, stage: Stage, layout: Layout, parameters: TrialParameters): Promise<RolesShown[]> {
   const { trial, play } = parameters;
-  const pair = await preparePair(session, trial, layout, place);
+  const pair = await preparePair(session, trial, layout, stage);
   const key_at_ms = await waitForStart(
     session,
-    place,
+    stage,
     readyText(session),
     note(session, parameters),
     declaredPairs(session).pointer_delay_ms,
   );
   const ledger = beginView(session, trial, play);
-  const shown = await ledger.unlessBroken(showAll(session, place, pair, key_at_ms, ledger.kept));
+  const shown = await ledger.unlessBroken(showAll(session, stage, pair, key_at_ms, ledger.kept));
   // The question does not wait for it: what the page does next is not on the disk's time.
   void ledger.end(shown);
   return shown;
@@ -112,52 +94,32 @@ function readyText({ t }: Session): string {
   return t(matchMedia("(pointer: coarse)").matches ? "pair_ready_touch" : "pair_ready");
 }
 
-function note({ t }: Session, { play, trial, number, total }: ComparisonParameters): string {
+function note({ t }: Session, { play, trial, number, total }: TrialParameters): string {
   return play > 1 && trial.kind !== "practice"
     ? t("pair_replay")
     : t(trial.kind === "practice" ? "practice_note" : "trial_of", { number, total });
 }
 
-async function compare(session: Session, place: Stage, arrangement: Arrangement): Promise<Compared> {
+async function compare(session: Session, stage: Stage, arrangement: Arrangement): Promise<Compared> {
   const { signal, done } = screenSignal(session);
   const { language, t } = session;
   const trial = declaredPairs(session);
   const question = h("h1", { class: "question" }, pick(trial.question, language));
-  const compared = await askWinner(place.below, { trial, arrangement, language, t, signal, question });
+  const compared = await askWinner(stage.below, { trial, arrangement, language, t, signal, question });
   done();
   return compared;
 }
 
 function bodyOf(
   session: Session,
-  { trial, play }: ComparisonParameters,
+  { trial, play }: TrialParameters,
   arrangement: Arrangement,
   shown: RolesShown[],
   { winner, answered_at_ms }: Compared,
 ): RatingBody {
   const showings = shown.map(({ showing }) => showing);
-  const last = showings.at(-1);
-  // From another page's clips to this page's key there is no response time.
-  const since = (start: number | undefined): number | null =>
-    start === undefined || isFromBefore(showings) ? null : Math.round((answered_at_ms - start) * 100) / 100;
-  const given = {
-    winner,
-    arrangement,
-    rt: since(last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms),
-    rt_from_first_frame: since(last?.drawn[0]?.[1]),
-    time_elapsed: session.clock.elapsed(),
-  };
   const playback = playbackRecord(trial.clips[0]?.clip_sha256 ?? null, showings, session.screen.record());
-  return comparisonBody(trial, play, given, { ...playback, clips: clipsOf(trial, shown) });
-}
-
-/** Presses start, then the second clip, then whatever goes on. */
-function actTrial(display: HTMLElement): void {
-  const own = display.firstElementChild;
-  const timer = setInterval(() => {
-    if (!own?.isConnected) return clearInterval(timer);
-    const press =
-      display.querySelector<HTMLButtonElement>(".pair-answer[data-answer=right]") ?? display.querySelector<HTMLButtonElement>(".primary");
-    press?.click();
-  }, 250);
+  const answer = { kind: "paired_comparison", winner, arrangement } as const;
+  const times = timesOf(spanOf(showings), answered_at_ms);
+  return ratingBody(session, trial, play, answer, { ...playback, clips: clipsOf(trial, shown) }, times);
 }

@@ -9,14 +9,14 @@ import "./points.css";
 export function widget({ scale, language, t, meant, choose }: Ask): Widget {
   if (scale.type !== "points") throw new Error(`expected points, got ${scale.type}`);
   const { minimum, maximum, labels, low, high } = scale;
-  const textOf = (place: number): string => {
-    const end = place === 0 ? low : place === maximum - minimum ? high : null;
-    const text = labels[place] ?? end;
+  const textOf = (index: number): string => {
+    const end = index === 0 ? low : index === maximum - minimum ? high : null;
+    const text = labels[index] ?? end;
     return text ? pick(text, language) : "";
   };
-  const keys = Array.from({ length: maximum - minimum + 1 }, (_, place) => {
-    const value = minimum + place;
-    const text = textOf(place);
+  const keys = Array.from({ length: maximum - minimum + 1 }, (_, index) => {
+    const value = minimum + index;
+    const text = textOf(index);
     const onclick = (event: Event): void => {
       if (meant.allows(event)) choose(value, event.timeStamp);
     };

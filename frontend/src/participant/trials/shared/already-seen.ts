@@ -3,6 +3,6 @@ import { h } from "../../../ui/element";
 import type { Session } from "../../session";
 import type { Stage } from "./stage";
 
-export function sayAlreadySeen(session: Session, place: Stage): void {
-  place.element.querySelector(".above")?.replaceChildren(h("p", { role: "status" }, session.t("already_seen")));
+export function sayAlreadySeen(session: Session, stage: Stage): void {
+  stage.element.querySelector(".above")?.replaceChildren(h("p", { role: "status" }, session.t("already_seen")));
 }

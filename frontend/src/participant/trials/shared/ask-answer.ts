@@ -26,8 +26,8 @@ export interface Chosen<Name extends string> {
 
 const SEEN_MS = 140;
 
-/** Show the answers in `place`; resolves with the one given. Its time is that of the press. */
-export function askAnswer<Name extends string>(place: HTMLElement, options: AskOptions<Name>): Promise<Chosen<Name>> {
+/** Show the answers in `container`; resolves with the one given. Its time is that of the press. */
+export function askAnswer<Name extends string>(container: HTMLElement, options: AskOptions<Name>): Promise<Chosen<Name>> {
   const { choices, further = [], keyed, layout, signal, question } = options;
   const meant = new MeantPress(options.pointer_delay_ms, signal);
   return new Promise((resolve) => {
@@ -57,7 +57,7 @@ export function askAnswer<Name extends string>(place: HTMLElement, options: AskO
       h("div", { class: "keys" }, ...choices.map(answer)),
       ...further.map(answer),
     );
-    place.replaceChildren(question, group);
+    container.replaceChildren(question, group);
     listenKeys((event) => {
       const name = keyed(event.key.length === 1 ? event.key.toLowerCase() : event.key);
       if (!name) return;

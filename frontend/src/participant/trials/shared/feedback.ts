@@ -26,13 +26,13 @@ export interface Practised {
 }
 
 /** Say how the procedure went; where it went wrong the same trial comes once more. */
-export async function procedureFeedback(session: Session, place: Stage, { trial, play, showings, rt_ms }: Practised): Promise<void> {
+export async function procedureFeedback(session: Session, stage: Stage, { trial, play, showings, rt_ms }: Practised): Promise<void> {
   const { t, run, replays } = session;
   const footer = h("div", { class: "actions" });
   const key = procedureRemark(showings, rt_ms);
   const again = AGAIN.includes(key) && play <= run.playback.max_repeats;
   const text = t(key, { seconds: Math.round(rt_ms / 1000) }) + (again ? ` ${t("feedback_again")}` : "");
-  place.below.replaceChildren(h("h1", { class: "feedback" }, h("span", { role: "status" }, text)), footer);
+  stage.below.replaceChildren(h("h1", { class: "feedback" }, h("span", { role: "status" }, text)), footer);
   await choose(session, footer, [{ label: t(again ? "try_again" : "continue"), value: true }], true);
   if (again) replays.add(trial, play + 1);
 }

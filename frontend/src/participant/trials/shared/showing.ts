@@ -18,7 +18,7 @@ const FALLBACK_REFRESH_MS = 1000 / 60;
 /** The ready screen; resolves with the time of the press that starts the clip (absolute, ms). */
 export function waitForStart(
   session: Session,
-  place: Stage,
+  stage: Stage,
   prompt: string,
   note: string,
   pointer_delay_ms: number,
@@ -34,10 +34,10 @@ export function waitForStart(
       done();
       resolve(performance.timeOrigin + event.timeStamp);
     };
-    const go = button(t("start_clip"), () => {});
+    const go = button(t("start"), () => {});
     go.addEventListener("click", start, { signal });
-    place.below.replaceChildren(h("h1", { class: "ready" }, prompt), go, h("p", { class: "count" }, note));
-    place.element.querySelector(".clip")?.addEventListener("click", start, { signal });
+    stage.below.replaceChildren(h("h1", { class: "ready" }, prompt), go, h("p", { class: "count" }, note));
+    stage.element.querySelector(".clip")?.addEventListener("click", start, { signal });
     listenKeys((event) => {
       if (!isStartKey(event)) return;
       event.preventDefault();
@@ -50,7 +50,7 @@ export function waitForStart(
 /** Play the prepared clip once, with nothing else on the screen, and not before `kept`: the view is on disk first. */
 export async function showOnce(
   session: Session,
-  place: Stage,
+  stage: Stage,
   sha256: string,
   key_at_ms: number,
   fixation_ms: number,
@@ -68,9 +68,9 @@ export async function showOnce(
     },
     { signal },
   );
-  place.setPlaying(true);
-  place.below.replaceChildren(h("p", { class: label ? "count" : "spoken", role: "status" }, label || t("clip_playing")));
-  const watched = watchDisturbances(player.element);
+  stage.setPlaying(true);
+  stage.below.replaceChildren(h("p", { class: label ? "count" : "spoken", role: "status" }, label || t("clip_playing")));
+  const watched = watchDisturbances(player.element, stage.layout);
   const refresh_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : FALLBACK_REFRESH_MS;
   try {
     const shown = await player.play(sha256, { fixation_ms, refresh_ms, ready: kept });
@@ -81,6 +81,6 @@ export async function showOnce(
   } finally {
     watched.stop();
     done();
-    place.setPlaying(false);
+    stage.setPlaying(false);
   }
 }

@@ -1,11 +1,22 @@
 /** The place of the clip: at actual size, always at the same spot, with marks at its corners between plays. */
+import type { TrialInfo } from "../../../api/schema";
+import type { MessageKey } from "../../../i18n";
 import { h } from "../../../ui/element";
+import { clipHeight, clipWidth } from "../../screen/size";
+import { stopButton } from "../../screens/support";
+import type { Session } from "../../session";
+import { layout, type Layout } from "../../views/disturbances";
 
+export interface Size {
+  width: number;
+  height: number;
+}
 export interface Stage {
   element: HTMLElement;
   /** Where the prompt, the scale and the feedback appear, below the clip. */
   below: HTMLElement;
   setPlaying(playing: boolean): void;
+  layout: Layout;
 }
 
 export function stage(clip: HTMLElement, width_px: number, height_px: number, name: string): Stage {
@@ -15,5 +26,19 @@ export function stage(clip: HTMLElement, width_px: number, height_px: number, na
   frame.style.height = `${height_px}px`;
   const below = h("div", { class: "below" });
   const element = h("section", { class: "trial" }, h("div", { class: "above" }), frame, below);
-  return { element, below, setPlaying: (playing) => element.classList.toggle("playing", playing) };
+  return { element, below, setPlaying: (playing) => element.classList.toggle("playing", playing), layout: layout() };
+}
+
+/** One clip at actual size; only where calibration is optional can it be too wide: it is then as wide as the window. */
+export function clipSize({ run, screen }: Session, trial: TrialInfo): Size {
+  const width = Math.min(clipWidth(trial, run.display.inter_ocular_mm, screen.px_per_mm), window.innerWidth);
+  return { width, height: clipHeight(trial, width) };
+}
+
+/** The place of clips of this size, with the way out, as all that is on the screen. */
+export function showStage(session: Session, display: HTMLElement, { width, height }: Size, name: MessageKey = "clip_name"): Stage {
+  const clipStage = stage(session.player.element, width, height, session.t(name));
+  clipStage.element.append(stopButton(session));
+  display.replaceChildren(clipStage.element);
+  return clipStage;
 }

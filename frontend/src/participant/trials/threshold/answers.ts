@@ -16,11 +16,11 @@ export function responseOf(key: string, [one, other]: readonly [Response, Respon
   return key === "y" ? one : key === "n" ? other : null;
 }
 
-export async function askResponse(session: Session, place: HTMLElement, question: HTMLElement): Promise<Chosen<Response>> {
+export async function askResponse(session: Session, container: HTMLElement, question: HTMLElement): Promise<Chosen<Response>> {
   const { answers, pointer_delay_ms } = declaredThreshold(session);
   const { signal, done } = screenSignal(session);
   const [one, other] = answers;
-  const chosen = await askAnswer<Response>(place, {
+  const chosen = await askAnswer<Response>(container, {
     choices: answers.map(({ response, label }, index) => ({ name: response, number: index + 1, label: pick(label, session.language) })),
     keyed: (key) => responseOf(key, [one.response, other.response]),
     layout: "one_after_the_other",

@@ -39,6 +39,5 @@ async function check(session: Session, display: HTMLElement, trial: TrialInfo): 
 }
 
 function store(session: Session, trial: TrialInfo, chosen: Response, rt: number): Promise<void> {
-  const given = { chosen, rt, rt_from_first_frame: null, time_elapsed: session.clock.elapsed() };
-  return saveRating(session, trial, thresholdBody(trial, 1, given, playbackRecord(null, [], session.screen.record())));
+  return saveRating(session, trial, thresholdBody(session, trial, 1, chosen, playbackRecord(null, [], session.screen.record()), { rt }));
 }

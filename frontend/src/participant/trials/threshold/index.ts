@@ -1,20 +1,13 @@
 /** The threshold as the registry of trial kinds finds it. */
 import { trial } from "../../jspsych";
 import type { TrialKind } from "../kind";
-import { placeIn } from "../shared/place";
+import { parametersOf } from "../shared/parameters";
 import { thresholdCheck } from "./attention-check";
 import { thresholdTrial, unrated } from "./screen";
 import "../shared/answers.css";
 
 export const kind: TrialKind = {
-  node: (session, what) =>
-    trial(thresholdTrial(session), {
-      trial: () => what().trial,
-      play: () => what().play,
-      next: () => what().next,
-      number: () => placeIn(session, what().trial).number,
-      total: () => placeIn(session, what().trial).total,
-    }),
+  node: (session, what) => trial(thresholdTrial(session), parametersOf(session, what)),
   attention: (session, what) => trial(thresholdCheck(session), { trial: () => what().trial }),
   unrated,
 };

@@ -1,17 +1,26 @@
-/** The answer of a simulated participant: stored like any other, with a playback of method none. */
+/** A simulated participant: what is stored is like any other, with a playback of method none; what is done on the page, what people do. */
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
 import { saveRating } from "../save-rating";
+import { actWhileShown } from "../shared/act-while-shown";
+import type { TrialParameters } from "../shared/parameters";
 import { thresholdBody } from "./body";
 import { declaredThreshold } from "./declared";
-import type { ThresholdData, ThresholdParameters } from "./screen";
+import type { ThresholdData } from "./screen";
 
-export async function simulatedThreshold(session: Session, { trial, play }: ThresholdParameters): Promise<ThresholdData> {
+export async function simulatedThreshold(session: Session, { trial, play }: TrialParameters): Promise<ThresholdData> {
   const { answers } = declaredThreshold(session);
   const chosen = answers[Math.random() < 0.5 ? 0 : 1].response;
   const rt = 300 + Math.round(Math.random() * 900);
-  const given = { chosen, rt, rt_from_first_frame: rt + 1_500, time_elapsed: session.clock.elapsed() };
   const playback = playbackRecord(trial.clip_sha256, [], session.screen.record());
-  await saveRating(session, trial, thresholdBody(trial, play, given, playback));
+  await saveRating(session, trial, thresholdBody(session, trial, play, chosen, playback, { rt, rt_from_first_frame: rt + 1_500 }));
   return { chosen, rt, again: play > 1 };
+}
+
+/** Presses start, then the second answer, then whatever goes on. */
+export function actThreshold(display: HTMLElement): void {
+  actWhileShown(display, () => {
+    const press = [...display.querySelectorAll<HTMLButtonElement>(".pair-answer")].at(-1);
+    (press ?? display.querySelector<HTMLButtonElement>(".primary"))?.click();
+  });
 }

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
-from server.tallies.tally import Counted, Place
+from server.tallies.tally import Counted, NumberedClip
 from server.trials.kinds import Part, Preference, Served, answer_of
 from server.trials.schemas import RatingIn
 from server.trials.verdict import Ruling
@@ -29,8 +29,8 @@ def simulated(
     return {"kind": "same_or_not", "same": rng.random() < 0.5}
 
 
-def counted(places: Mapping[str, Place], payload: Mapping[str, Any]) -> list[Counted]:
-    return [Counted("", places["first"].clip, places["second"].clip, float(payload["same"]))]
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
+    return [Counted("", clips["first"].clip, clips["second"].clip, float(payload["same"]))]
 
 
 SERVED = Served(validate, judge, simulated, counted)

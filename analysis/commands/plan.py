@@ -1,0 +1,309 @@
+"""`analysis plan`: how many participants, clips and faces a study needs, before there are data."""
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from analysis.commands.output import JsonOption, names_in, save_json
+from analysis.commands.synthetic import StatisticChoice, bar, say_power
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from analysis.power.designs import Design
+
+SizesOption = Annotated[
+    str, typer.Option("--n", help="Numbers of participants: first:last:step, or 20,30,43.")
+]
+SimulationsOption = Annotated[int, typer.Option(help="Data sets a number of participants.")]
+AlphaOption = Annotated[float, typer.Option(help="Level of the tests.")]
+PowerOption = Annotated[float, typer.Option("--power", help="Power to look for.", min=0.01, max=0.999)]
+SeedOption = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
+PlotOption = Annotated[
+    Path | None, typer.Option(help="Draw the curves into this PNG, SVG or PDF.", show_default=False)
+]
+
+
+class ShapeChoice(StrEnum):
+    """Shapes of psychometric functions."""
+
+    NORMAL = "normal"
+    LOGISTIC = "logistic"
+    WEIBULL = "weibull"
+
+
+plan = typer.Typer(
+    name="plan",
+    help="Sample size by simulation: participants, clips and faces for a power, and a text that says so.",
+    no_args_is_help=True,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
+    app.add_typer(plan)
+
+
+@plan.command(name="anova")
+def anova(
+    within: Annotated[
+        str, typer.Option(help="Factors within participants and their levels: face:3,blur:2.")
+    ] = "",
+    between: Annotated[str, typer.Option(help="Factors between participants: group:2.")] = "",
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Cohen's f of an effect: face=0.25, face:group=0.1 (small .1, medium .25, large .4). "
+            "Repeatable."
+        ),
+    ] = None,
+    correlation: Annotated[float, typer.Option(help="Between two cells of a participant.")] = 0.5,
+    statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = (
+        StatisticChoice.GREENHOUSE_GEISSER
+    ),
+    covariate: Annotated[
+        float, typer.Option(help="Correlation of a covariate (ANCOVA) with participants' mean ratings.")
+    ] = 0.0,
+    n: SizesOption = "10:60:10",
+    simulations: SimulationsOption = 500,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan a factorial design within, between or mixed.
+
+    Examples:
+
+      analysis plan anova --within face:3,blur:2 --effect face=0.2 --effect face:blur=0.15
+
+      analysis plan anova --within face:3 --between group:2 --effect face:group=0.15 --n 20:80:20
+
+      analysis plan anova --between group:2 --effect group=0.3 --covariate 0.5 --n 40:120:20
+    """
+    from analysis.power.factorial import FactorialDesign
+
+    design = FactorialDesign(
+        _levels(within, "--within"), _levels(between, "--between"), _effects(effect or []), correlation,
+        statistic.value, covariate,
+    )  # fmt: skip
+    _simulate(design, "factorial design", (n, simulations, alpha, target, seed), plot, json)
+
+
+@plan.command(name="mixed")
+def mixed(
+    difference: Annotated[float, typer.Option(help="Between the two conditions, in rating points.")],
+    clips: Annotated[str, typer.Option(help="Numbers of clips, each tried: 8,16,32.")] = "8,16",
+    faces: Annotated[str, typer.Option(help="Numbers of faces that the clips are of, each tried: 2,4.")] = "",
+    crossed: Annotated[
+        bool, typer.Option("--crossed", help="Each clip in both conditions; else half in either.")
+    ] = False,
+    repeats: Annotated[int, typer.Option(help="Ratings of a clip by a participant.", min=1)] = 1,
+    sd_participant: Annotated[float, typer.Option(help="SD of participants' mean ratings.", min=0)] = 0.6,
+    sd_slope: Annotated[float, typer.Option(help="SD of participants' differences.", min=0)] = 0.4,
+    sd_clip: Annotated[float, typer.Option(help="SD of clips' mean ratings.", min=0)] = 0.3,
+    sd_face: Annotated[float, typer.Option(help="SD of faces' mean ratings.", min=0)] = 0.3,
+    sd_face_slope: Annotated[float, typer.Option(help="SD of faces' differences.", min=0)] = 0.1,
+    sd_residual: Annotated[float, typer.Option(help="SD of a rating's rest.", min=0.001)] = 1.0,
+    n: SizesOption = "10:50:10",
+    simulations: SimulationsOption = 200,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan a mixed model of two conditions: participants, clips, and faces as random factors.
+
+    Examples:
+
+      analysis plan mixed --difference 0.4 --clips 8,16,32
+
+      analysis plan mixed --difference 0.4 --clips 16 --faces 2,4,8 --n 20:60:20
+    """
+    from analysis.power.mixed_models import MixedDesign, Spreads
+
+    spreads = Spreads(sd_participant, sd_slope, sd_clip, sd_face, sd_face_slope, sd_residual)
+    design = MixedDesign(
+        difference, _counts(clips, "--clips"), _counts(faces, "--faces"), crossed, repeats, spreads
+    )
+    _simulate(design, "mixed model", (n, simulations, alpha, target, seed), plot, json)
+
+
+@plan.command(name="ordinal")
+def ordinal(
+    difference: Annotated[
+        float, typer.Option(help="Between the conditions, in log odds of a higher rating: 0.5 is 1.65 to 1.")
+    ],
+    shares: Annotated[
+        str, typer.Option(help="How often each rating is given in the first condition: 5,10,20,30,20,10,5.")
+    ],
+    clips: Annotated[int, typer.Option(help="Clips, shared evenly by the conditions.", min=2)] = 8,
+    crossed: Annotated[
+        bool, typer.Option("--crossed", help="Each clip in both conditions; else half in either.")
+    ] = False,
+    sd_participant: Annotated[float, typer.Option(help="SD of participants, in log odds.", min=0)] = 1.0,
+    sd_slope: Annotated[float, typer.Option(help="SD of participants' differences.", min=0)] = 0.5,
+    sd_clip: Annotated[float, typer.Option(help="SD of clips.", min=0)] = 0.5,
+    n: SizesOption = "10:50:10",
+    simulations: SimulationsOption = 200,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan an ordinal mixed model of two conditions: ratings as ordered categories.
+
+    Examples:
+
+      analysis plan ordinal --difference 0.5 --shares 5,10,20,30,20,10,5 --clips 16
+
+      analysis plan ordinal --difference 0.4 --shares 1,2,4,2,1 --clips 8 --crossed --n 20:60:20
+    """
+    from analysis.power.ordinal_models import OrdinalDesign
+
+    design = OrdinalDesign(
+        difference, _numbers(shares, "--shares"), clips, crossed, sd_participant, sd_slope, sd_clip
+    )
+    _simulate(design, "ordinal mixed model", (n, simulations, alpha, target, seed), plot, json)
+
+
+@plan.command(name="pairs")
+def pairs(
+    abilities: Annotated[
+        str, typer.Option(help="Log odds of the items: 0,0.3,0.6. One above another wins 73% of the time.")
+    ],
+    repeats: Annotated[int, typer.Option(help="Comparisons of each pair by a participant.", min=1)] = 1,
+    sd_rater: Annotated[float, typer.Option(help="SD of participants' own log odds of a pair.", min=0)] = 0.0,
+    tie: Annotated[float, typer.Option(help="Probability that two equal items tie (Davidson).")] = 0.0,
+    n: SizesOption = "10:60:10",
+    simulations: SimulationsOption = 500,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan paired comparisons: whether items differ, and each item against the next best.
+
+    Examples:
+
+      analysis plan pairs --abilities 0,0.3,0.6,0.9 --n 10:40:10
+
+      analysis plan pairs --abilities 0,0.5 --repeats 4 --sd-rater 0.5
+
+      analysis plan pairs --abilities 0,0.3,0.6 --tie 0.2
+    """
+    from analysis.power.choices import PairsDesign
+
+    design = PairsDesign(_numbers(abilities, "--abilities"), repeats, sd_rater, tie)
+    _simulate(design, "paired comparisons", (n, simulations, alpha, target, seed), plot, json)
+
+
+@plan.command(name="thresholds")
+def thresholds(
+    levels: Annotated[str, typer.Option(help="Stimuli shown: 100,120,140,160.")],
+    threshold: Annotated[float, typer.Option(help="Mean threshold of the first condition.")],
+    difference: Annotated[float, typer.Option(help="How much higher that of the second is.")],
+    spread: Annotated[float, typer.Option(help="Spread of a person's function.")],
+    sd_people: Annotated[float, typer.Option(help="SD of thresholds over people.")] = 0.0,
+    sd_difference: Annotated[float, typer.Option(help="SD of differences over people.")] = 0.0,
+    trials: Annotated[int, typer.Option(help="Trials of each stimulus in a condition.", min=1)] = 10,
+    guess: Annotated[float, typer.Option(help="Guess rate: 0 for yes/no, 0.5 for two alternatives.")] = 0.0,
+    lapse: Annotated[float, typer.Option(help="Lapse rate.")] = 0.0,
+    function: Annotated[ShapeChoice, typer.Option(help="Shape of the function.")] = ShapeChoice.NORMAL,
+    n: SizesOption = "6:30:6",
+    simulations: SimulationsOption = 500,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan a comparison of thresholds in two conditions, each person in both.
+
+    Examples:
+
+      analysis plan thresholds --levels 100,120,140,160 --threshold 130 --difference 8 --spread 12
+    """
+    from analysis.power.choices import ThresholdDesign
+
+    design = ThresholdDesign(
+        _numbers(levels, "--levels"), trials, threshold, difference, sd_people, sd_difference, spread, guess,
+        lapse, function.value, seed,
+    )  # fmt: skip
+    _simulate(design, "thresholds", (n, simulations, alpha, target, seed), plot, json)
+
+
+def _simulate(
+    design: "Design",
+    name: str,
+    asked: tuple[str, int, float, float, int],
+    plot: Path | None,
+    json: Path | None,
+) -> None:
+    from importlib.metadata import version
+
+    from analysis.power.designs import sample_size_text, simulate_design
+    from analysis.power.simulate import sample_sizes
+    from analysis.report.formats import wrap
+
+    n, simulations, alpha, target, seed = asked
+    sizes = sample_sizes(n)
+    with bar("simulating", len(sizes) * simulations) as advance:
+        result = simulate_design(design, name, sizes, simulations, alpha, seed, advance)
+    say_power(result, target)
+    text = sample_size_text(result, design, target, version("palpebra"))
+    typer.echo("\n" + "\n".join(wrap(text)))
+    if plot is not None:
+        from analysis.power.figure import save_power_figure
+
+        save_power_figure(result, plot, target)
+        typer.echo(f"\nwritten: {plot}")
+    numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
+    save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
+
+
+def _levels(text: str, option: str) -> dict[str, int]:
+    levels: dict[str, int] = {}
+    for part in names_in(text):
+        name, _, count = part.partition(":")
+        if not name or not count.isdecimal() or int(count) < 2 or name in levels:
+            raise InputError(
+                f"{option} should be like face:3,blur:2 (names and numbers of levels), got '{text}'"
+            )
+        levels[name] = int(count)
+    return levels
+
+
+def _effects(given: list[str]) -> dict[str, float]:
+    sizes: dict[str, float] = {}
+    for text in given:
+        name, _, size = text.partition("=")
+        try:
+            sizes[name.strip()] = float(size)
+        except ValueError:
+            raise InputError(f"--effect should be like face=0.25 or face:group=0.1, got '{text}'") from None
+        if not 0 <= sizes[name.strip()] < 10:
+            raise InputError(
+                f"--effect takes Cohen's f from 0 (small .1, medium .25, large .4), got '{text}'"
+            )
+    return sizes
+
+
+def _numbers(text: str, option: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in names_in(text))
+    except ValueError:
+        raise InputError(f"{option} should be numbers separated by commas, got '{text}'") from None
+
+
+def _counts(text: str, option: str) -> tuple[int, ...]:
+    parts = names_in(text)
+    if not all(part.isdecimal() and int(part) > 0 for part in parts):
+        raise InputError(f"{option} should be whole numbers separated by commas, got '{text}'")
+    return tuple(int(part) for part in parts)

@@ -1,0 +1,203 @@
+"""Profile likelihood intervals of a linear mixed model: of coefficients, and of standard deviations.
+
+As lme4's `confint(method = "profile")`: maximum likelihood, every other parameter fitted anew at each point
+(Bates et al. 2015, doi:10.18637/jss.v067.i01, section 5.1); the ends are solved for, where lme4 interpolates.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special
+
+from analysis.models.reml import Criterion, CrossProducts, criterion
+
+Floats = NDArray[np.float64]
+Bound = tuple[float | None, float | None]
+
+TOLERANCE = 1e-6
+"""Relative precision of an end, in units of the distance from the estimate."""
+
+MAX_RESTARTS = 6
+SETTLED = 1e-7
+"""L-BFGS, which may stop early or at zero, starts anew until the deviance falls by less than this."""
+
+LIFT = 0.05
+"""Relative standard deviations start at this at least."""
+
+START_APART = 0.5
+"""Relative standard deviation of the second start of every minimum: the deviance may have two."""
+
+MAX_DOUBLINGS = 12
+"""How often the bracket of an end is widened before the end counts as not there."""
+
+
+class Profile:
+    r"""Intervals of one model; an end that the likelihood does not have is NaN.
+
+    Parameters
+    ----------
+    c : CrossProducts
+    start : (m,) array
+        Relative standard deviations to start from, such as the REML estimate.
+    confidence : float
+        Coverage.
+
+    Notes
+    -----
+    With :math:`d(\psi)` the deviance (-2 log likelihood) minimised over everything but :math:`\psi`, an end
+    solves :math:`d(\psi) - d(\hat\psi) = \chi^2_{1; confidence}`. For a standard deviation
+    :math:`s = \sigma\theta_k` the deviance is
+    :math:`\log|V| + n \log 2\pi\sigma^2 + r^2 / \sigma^2` with :math:`\theta_k = s / \sigma`; for a
+    coefficient b its column leaves X and y becomes :math:`y - b x`.
+    """
+
+    def __init__(self, c: CrossProducts, start: Floats, confidence: float = 0.95) -> None:
+        self._c = c
+        self._bounds: list[Bound] = [
+            (0.0, None) if np.trace(pattern) > 0 else (None, None)
+            for block in c.blocks
+            for pattern in block.patterns
+        ]
+        self._rise = float(special.chdtri(1, 1 - confidence))
+        self._reach = float(np.sqrt(self._rise))
+        self._theta, self._least = self._fitted(c, start)
+        self._best = criterion(c, self._theta, reml=False)
+
+    def coefficient(self, column: int) -> tuple[float, float]:
+        """Interval of the fixed coefficient of a column of X."""
+        estimate = float(self._best.beta[column])
+        se = self._best.sigma * float(np.sqrt(self._best.unscaled[column, column]))
+
+        def deviance(value: float) -> float:
+            return self._fitted(_without(self._c, column, value), self._theta)[1]
+
+        return self._end(deviance, estimate, -se), self._end(deviance, estimate, se)
+
+    def sigma(self) -> tuple[float, float]:
+        """Interval of the residual standard deviation."""
+        estimate = self._best.sigma
+        se = estimate / np.sqrt(2 * self._c.n)
+
+        def deviance(value: float) -> float:
+            return self._minimised(
+                self._theta,
+                lambda at: _deviance(self._c.n, at, value),
+                lambda at: at.grad_h + at.grad_r2 / value**2,
+            )[1]
+
+        return self._end(deviance, estimate, -se, floor=0.0), self._end(deviance, estimate, se)
+
+    def sd(self, k: int) -> tuple[float, float]:
+        """Interval of the standard deviation of the random term of theta k; its low end may be zero."""
+        estimate = self._best.sigma * float(self._theta[k])
+        step = max(estimate / 4, self._best.sigma / 50)
+        low = 0.0
+        if estimate > 0 and self._held(k, 0.0) - self._least > self._rise:
+            low = self._end(lambda value: self._held(k, value), estimate, -min(step, estimate / 2), floor=0.0)
+        return low, self._end(lambda value: self._held(k, value), estimate, step)
+
+    def _held(self, k: int, value: float) -> float:
+        """Least deviance with the standard deviation of theta k at `value`, over all other parameters."""
+        others = np.delete(np.arange(len(self._theta)), k)
+        n = self._c.n
+
+        def objective(packed: Floats) -> tuple[float, Floats]:
+            sigma, theta = float(np.exp(packed[0])), np.empty(len(self._theta))
+            theta[others], theta[k] = packed[1:], value / sigma
+            at = criterion(self._c, theta, reml=False)
+            by_theta = at.grad_h + at.grad_r2 / sigma**2
+            by_sigma = 2 * n - 2 * at.r2 / sigma**2 - theta[k] * by_theta[k]
+            return _deviance(n, at, sigma), np.concatenate([[by_sigma], by_theta[others]])
+
+        bounds: list[Bound] = [(None, None), *(self._bounds[other] for other in others)]
+        fitted = np.concatenate([[np.log(self._best.sigma)], self._theta[others]])
+        apart = np.concatenate([[np.log(self._best.sigma)], self._apart()[others]])
+        return min(_minimum(objective, start, bounds)[1] for start in (fitted, apart))
+
+    def _fitted(self, c: CrossProducts, start: Floats) -> tuple[Floats, float]:
+        return self._minimised(start, lambda at: at.value, lambda at: at.gradient, c)
+
+    def _minimised(
+        self,
+        start: Floats,
+        value: Callable[[Criterion], float],
+        gradient: Callable[[Criterion], Floats],
+        c: CrossProducts | None = None,
+    ) -> tuple[Floats, float]:
+        def objective(theta: Floats) -> tuple[float, Floats]:
+            at = criterion(c or self._c, theta, reml=False)
+            return value(at), gradient(at)
+
+        starts = (start, self._apart())
+        return min((_minimum(objective, one, self._bounds) for one in starts), key=lambda fit: fit[1])
+
+    def _apart(self) -> Floats:
+        """A start whose random terms all have a variance."""
+        return np.array([START_APART if bound[0] == 0.0 else 0.0 for bound in self._bounds])
+
+    def _end(
+        self, deviance: Callable[[float], float], estimate: float, step: float, floor: float = -np.inf
+    ) -> float:
+        """Where the deviance has risen by chi-squared, on the side of `step`; NaN where it never does."""
+
+        @cache
+        def lacking(distance: float) -> float:
+            if not distance:
+                return -self._reach
+            rise = deviance(estimate + distance) - self._least
+            return float(np.sqrt(max(rise, 0.0))) - self._reach
+
+        near, far = 0.0, self._reach * step
+        for _ in range(MAX_DOUBLINGS):
+            far = max(far, (floor - estimate) * (1 - 1e-6)) if step < 0 else far
+            if lacking(far) > 0:
+                distance = optimize.brentq(
+                    lacking,
+                    near,
+                    far,
+                    xtol=TOLERANCE * abs(far),
+                    rtol=1e-12,
+                )
+                return estimate + float(distance)
+            near, far = far, 2 * far
+        return float("nan")
+
+
+def _deviance(n: int, at: Criterion, sigma: float) -> float:
+    return float(at.h + n * np.log(2 * np.pi * sigma**2) + at.r2 / sigma**2)
+
+
+def _minimum(
+    objective: Callable[[Floats], tuple[float, Floats]],
+    start: Floats,
+    bounds: list[Bound],
+) -> tuple[Floats, float]:
+    floors = np.array([low == 0.0 for low, _ in bounds])
+    best, least = start, np.inf
+    for _ in range(MAX_RESTARTS):
+        # a theta at zero is stationary whatever the data say: it starts above, and may fall back
+        point = np.where(floors & (best < LIFT), LIFT, best)
+        optimum = optimize.minimize(
+            objective,
+            point,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxiter": 500, "maxfun": 1000, "ftol": 1e-12, "gtol": 1e-6, "maxcor": 30},
+        )
+        fallen = least - float(optimum.fun)
+        if fallen > 0:
+            best, least = np.asarray(optimum.x, dtype=np.float64), float(optimum.fun)
+        if fallen < SETTLED:
+            break
+    return best, least
+
+
+def _without(c: CrossProducts, column: int, value: float) -> CrossProducts:
+    """The cross-products of the model in which a coefficient has this value."""
+    turn = np.delete(np.eye(c.f + 1), column, axis=1)
+    turn[column, -1] = -value
+    return replace(c, pb=c.pb @ turn, cb=c.cb @ turn, bb=turn.T @ c.bb @ turn)

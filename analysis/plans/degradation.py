@@ -1,0 +1,191 @@
+"""Degradation mean opinion scores (ITU-T P.910): impairment by cell, and against the rated reference."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis.plans.prepare import Prepared
+from analysis.report.captions import caption
+from analysis.report.contents import Contents, Part
+from analysis.report.formats import Table
+from analysis.report.numbers import DASH, fixed
+from experiments import design
+from experiments.design import ClipSpec
+from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.trials.clip_rating.reference import RatingReference
+from experiments.trials.scales import RatedScale, scales_of
+
+METHODS = (
+    " DMOS is the mean over participants of their mean rating of a cell after its reference, with a 95% "
+    "interval from t with n - 1 degrees of freedom (ITU-T P.910)."
+)
+TURNED = (
+    " Answers on a reverse-keyed scale are turned first (its lowest + its highest answer - the answer), so "
+    "that high scores mean little impairment throughout."
+)
+DIFFERENTIAL = (
+    " Where the hidden reference was rated, the differential score of a participant is V(P) - V(R) + the "
+    "highest answer, V being their mean ratings of the cell (P) and of its reference (R)."
+)
+
+
+@dataclass(frozen=True)
+class CellScore:
+    """One cell on one scale: mean over participants, its interval, and the same of differential scores.
+
+    Attributes
+    ----------
+    turned : bool
+        Whether the scale is reverse-keyed, hence its answers turned: a high score is little impairment.
+    dmos, sd, ci_low, ci_high : float
+        NaN where too few participants rated the cell; sd with n - 1.
+    n : int
+        Participants.
+    differential, differential_low, differential_high : float or None
+        Mean of V(P) - V(R) + highest answer; None where the reference was not rated, or is this cell.
+    """
+
+    scale: str
+    turned: bool
+    cell: str
+    dmos: float
+    sd: float
+    n: int
+    ci_low: float
+    ci_high: float
+    differential: float | None
+    differential_low: float | None
+    differential_high: float | None
+
+
+def scores(prepared: Prepared) -> tuple[CellScore, ...]:
+    """The scores of each cell on each scale that `prepared` names, in the order of the design."""
+    return tuple(
+        score
+        for scale in scales_of(prepared.experiment)
+        if prepared.scale in (None, scale.name)
+        for score in _of_scale(prepared, scale)
+    )
+
+
+def _of_scale(prepared: Prepared, scale: RatedScale) -> list[CellScore]:
+    means = _means(prepared, scale)
+    references = _references(prepared)
+    return [_scored(scale, cell, means, references.get(cell)) for cell in references if cell in means]
+
+
+def _means(prepared: Prepared, scale: RatedScale) -> Mapping[str, "pd.Series[float]"]:
+    """Each participant's mean rating by cell, answers on a reverse-keyed scale turned."""
+    rows = prepared.rows
+    if len(scales_of(prepared.experiment)) > 1:
+        rows = rows[(rows["scale"] == scale.name).to_numpy()]
+    cells = rows[prepared.experiment.factor_names[0]].astype(str)
+    for name in prepared.experiment.factor_names[1:]:
+        cells = cells + "/" + rows[name].astype(str)
+    answers = rows["response"]
+    turned = scale.minimum + scale.maximum - answers if scale.reverse else answers
+    given = rows.assign(cell=cells, response=turned).dropna(subset=["response"])
+    return {
+        str(cell): of.groupby("participant", observed=True)["response"].mean()
+        for cell, of in given.groupby("cell")
+    }
+
+
+def _references(prepared: Prepared) -> dict[str, str | None]:
+    """The reference's cell of each cell; None where it is its own."""
+    experiment = prepared.experiment
+    declared = _reference_of(prepared)
+    cells_of: dict[str, str | None] = {}
+    for levels in design.cells(experiment):
+        clip = ClipSpec(levels, 1)
+        reference = declared.of(experiment, clip)
+        cells_of[clip.cell] = None if reference == clip else reference.cell
+    return cells_of
+
+
+def _reference_of(prepared: Prepared) -> RatingReference:
+    reference = clip_rating_of(prepared.experiment).reference
+    if reference is None:
+        raise ValueError("expected a declared reference")
+    return reference
+
+
+def _scored(
+    scale: RatedScale, cell: str, means: Mapping[str, "pd.Series[float]"], reference: str | None
+) -> CellScore:
+    mine = means[cell]
+    mean, sd, low, high = _interval(mine.to_numpy(dtype=float))
+    differential: tuple[float | None, ...] = (None, None, None)
+    if reference is not None and reference in means:
+        both = (mine - means[reference]).dropna().to_numpy(dtype=float) + scale.maximum
+        at, _, from_, to = _interval(both)
+        differential = (at, from_, to)
+    return CellScore(scale.name, scale.reverse, cell, mean, sd, len(mine), low, high, *differential)
+
+
+def _interval(values: np.ndarray[Any, Any]) -> tuple[float, float, float, float]:
+    """Mean, sd (n - 1), and the ends of the 95% interval of the mean; NaN where undefined."""
+    if len(values) < 2:
+        return (float(values.mean()) if len(values) else np.nan, np.nan, np.nan, np.nan)
+    mean, sd = float(values.mean()), float(values.std(ddof=1))
+    reach = float(stats.t.ppf(0.975, len(values) - 1)) * sd / np.sqrt(len(values))
+    return mean, sd, mean - reach, mean + reach
+
+
+def with_degradation(contents: Contents, prepared: Prepared) -> Contents:
+    """The report with a part of degradation scores, where the study shows a reference before each clip."""
+    reference = clip_rating_of(prepared.experiment).reference
+    if reference is None:
+        return contents
+    every = scores(prepared)
+    part = Part((_table(every, prepared),), _said(every), "Degradation", key="degradation")
+    named = tuple(replace(one, title=one.title or "Ratings") for one in contents.parts)
+    return replace(
+        contents,
+        parts=(*named, part),
+        methods=contents.methods + _methods(every, reference),
+        numbers={**contents.numbers, "degradation": [vars(one) for one in every]},
+    )
+
+
+def _methods(every: tuple[CellScore, ...], reference: RatingReference) -> str:
+    turned = TURNED if any(one.turned for one in every) else ""
+    return METHODS + turned + (DIFFERENTIAL if reference.rate_itself else "")
+
+
+def _table(every: tuple[CellScore, ...], prepared: Prepared) -> Table:
+    rows = tuple(
+        (
+            f"{one.scale} (turned)" if one.turned else one.scale,
+            one.cell,
+            fixed(one.dmos),
+            fixed(one.sd),
+            str(one.n),
+            f"{fixed(one.ci_low)} to {fixed(one.ci_high)}",
+            DASH if one.differential is None else fixed(one.differential),
+            _range(one.differential_low, one.differential_high),
+        )
+        for one in every
+    )
+    header = ("Scale", "Cell", "DMOS", "SD", "n", "95% CI", "Differential", "95% CI")
+    title = caption("Degradation mean opinion scores", prepared.experiment.name, prepared.synthetic)
+    return Table("degradation", title, header, rows, 2)
+
+
+def _range(low: float | None, high: float | None) -> str:
+    return DASH if low is None or high is None else f"{fixed(low)} to {fixed(high)}"
+
+
+def _said(every: tuple[CellScore, ...]) -> tuple[str, ...]:
+    told = [one for one in every if np.isfinite(one.dmos)]
+    if not told:
+        return ("No cell has a rating.",)
+    least, most = max(told, key=lambda one: one.dmos), min(told, key=lambda one: one.dmos)
+    return (
+        f"The least impaired cell is {least.cell} (DMOS {fixed(least.dmos)}, n = {least.n}), the most "
+        f"impaired {most.cell} (DMOS {fixed(most.dmos)}, n = {most.n}).",
+    )

@@ -1,0 +1,228 @@
+"""The multiverse of exclusions: the same tests with every choice among the declared rules.
+
+Source: Steegen, Tuerlinckx, Gelman & Vanpaemel (2016), doi:10.1177/1745691616658637.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.plans.exclusions import Exclusions, judged
+from analysis.plans.prepare import Prepared
+from analysis.plans.result import Analysis
+from analysis.plans.sensitivity import MAX_RATINGS
+from analysis.report.captions import caption
+from analysis.report.contents import Section
+from analysis.report.formats import Table
+from analysis.report.numbers import p_value, share
+from analysis.report.tables import effect_label
+from analysis.within.anova import AnovaResult
+from analysis.within.cell_means import CellTable
+from analysis.within.simple_effects import SIGNIFICANCE
+from experiments.definition import Experiment
+from experiments.errors import InputError
+
+MAX_RULES = 6
+"""With more rules each is left out alone, and all are: 2 to the power of their number would keep waiting."""
+
+TITLE = "Multiverse of exclusions"
+
+
+@dataclass(frozen=True)
+class Universe:
+    """One choice among the declared rules, and the tests it leads to.
+
+    Attributes
+    ----------
+    applied : tuple of bool
+        For each declared rule, whether this choice applies it.
+    n_participants, n_ratings : int
+    p_values, sizes : tuple of float
+        Greenhouse-Geisser's p and partial eta squared of each effect.
+    declared : bool
+        Whether it is the choice of the declaration: all rules.
+    """
+
+    applied: tuple[bool, ...]
+    n_participants: int
+    n_ratings: int
+    p_values: tuple[float, ...]
+    sizes: tuple[float, ...]
+
+    @property
+    def declared(self) -> bool:
+        """True for the choice that the experiment declares."""
+        return all(self.applied)
+
+
+@dataclass(frozen=True)
+class Multiverse:
+    """Every choice that could be analysed, and how many could not."""
+
+    rules: tuple[str, ...]
+    effects: tuple[tuple[str, ...], ...]
+    universes: tuple[Universe, ...]
+    n_failed: int
+
+
+class Tested(Protocol):
+    """What an analysis of prepared rows must have: who remains, and the tests."""
+
+    @property
+    def cells(self) -> CellTable:
+        """Cell means of those who remain."""
+
+    @property
+    def anova(self) -> AnovaResult:
+        """Every effect."""
+
+
+Analyse = Callable[[Prepared], Tested]
+
+
+def multiverse(prepared: Prepared, analyse: Analyse) -> Multiverse:
+    """Analyse under every choice among the declared exclusion rules.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        With the answers before exclusion.
+    analyse : callable
+        From prepared rows to their analysis; an InputError of it makes a choice count as failed.
+
+    Returns
+    -------
+    Multiverse
+        The declared choice first; then fewer and fewer rules.
+    """
+    experiment, universes, failed = prepared.experiment, list[Universe](), 0
+    effects: tuple[tuple[str, ...], ...] = ()
+    choose = _Choice(prepared, analyse)
+    for applied in _choices(len(experiment.exclusions)):
+        try:
+            anova, n_ratings = choose(applied)
+        except InputError:
+            failed += 1
+            continue
+        effects = effects or tuple(effect.factors for effect in anova.effects)
+        tests = [anova.effect(":".join(factors)) for factors in effects]
+        universes.append(
+            Universe(
+                applied,
+                anova.n_participants,
+                n_ratings,
+                tuple(test.univariate.p_gg for test in tests),
+                tuple(test.eta_sq_partial for test in tests),
+            )
+        )
+    return Multiverse(rule_names(experiment), effects, tuple(universes), failed)
+
+
+def _choices(n_rules: int) -> Iterator[tuple[bool, ...]]:
+    """All rules first; every choice of few rules, else each left out alone and none applied."""
+    if n_rules <= MAX_RULES:
+        yield from product((True, False), repeat=n_rules)
+        return
+    yield (True,) * n_rules
+    for left_out in range(n_rules):
+        yield tuple(rule != left_out for rule in range(n_rules))
+    yield (False,) * n_rules
+
+
+class _Choice:
+    """Analyses under choices of rules: a rule judges once, choices that keep the same rows share one."""
+
+    def __init__(self, prepared: Prepared, analyse: Analyse) -> None:
+        self._prepared, self._analyse = prepared, analyse
+        whole = judged(prepared.experiment, prepared.checked)
+        self._judged = replace(whole, main=whole.main.reset_index(drop=True))
+        self._known: dict[bytes, tuple[AnovaResult, int] | InputError] = {}
+
+    def __call__(self, applied: tuple[bool, ...]) -> tuple[AnovaResult, int]:
+        exclusions = self._judged.under(applied)
+        key = exclusions.rows.index.to_numpy().tobytes()
+        if key not in self._known:
+            try:
+                self._known[key] = self._of(applied, exclusions)
+            except InputError as error:
+                self._known[key] = error
+        known = self._known[key]
+        if isinstance(known, InputError):
+            raise known
+        return known
+
+    def _of(self, applied: tuple[bool, ...], exclusions: Exclusions) -> tuple[AnovaResult, int]:
+        declared = self._prepared.experiment
+        chosen = tuple(rule for rule, applies in zip(declared.exclusions, applied, strict=True) if applies)
+        experiment = declared.model_copy(update={"exclusions": chosen})
+        tested = self._analyse(
+            replace(self._prepared, experiment=experiment, exclusions=exclusions, decisions=())
+        )
+        kept = exclusions.rows["participant"].isin(list(tested.cells.participants))
+        return tested.anova, int(kept.sum())
+
+
+def rule_names(experiment: Experiment) -> tuple[str, ...]:
+    """What the declared rules are called, numbered where two are of one kind."""
+    kinds = [rule.rule for rule in experiment.exclusions]
+    return tuple(
+        kind if kinds.count(kind) == 1 else f"{kind} ({kinds[: position + 1].count(kind)})"
+        for position, kind in enumerate(kinds)
+    )
+
+
+def multiverse_section(analysis: Analysis, prepared: Prepared, analyse: Analyse) -> Section:
+    """The section of the report: how far the tests hang on the rules."""
+    if not prepared.experiment.exclusions:
+        return Section(TITLE, "The experiment declares no exclusion rule, so that there is nothing to vary.")
+    if len(prepared.checked.rows) > MAX_RATINGS:
+        said = f"{len(prepared.checked.rows)} ratings are more than {MAX_RATINGS}."
+        return Section(TITLE, f"Not computed: {said}")
+    # matplotlib takes a second to import, which commands that draw nothing need not pay
+    from analysis.report.multiverse_figure import multiverse_picture
+
+    result = multiverse(prepared, analyse)
+    choices = "every choice among" if len(result.rules) <= MAX_RULES else "leaving out one or all of"
+    text = (
+        f"The tests under {choices} the {len(result.rules)} declared exclusion rules: "
+        f"{len(result.universes)} analyses. Exclusions by hand always apply."
+    )
+    if result.n_failed:
+        text += f" {result.n_failed} further choices could not be analysed."
+    picture = multiverse_picture(analysis, result)
+    return Section(TITLE, text, (_table(analysis, result),), (picture,))
+
+
+def _table(analysis: Analysis, result: Multiverse) -> Table:
+    p = np.array([universe.p_values for universe in result.universes])
+    sizes = np.array([universe.sizes for universe in result.universes])
+    declared = next(universe for universe in result.universes if universe.declared)
+    rows = tuple(
+        (
+            effect_label(analysis, factors),
+            p_value(declared.p_values[i]),
+            _range([p_value(value) for value in _ends(p[:, i])]),
+            f"{int((p[:, i] < SIGNIFICANCE).sum())} of {len(p)}",
+            _range([share(value) for value in _ends(sizes[:, i])]),
+        )
+        for i, factors in enumerate(result.effects)
+    )
+    people = [universe.n_participants for universe in result.universes]
+    header = ("Effect", "p as declared", "p", f"p < {share(SIGNIFICANCE, 2)}", "partial η²")
+    notes = (f"N = {_range([str(min(people)), str(max(people))])}. p by Greenhouse-Geisser.",)
+    title = caption("Tests under other exclusions", analysis.name, analysis.synthetic)
+    return Table("multiverse", title, header, rows, 1, notes)
+
+
+def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Smallest and largest of the values there are; NaN where there is none."""
+    given = values[np.isfinite(values)]
+    return (float(given.min()), float(given.max())) if given.size else (np.nan, np.nan)
+
+
+def _range(ends: list[str]) -> str:
+    return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"

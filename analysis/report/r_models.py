@@ -1,0 +1,108 @@
+"""A script in R that fits the mixed and ordinal models of a report anew, and compares."""
+
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from analysis.plans.result import Analysis
+from analysis.report.r_script import SCRIPT
+from analysis.report.r_text import as_csv, r_number
+from analysis.report.templating import filled
+
+if TYPE_CHECKING:
+    from analysis.models.mixed import MixedResult
+    from analysis.models.ordinal import OrdinalResult
+
+Rows = list[list[Any]]
+
+MODEL_SCRIPTS = tuple(f"{kind}-{SCRIPT}" for kind in ("mixed", "ordinal"))
+"""How the names of these scripts end."""
+
+
+def model_files(
+    analysis: Analysis, arguments: dict[str, Any], model: "MixedResult | OrdinalResult", key: str = ""
+) -> dict[str, bytes]:
+    """The script of one model and the ratings it reads, by file name.
+
+    No file for an ordinal model with slopes of a factor of three levels or more, whose contrasts share one
+    variance here: clmm has no such model. lme4 has, by its own deviance function.
+    """
+    from analysis.models.mixed import MixedResult
+
+    is_mixed = isinstance(model, MixedResult)
+    kind = "mixed" if is_mixed else "ordinal"
+    slopes = [c.term for c in model.components if c.group == "participant" and c.term != "intercept"]
+    levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))
+    shared = any(len(levels[name]) > 2 for slope in slopes for name in slope.split(":"))
+    if shared and not is_mixed:
+        return {}
+    own = "-".join(part for part in (key, kind) if part)
+    script, data = f"{own}-{SCRIPT}", f"{own}-ratings.csv"
+    names = {name: f"f{i}" for i, name in enumerate(model.factors, start=1)}
+    coded = (", ".join(f'"{names[name]}"' for name in slope.split(":")) for slope in slopes)
+    with_df = isinstance(model, MixedResult) and not shared and not model.singular
+    text = filled(
+        "verify-models.R.j2",
+        title=" ".join(analysis.title.split()),
+        version=version("palpebra"),
+        script=script,
+        data=data,
+        factors=[{"name": names[name], "levels": len(levels[name])} for name in model.factors],
+        slopes=[f"c({slope})" for slope in coded],
+        fixed=" * ".join(names.values()),
+        mixed=is_mixed,
+        ordinal=not is_mixed,
+        df=with_df,
+        printed=as_csv(
+            _printed_mixed(model, names, with_df)
+            if isinstance(model, MixedResult)
+            else _printed_ordinal(model)
+        ).strip(),
+        floor="1e-3",
+        limit="1e-3",
+    )
+    return {script: text.encode(), data: _ratings(arguments, model.factors, levels, names).encode()}
+
+
+def _printed_mixed(model: "MixedResult", names: dict[str, str], with_df: bool) -> Rows:
+    """Criterion, F, and df where lmerTest has them: not of shared variances, nor at a bound."""
+    rows: Rows = [["mixed criterion", "REML", r_number(model.reml_criterion)]]
+    for effect in model.effects:
+        label = ":".join(sorted(names[part] for part in effect.effect.split(":")))
+        rows.append(["mixed F", label, r_number(effect.f_value)])
+        if with_df:
+            rows.append(["mixed df", label, r_number(effect.df_error)])
+    return [*rows, ["mixed residual SD", "residual", r_number(model.sigma)]]
+
+
+def _printed_ordinal(model: "OrdinalResult") -> Rows:
+    rows: Rows = [["ordinal likelihood", "log", r_number(model.log_likelihood)]]
+    for i, coefficient in enumerate(model.coefficients, start=1):
+        rows.append(["ordinal coefficient", str(i), r_number(coefficient.estimate)])
+        rows.append(["ordinal se", str(i), r_number(coefficient.se)])
+    return rows
+
+
+def _ratings(
+    arguments: dict[str, Any],
+    factors: Sequence[str],
+    levels: dict[str, tuple[str, ...]],
+    names: dict[str, str],
+) -> str:
+    """Trials with codes for people, items and levels, so that no name stands in code."""
+    from analysis.within.cell_means import natural_order
+
+    rows: pd.DataFrame = arguments["rows"]
+    items = rows.groupby(list(arguments["item"]), sort=False, observed=True, dropna=False).ngroup()
+    columns: list[list[Any]] = [
+        (pd.factorize(rows["participant"].astype(str))[0] + 1).tolist(),
+        (items + 1).tolist(),
+    ]
+    for name in factors:
+        order = {level: i for i, level in enumerate(natural_order(levels[name]), start=1)}
+        columns.append(rows[name].astype(str).map(order).tolist())
+    columns.append([r_number(value) for value in rows[arguments["rating"]]])
+    header = ["participant", "item", *(names[name] for name in factors), "rating"]
+    return as_csv([header, *zip(*columns, strict=True)])

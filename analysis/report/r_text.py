@@ -1,0 +1,20 @@
+"""Numbers and rows as R reads them."""
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+
+def r_number(value: float | None) -> str:
+    """A number as R reads it; NA where there is none."""
+    return "NA" if value is None or not np.isfinite(value) else repr(float(value))
+
+
+def as_csv(rows: Iterable[Sequence[Any]]) -> str:
+    """Rows as CSV text."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,1 @@
+"""Companions of the ANOVA that assume less: aligned ranks, permutations, trimmed means."""

@@ -1,0 +1,42 @@
+/** A clip with what it shows, and what it was converted from. */
+
+import { Anchor, Card, Text } from "@mantine/core";
+import type { Schemas } from "../api";
+import { ClipVideo } from "../studies/ClipVideo";
+import { onDemand } from "../ui/onDemand";
+import { changesOf } from "./changes";
+
+const ClosureFigure = onDemand(async () => (await import("../ui/ClosureFigure")).ClosureFigure);
+
+export function ClipCard({ study, clip }: { study: string; clip: Schemas["ClipOut"] }) {
+  return (
+    <Card withBorder padding="sm">
+      <Text size="sm" fw={600} className="wrap-anywhere" mb={6}>
+        {clip.cell}, no. {clip.exemplar}
+      </Text>
+      <ClipVideo url={clip.url} label={`${clip.cell}, no. ${clip.exemplar}`} />
+      <Text size="xs" c="dimmed" mt={6} className="wrap-anywhere">
+        {clip.profile !== "" && `${clip.profile}, `}
+        {clip.frames} frames at {Number(clip.fps.toFixed(3))} fps, {Math.round(clip.bytes / 1024)} KiB
+      </Text>
+      {clip.source != null && <Origin study={study} source={clip.source} />}
+      {clip.closure.length > 0 && <ClosureFigure closure={clip.closure} label="Closure over time" />}
+    </Card>
+  );
+}
+
+function Origin({ study, source }: { study: string; source: Schemas["SourceVideo"] }) {
+  const address = `/api/admin/studies/${study}/originals/${source.sha256}`;
+  return (
+    <Text size="xs" c="dimmed" className="wrap-anywhere">
+      Converted from{" "}
+      <Anchor href={address} download size="xs" underline="always">
+        {source.file}
+      </Anchor>
+      : {changesOf(source)}.{" "}
+      <Anchor href={`${address}/frame-map.csv`} download size="xs" underline="always">
+        Frame map
+      </Anchor>
+    </Text>
+  );
+}

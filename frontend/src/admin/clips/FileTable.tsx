@@ -1,0 +1,93 @@
+/** Every file of an upload and what became of it; of thousands only those in sight are drawn. */
+
+import { Badge, Text } from "@mantine/core";
+import { useVirtualizer } from "@tanstack/react-virtual";
+import { useRef } from "react";
+import type { Schemas } from "../api";
+import { changesOf } from "./changes";
+
+const ROW_PX = 56;
+const MAX_ROWS = 6;
+
+interface Props {
+  files: Schemas["UploadedFile"][];
+  onReplace: (name: string, file: File) => void;
+}
+
+export function FileTable({ files, onReplace }: Props) {
+  const frame = useRef<HTMLDivElement>(null);
+  // eslint-disable-next-line react-hooks/incompatible-library -- what it returns is used here alone
+  const rows = useVirtualizer({
+    count: files.length,
+    getScrollElement: () => frame.current,
+    estimateSize: () => ROW_PX,
+    overscan: 4,
+    initialRect: { width: 0, height: ROW_PX * MAX_ROWS },
+  });
+  return (
+    <div
+      ref={frame}
+      className="long-list"
+      style={{ maxBlockSize: ROW_PX * MAX_ROWS }}
+      tabIndex={0}
+      role="region"
+      aria-label="What became of each file"
+    >
+      <ul style={{ blockSize: rows.getTotalSize() }}>
+        {rows.getVirtualItems().map(({ key, index, start }) => {
+          const file = files[index];
+          return file === undefined ? null : (
+            <li
+              key={key}
+              ref={rows.measureElement}
+              data-index={index}
+              aria-setsize={files.length}
+              aria-posinset={index + 1}
+              style={{ transform: `translateY(${String(start)}px)` }}
+            >
+              <OneFile file={file} onReplace={onReplace} />
+            </li>
+          );
+        })}
+      </ul>
+    </div>
+  );
+}
+
+function OneFile({ file, onReplace }: { file: Schemas["UploadedFile"]; onReplace: Props["onReplace"] }) {
+  const { state, source } = file;
+  const [colour, word] = state === "refused" ? ["red", "refused"] : source != null ? ["blue", "converted"] : ["gray", "as it came"];
+  return (
+    <>
+      <Text size="sm" className="wrap-anywhere">
+        <Badge variant="default" color={colour} size="sm" mr="xs">
+          {word}
+        </Badge>
+        {file.name}
+        {state === "refused" && (
+          <label>
+            {" "}
+            Replace by:{" "}
+            <input
+              type="file"
+              accept="video/*,.mkv,.mxf,.y4m"
+              aria-label={`Replace ${file.name} by`}
+              onChange={({ target }) => {
+                if (target.files?.[0]) onReplace(file.name, target.files[0]);
+                // The same file, corrected, is a change again.
+                target.value = "";
+              }}
+            />
+          </label>
+        )}
+      </Text>
+      <Text size="xs" c={state === "refused" ? "var(--mantine-color-error)" : "dimmed"} className="wrap-anywhere">
+        {file.problem ?? `${sizeOf(file)}${source == null ? "" : `; ${changesOf(source)}`}`}
+      </Text>
+    </>
+  );
+}
+
+function sizeOf({ frames, fps, width_px, height_px }: Schemas["UploadedFile"]): string {
+  return frames == null || fps == null ? "" : `${frames} frames at ${Number(fps.toFixed(3))} fps, ${width_px} x ${height_px}`;
+}

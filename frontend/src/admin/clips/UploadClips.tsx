@@ -1,0 +1,163 @@
+/** Clips of one's own: chosen or dropped, sent, looked into; what becomes of each. */
+
+import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";
+import { useState } from "react";
+import type { Schemas } from "../api";
+import { onDemand } from "../ui/onDemand";
+import type { Upload } from "./useUpload";
+
+const RATES = ["24", "25", "30", "50", "60"];
+const ENDINGS = ".mp4,.m4v,.mov,.webm,.mkv,.avi,.mpg,.mpeg,.m2v,.ts,.mts,.m2ts,.wmv,.flv,.gif,.apng,.ogv,.3gp,.mxf,.y4m";
+const FileTable = onDemand(async () => (await import("./FileTable")).FileTable);
+
+interface Props {
+  upload: Upload;
+  label?: string;
+  description?: string;
+  accept?: string;
+}
+
+export function UploadClips({ upload, label = "Clips", description, accept = `.zip,${ENDINGS},.csv` }: Props) {
+  const [over, setOver] = useState(false);
+  return (
+    <Stack gap="sm">
+      <div
+        className={over ? "drop-here over" : "drop-here"}
+        onDragOver={(event) => {
+          event.preventDefault();
+          setOver(true);
+        }}
+        onDragLeave={() => setOver(false)}
+        onDrop={(event) => {
+          event.preventDefault();
+          setOver(false);
+          if (event.dataTransfer.files.length > 0) upload.send([...event.dataTransfer.files]);
+        }}
+      >
+        <FileInput
+          label={label}
+          description={
+            description ??
+            "Videos of any usual format, or a zip of them; a CSV of levels may be among them. Sound is left out. Choose them here, or drop them on this field."
+          }
+          placeholder="Choose files"
+          accept={accept}
+          multiple
+          value={[]}
+          onChange={(files) => files.length > 0 && upload.send(files)}
+        />
+      </div>
+      <Select
+        label="Frame rate"
+        description="A video of variable rate gets the rate of most of its frames; frames are repeated or left out, never blended."
+        data={[{ value: "own", label: "Each clip's own" }, ...RATES.map((rate) => ({ value: rate, label: `${rate} frames per second` }))]}
+        value={upload.fps === null ? "own" : String(upload.fps)}
+        allowDeselect={false}
+        onChange={(value) => upload.askFps(value === null || value === "own" ? null : Number(value))}
+        maw={500}
+      />
+      <UploadProgress upload={upload} />
+      {upload.received !== null && <Received upload={upload} received={upload.received} />}
+    </Stack>
+  );
+}
+
+function UploadProgress({ upload: { sending, broken, progress, goOn } }: { upload: Upload }) {
+  if (broken !== null) {
+    return (
+      <Alert color="red" variant="light" title="The upload stopped" role="alert">
+        <Text size="sm">{broken.message} What has come is kept.</Text>
+        <Button mt="xs" size="xs" variant="default" onClick={goOn}>
+          Go on
+        </Button>
+      </Alert>
+    );
+  }
+  const looked = progress === null ? 0 : progress.files - progress.waiting;
+  const isLooking = progress !== null && progress.waiting > 0;
+  return (
+    <div role="status" aria-label="Upload">
+      {sending !== null && (
+        <Bar words={`Sending: ${count(sending.sent)} of ${count(sending.of)} files`} share={sending.sent / sending.of} name="Files sent" />
+      )}
+      {isLooking && (
+        <Bar
+          words={`Looking into clips and converting: ${count(looked)} of ${count(progress.files)}`}
+          share={looked / progress.files}
+          name="Clips looked into"
+        />
+      )}
+    </div>
+  );
+}
+
+const count = (number: number) => number.toLocaleString("en");
+
+function Bar({ words, share, name }: { words: string; share: number; name: string }) {
+  return (
+    <Stack gap={4} mb="xs">
+      <Text size="sm" className="number">
+        {words}
+      </Text>
+      <Progress value={100 * share} aria-label={name} />
+    </Stack>
+  );
+}
+
+function Received({ upload, received }: { upload: Upload; received: Schemas["UploadOut"] }) {
+  const { files } = received;
+  const refused = files.filter(({ state }) => state === "refused").length;
+  const changed = files.filter(({ source }) => source != null).length;
+  const twice = files.find(({ same_as }) => same_as != null);
+  return (
+    <Stack gap="xs">
+      <Group justify="space-between">
+        <Text>
+          {count(files.length)} clips received
+          {!received.has_manifest && `: ${summary(files.length - refused - changed, changed, refused)}`}.
+        </Text>
+        <Button size="compact-sm" variant="default" onClick={upload.forget}>
+          Begin anew
+        </Button>
+      </Group>
+      {refused > 0 && (
+        <Alert color="red" variant="light" title={`${count(refused)} of the files cannot be used`}>
+          <Text size="sm">Correct them as the table says, and choose the corrected file beside each: the others stay.</Text>
+        </Alert>
+      )}
+      {upload.isReplacing && (
+        <Text size="sm" role="status">
+          Sending the file…
+        </Text>
+      )}
+      {upload.notReplaced !== null && (
+        <Alert color="red" variant="light" title="The file was not replaced" role="alert">
+          {upload.notReplaced.message}
+        </Alert>
+      )}
+      {twice !== undefined && (
+        <Alert color="yellow">
+          {twice.name} holds the same bytes as {twice.same_as}. If they stand for different levels, one of them is the wrong file.
+        </Alert>
+      )}
+      {!received.has_manifest && files.length > 0 && <FileTable files={inOrder(files)} onReplace={upload.replace} />}
+    </Stack>
+  );
+}
+
+const ORDER = { refused: 0, waiting: 1, ready: 2 };
+
+/** What needs a hand first, then what was converted. */
+function inOrder(files: Schemas["UploadedFile"][]): Schemas["UploadedFile"][] {
+  const rank = ({ state, source }: Schemas["UploadedFile"]) => ORDER[state] + (source == null ? 0.5 : 0);
+  return [...files].sort((a, b) => rank(a) - rank(b));
+}
+
+function summary(shown: number, changed: number, refused: number): string {
+  const parts = [
+    shown > 0 && `${count(shown)} unchanged`,
+    changed > 0 && `${count(changed)} converted`,
+    refused > 0 && `${count(refused)} that cannot be used`,
+  ];
+  return parts.filter(Boolean).join(", ");
+}

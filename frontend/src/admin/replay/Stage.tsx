@@ -1,0 +1,94 @@
+/** The clip as it stood on the participant's screen, alone or at its place in the window. */
+
+import { Box, SegmentedControl, Stack, Text } from "@mantine/core";
+import { useEffect, useRef, useState } from "react";
+import type { Schemas } from "../api";
+import { fixed } from "../ui/format";
+import { type Arranged, topOf, windowOf } from "./arranging";
+import { paint } from "./painting";
+import type { Pictures } from "./pictures";
+import type { Play, Shown } from "./shown";
+
+interface Props {
+  arranged: Arranged;
+  display: Schemas["Display"];
+  pictures: ReadonlyMap<string, Pictures>;
+  play: Play;
+  shown: Shown;
+  at_ms: number;
+}
+
+type Around = "clip" | "window";
+
+export function Stage({ arranged, display, pictures, play, shown, at_ms }: Props) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const [around, setAround] = useState<Around>("clip");
+  const window_px = windowOf(play);
+  useEffect(() => {
+    let isCurrent = true;
+    const target = canvas.current;
+    if (target === null) return;
+    void paint({ canvas: target, arranged, pictures, display }, shown, () => isCurrent).then(() => {
+      if (isCurrent) target.dataset["paintedMs"] = String(at_ms);
+    });
+    return () => {
+      isCurrent = false;
+    };
+  });
+  const { width, height } = arranged.shown;
+  const inWindow = around === "window" && window_px !== null;
+  const frame = inWindow ? window_px : { width, height };
+  const top = inWindow ? topOf(frame.height, height) : 0;
+  return (
+    <Stack gap="xs">
+      <Box
+        className="replay-window"
+        style={{ background: display.background, maxInlineSize: frame.width, aspectRatio: frame.width / frame.height }}
+      >
+        <canvas
+          ref={canvas}
+          width={arranged.canvas.width}
+          height={arranged.canvas.height}
+          role="img"
+          aria-label={labelOf(shown)}
+          style={{
+            inlineSize: `${(100 * width) / frame.width}%`,
+            insetInlineStart: `${(50 * (frame.width - width)) / frame.width}%`,
+            insetBlockStart: `${(100 * top) / frame.height}%`,
+          }}
+        />
+      </Box>
+      {window_px !== null && (
+        <SegmentedControl
+          size="xs"
+          aria-label="What is around the clip"
+          value={around}
+          onChange={(value) => setAround(value)}
+          data={[
+            { value: "clip", label: "The clip alone" },
+            { value: "window", label: "In their window" },
+          ]}
+          style={{ alignSelf: "flex-start" }}
+        />
+      )}
+      <Text size="sm" c="dimmed">
+        {sizeWords(arranged, play)}
+      </Text>
+    </Stack>
+  );
+}
+
+function labelOf({ frames }: Shown): string {
+  const stood = frames.map(({ lane, stand }) => `${lane.role === "shown" ? "" : `${lane.role}: `}frame ${stand.index}`);
+  return stood.length > 0 ? `On their screen: ${stood.join(", ")}` : "On their screen: the surround, no clip";
+}
+
+/** How large the clip was there; in mm where the screen was measured. */
+function sizeWords({ shown }: Arranged, play: Play): string {
+  const { width, height } = shown;
+  const window_px = windowOf(play);
+  const mm = play.px_per_mm === null ? "" : `, ${fixed(width / play.px_per_mm, 0)} × ${fixed(height / play.px_per_mm, 0)} mm`;
+  const around = window_px === null ? "" : `, in a window of ${window_px.width} × ${window_px.height}`;
+  const refresh = play.refresh_rate_hz === null ? "" : `, on a screen of ${fixed(play.refresh_rate_hz, 1)} Hz`;
+  return `There ${fixed(width, 0)} × ${fixed(height, 0)} CSS px${mm}${around}${refresh}.`;
+}

@@ -1,0 +1,106 @@
+/** The time line of a play: a row for each clip with every frame as long as it stood, the answer, and events. */
+
+import { Group, Text } from "@mantine/core";
+import { memo, type PointerEvent } from "react";
+import type { Folding } from "./folding";
+import type { Lane, PlayedBack, Stand } from "./shown";
+
+export interface Mark {
+  at_ms: number;
+  label: string;
+  colour: string;
+}
+
+interface Props {
+  played: PlayedBack;
+  time: Folding;
+  marks: readonly Mark[];
+  /** The slider of a continuous rating: (time in ms, 0 to 1). */
+  trace: readonly (readonly [number, number])[];
+  at_ms: number;
+  onSeek: (at_ms: number) => void;
+}
+
+const WIDTH = 1_000;
+const HEIGHT = 26;
+const TICKS = 5;
+
+export function Timeline({ played, time, marks, trace, at_ms, onSeek }: Props) {
+  const seek = (event: PointerEvent<HTMLDivElement>): void => {
+    if (event.type === "pointermove" && event.buttons !== 1) return;
+    const { left, width } = event.currentTarget.getBoundingClientRect();
+    onSeek(time.unfold((time.length_ms * (event.clientX - left)) / Math.max(1, width)));
+  };
+  return (
+    <div className="replay-line" onPointerDown={seek} onPointerMove={seek}>
+      <Rows played={played} time={time} marks={marks} trace={trace} />
+      <div className="replay-head" style={{ insetInlineStart: `${share(time, at_ms)}%` }} />
+      <Group justify="space-between" gap={0} wrap="nowrap" className="number" aria-hidden>
+        {Array.from({ length: TICKS }, (_, tick) => (
+          <Text key={tick} size="xs" c="dimmed">
+            {seconds(time.unfold((time.length_ms * tick) / (TICKS - 1)))}
+          </Text>
+        ))}
+      </Group>
+    </div>
+  );
+}
+
+export const seconds = (ms: number): string => `${(ms / 1000).toFixed(2)} s`;
+const share = (time: Folding, at_ms: number): number => (100 * time.fold(at_ms)) / Math.max(1, time.length_ms);
+
+const Rows = memo(function Rows({ played, time, marks, trace }: Omit<Props, "at_ms" | "onSeek">) {
+  const x = (at_ms: number): number => (WIDTH * share(time, at_ms)) / 100;
+  const roles = [...new Set(played.scenes.flatMap(({ lanes }) => lanes.map(({ role }) => role)))];
+  return (
+    <>
+      {roles.map((role) => (
+        <LaneRow key={role} role={role} x={x} lanes={played.scenes.flatMap(({ lanes }) => lanes.filter((lane) => lane.role === role))} />
+      ))}
+      {trace.length > 0 && (
+        <Row label="slider">
+          <polyline
+            className="replay-trace"
+            points={trace.map(([at_ms, value]) => `${x(at_ms)},${HEIGHT - 2 - value * (HEIGHT - 4)}`).join(" ")}
+          />
+        </Row>
+      )}
+      <Row label="answer and events">
+        {marks.map(({ at_ms, label, colour }, index) => (
+          <line key={index} x1={x(at_ms)} x2={x(at_ms)} y1={0} y2={HEIGHT} stroke={colour} className="replay-mark">
+            <title>{label}</title>
+          </line>
+        ))}
+      </Row>
+    </>
+  );
+});
+
+function Row({ label, children }: { label: string; children: React.ReactNode }) {
+  return (
+    <>
+      <Text size="xs" c="dimmed">
+        {label}
+      </Text>
+      <svg viewBox={`0 0 ${WIDTH} ${HEIGHT}`} preserveAspectRatio="none" className="replay-row" role="img" aria-label={label}>
+        {children}
+      </svg>
+    </>
+  );
+}
+
+function LaneRow({ role, lanes, x }: { role: string; lanes: readonly Lane[]; x: (at_ms: number) => number }) {
+  const stands = lanes.flatMap((lane) => lane.stands);
+  const held = lanes.flatMap((lane) => lane.held);
+  const skipped = lanes.flatMap((lane) => lane.stands.filter(({ index }) => lane.missing.some(([, last]) => last === index - 1)));
+  const path = (some: readonly Stand[]): string =>
+    some.map(({ from_ms, to_ms }) => `M${x(from_ms)} 2H${x(to_ms)}V${HEIGHT - 2}H${x(from_ms)}Z`).join("");
+  return (
+    <Row label={`${role === "shown" ? "clip" : role}: ${stands.length} frames stood, ${held.length} too long`}>
+      <path d={path(stands.filter((_, row) => row % 2 === 0))} className="replay-even" />
+      <path d={path(stands.filter((_, row) => row % 2 === 1))} className="replay-odd" />
+      <path d={path(held)} className="replay-held" />
+      <path d={skipped.map(({ from_ms }) => `M${x(from_ms)} 0V${HEIGHT}`).join("")} className="replay-skip" />
+    </Row>
+  );
+}

@@ -1,0 +1,161 @@
+/**
+ * What stood on the screen when, from the stored logs: every frame from the moment it was drawn to the next one's.
+ * Times are ms since the start key of a play's first view, by the participant's clock.
+ */
+import type { Schemas } from "../api";
+
+export type Play = Schemas["ReplayedPlay"];
+export type Clip = Schemas["ReplayedClip"];
+export type View = Schemas["ReplayedView"];
+
+/** Frame `index` stood from `from_ms` until `to_ms`. */
+export interface Stand {
+  index: number;
+  from_ms: number;
+  to_ms: number;
+}
+/** One clip of one view. */
+export interface Lane {
+  role: string;
+  sha256: string;
+  stands: Stand[];
+  /** Frames of the clip that its log does not have, in ranges. */
+  missing: [first: number, last: number][];
+  /** Stands of more than a frame's period and one refresh. */
+  held: Stand[];
+}
+export interface Scene {
+  view: View;
+  start_ms: number;
+  end_ms: number;
+  lanes: Lane[];
+}
+export interface PlayedBack {
+  scenes: Scene[];
+  /** When the answer came; null without one, or where no page saw both clip and answer. */
+  answered_ms: number | null;
+  end_ms: number;
+}
+
+/** Views without a clock of their own stand so far apart. */
+const UNKNOWN_GAP_MS = 500;
+const ASSUMED_REFRESH_MS = 1000 / 60;
+/** Scheduling jitter of a time stamp that is no lateness. */
+const JITTER_MS = 2;
+
+export function playedBack(play: Play, clips: readonly Clip[]): PlayedBack {
+  const scenes: Scene[] = [];
+  const origin = momentOf(play.views[0]?.started_at_client);
+  for (const view of play.views) {
+    const after = scenes.at(-1)?.end_ms;
+    const began = momentOf(view.started_at_client);
+    const told = began === null || origin === null ? null : began - origin;
+    const earliest = after === undefined ? 0 : after;
+    const start_ms = told === null ? (after === undefined ? 0 : after + UNKNOWN_GAP_MS) : Math.max(told, earliest);
+    scenes.push(sceneOf(view, start_ms, clips, refreshOf(play)));
+  }
+  const answered_ms = answeredAt(play, scenes.at(-1), origin);
+  const ends = scenes.map(({ end_ms }) => end_ms);
+  return { scenes, answered_ms, end_ms: Math.max(0, ...ends, answered_ms ?? 0) };
+}
+
+const momentOf = (text: string | null | undefined): number | null => (text ? Date.parse(text) : null);
+const refreshOf = ({ refresh_rate_hz }: Play): number => (refresh_rate_hz ? 1000 / refresh_rate_hz : ASSUMED_REFRESH_MS);
+
+function sceneOf(view: View, start_ms: number, clips: readonly Clip[], refresh_ms: number): Scene {
+  const lanes = view.clips.map(({ role, clip_sha256, drawn }): Lane => {
+    const clip = clips.find((one) => one.clip_sha256 === clip_sha256);
+    const showing = view.showings?.find(({ roles }) => roles.some((one) => one === role));
+    const period_ms = 1000 / (showing?.fps ?? clip?.fps ?? 30);
+    const stands = standsOf(drawn, start_ms, showing?.ended_ms ?? null, period_ms);
+    return {
+      role,
+      sha256: clip_sha256,
+      stands,
+      missing: missingOf(stands, clip?.frames ?? 0),
+      held: stands.filter(({ from_ms, to_ms }) => to_ms - from_ms > period_ms + refresh_ms + JITTER_MS),
+    };
+  });
+  const ends = [
+    ...lanes.flatMap(({ stands }) => stands.at(-1)?.to_ms ?? []),
+    ...(view.showings ?? []).map((one) => start_ms + one.ended_ms),
+  ];
+  return { view, start_ms, end_ms: Math.max(start_ms, ...ends), lanes };
+}
+
+/** Entries of one frame in a row are one stand; the last lasts until the clip's end, or for a period where that is not known. */
+function standsOf(drawn: readonly (readonly [number, number])[], start_ms: number, ended_ms: number | null, period_ms: number): Stand[] {
+  const firsts = drawn.filter(([index], row) => row === 0 || drawn[row - 1]?.[0] !== index);
+  return firsts.map(([index, ms], row) => {
+    const next = firsts[row + 1]?.[1] ?? Math.max(ms, ended_ms ?? ms + period_ms);
+    return { index, from_ms: start_ms + ms, to_ms: start_ms + next };
+  });
+}
+
+function missingOf(stands: readonly Stand[], frames: number): [number, number][] {
+  const drawn = new Set(stands.map(({ index }) => index));
+  const ranges: [number, number][] = [];
+  for (let index = 0; index < frames; index += 1) {
+    if (drawn.has(index)) continue;
+    const last = ranges.at(-1);
+    if (last && last[1] === index - 1) last[1] = index;
+    else ranges.push([index, index]);
+  }
+  return ranges;
+}
+
+/** Response times count from what the last view drew; without them the clock's own moment counts. */
+function answeredAt(play: Play, last: Scene | undefined, origin: number | null): number | null {
+  const starts = last?.lanes.flatMap(({ stands }) => stands[0] ?? []) ?? [];
+  // In turn, the answer's times are those of the clip shown last.
+  const first = starts.toSorted((one, other) => other.from_ms - one.from_ms)[0];
+  if (first && play.rt_from_first_frame !== null) return first.from_ms + play.rt_from_first_frame;
+  const answered = momentOf(play.answered_at_client);
+  return answered === null || origin === null ? null : Math.max(0, answered - origin);
+}
+
+/** The frame that stood at a moment; null where the lane showed nothing. */
+function standAt({ stands }: Lane, at_ms: number): Stand | null {
+  let low = 0;
+  let high = stands.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if ((stands[middle]?.from_ms ?? Infinity) <= at_ms) low = middle + 1;
+    else high = middle;
+  }
+  const stand = stands[low - 1];
+  return stand && at_ms < stand.to_ms ? stand : null;
+}
+
+export interface Shown {
+  scene: Scene | null;
+  /** The clips that stood on the canvas. */
+  frames: { lane: Lane; stand: Stand }[];
+}
+
+export function shownAt({ scenes }: PlayedBack, at_ms: number): Shown {
+  const scene = scenes.findLast(({ start_ms, end_ms }) => start_ms <= at_ms && at_ms < end_ms) ?? null;
+  const frames = (scene?.lanes ?? []).flatMap((lane) => {
+    const stand = standAt(lane, at_ms);
+    return stand ? [{ lane, stand }] : [];
+  });
+  return { scene, frames };
+}
+
+/** The moments at which the picture changed, ascending: where arrow keys stop. */
+export function changesOf({ scenes }: PlayedBack): number[] {
+  const moments = scenes.flatMap(({ start_ms, end_ms, lanes }) => [
+    start_ms,
+    ...lanes.flatMap(({ stands }) => stands.flatMap(({ from_ms, to_ms }) => [from_ms, to_ms])),
+    end_ms,
+  ]);
+  return [...new Set(moments)].sort((one, other) => one - other);
+}
+
+export function nextChange(changes: readonly number[], at_ms: number): number {
+  return changes.find((moment) => moment > at_ms) ?? at_ms;
+}
+
+export function changeBefore(changes: readonly number[], at_ms: number): number {
+  return changes.findLast((moment) => moment < at_ms) ?? at_ms;
+}

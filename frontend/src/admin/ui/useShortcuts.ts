@@ -1,0 +1,35 @@
+/** Keys of a page. They rest while a person types into a field, Space and Enter on a button too. */
+
+import { useEffect, useEffectEvent } from "react";
+
+export type Shortcuts = Readonly<Record<string, (event: KeyboardEvent) => void>>;
+
+/** Name of a pressed key: "n", "arrowleft", "ctrl+z", "ctrl+shift+z"; Shift alone is told by the event. */
+function nameOf(event: KeyboardEvent): string {
+  const key = event.key.toLowerCase();
+  if (!event.ctrlKey && !event.metaKey) return key;
+  return `ctrl+${event.shiftKey && !key.startsWith("arrow") ? "shift+" : ""}${key}`;
+}
+
+const TYPED_INTO = "input, textarea, select, [contenteditable], [role=dialog]";
+const PRESSED = "button, a, [role=button], summary";
+
+/** True where a key belongs to what has the focus: a field's own text, and Space and Enter on what they press. */
+export function isOwnKey(key: string, target: EventTarget | null): boolean {
+  const presses = key === " " || key === "Enter";
+  return target instanceof Element && target.closest(presses ? `${TYPED_INTO}, ${PRESSED}` : TYPED_INTO) !== null;
+}
+
+export function useShortcuts(shortcuts: Shortcuts): void {
+  const pressed = useEffectEvent((event: KeyboardEvent): void => {
+    const action = shortcuts[nameOf(event)];
+    if (action === undefined || event.defaultPrevented || event.altKey || isOwnKey(event.key, event.target)) return;
+    event.preventDefault();
+    action(event);
+  });
+  useEffect(() => {
+    const press = (event: KeyboardEvent): void => pressed(event);
+    window.addEventListener("keydown", press);
+    return () => window.removeEventListener("keydown", press);
+  }, []);
+}

@@ -1,0 +1,29 @@
+"""Capsules built on request."""
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class NewCapsule(BaseModel):
+    """What a capsule is to hold."""
+
+    model_config = ConfigDict(extra="forbid")
+    origin: Literal["participant", "pilot", "simulated"] = "participant"
+    clips: bool = Field(default=True, description="Put the clips in; their hashes are in it always.")
+    sensitivity: bool = Field(default=True, description="With the models of the report that take long.")
+
+
+class CapsuleOut(BaseModel):
+    """A capsule that waits, is made, is done or has failed (then `message` says why)."""
+
+    id: str
+    status: Literal["queued", "running", "done", "failed", "cancelled"]
+    progress: float
+    message: str
+    origin: str
+    clips: bool
+    created_at: datetime
+    bytes: int | None = Field(description="Length of the zip; null until it is there.")
+    sha256: str | None = Field(description="What `analysis verify` prints of it.")

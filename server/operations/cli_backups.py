@@ -1,0 +1,272 @@
+"""`server backup`, `server backup-key`, `server restore` and `server drill`."""
+
+import os
+import signal
+import sys
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pyrage import x25519
+
+from experiments.errors import InputError
+from server.cli_common import migrated_services, out
+from server.clock import now
+from server.context import open_services
+from server.operations import backup as backups
+from server.operations import drill as drills
+from server.operations import restore as restoring
+from server.operations.backup_stores import SCHEME, backup_store
+from server.operations.drill import identity_of
+from server.operations.encryption import ENDING, identity_in, make_identity, recipient_of
+from server.operations.off_host import KeptBackup, back_up_to, brought_here, ending_of
+from server.operations.retention import superfluous
+from server.operations.watched_backups import newest_backup
+from server.settings import Settings
+
+LOWEST_PRIORITY = 19
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the commands that make backups and bring them back."""
+    parent.command("backup")(backup)
+    parent.command("backup-key")(backup_key)
+    parent.command("restore")(restore)
+    parent.command("drill")(drill)
+
+
+def backup(
+    file: Annotated[
+        Path | None, typer.Argument(help="The file to write; palpebra-DATE.tar where not given.")
+    ] = None,
+    without_clips: Annotated[
+        bool,
+        typer.Option(
+            "--without-clips", help="Leave the clips out, where their store is backed up by itself."
+        ),
+    ] = False,
+    keep: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            help="Keep, of the newest DAYS days with a backup, the last one each (all of the newest day); "
+            "remove earlier palpebra-DATE.tar of that folder. 0: remove none.",
+            metavar="DAYS",
+        ),
+    ] = 0,
+    keys: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where to write the key file; PALPEBRA_BACKUP_KEYS, or palpebra-keys.json beside the "
+            "backup, if not given."
+        ),
+    ] = None,
+    to: Annotated[
+        str,
+        typer.Option(
+            help="Encrypt, and write to this folder or s3://BUCKET/PREFIX instead.", metavar="ADDRESS"
+        ),
+    ] = "",
+    recipient: Annotated[
+        str,
+        typer.Option(help="Public key to encrypt for; PALPEBRA_BACKUP_RECIPIENT where not given."),
+    ] = "",
+) -> None:
+    """Write database, clips and secret key of this moment into one file, while the server goes on.
+
+    The file holds everybody's answers and the secret key: keep it where only you can read it (mode 600), or
+    encrypt it for another host by --to. The keys of recruiters' ids are in palpebra-keys.json, which each
+    backup replaces: keep one copy of it, the newest, so that who is erased is erased from older backups too.
+
+    Examples:
+
+      server backup backups/palpebra-$(date -u +%FT%H%M%S).tar --keep 14
+
+      server backup-key /media/safe/backups.key
+
+      server backup --to s3://lab-backups/palpebra --recipient age1... --keep 14
+    """
+    if to and (file is not None or keys is not None):
+        raise InputError("expected either a FILE (and --keys) or --to, where the key file goes along")
+    name = f"palpebra-{now():%Y-%m-%dT%H%M%S}.tar"
+    if to:
+        _back_up_to(to, recipient, name, with_clips=not without_clips, keep=keep)
+        return
+    path = file or Path(name)
+    with migrated_services() as services:
+        described = backups.back_up(
+            services, path, with_clips=not without_clips, keys=keys or services.settings.backup_keys
+        )
+    out.print(f"{path}: {_contents(described)}, {path.stat().st_size / 1e6:.1f} MB")
+    for old in superfluous(path.parent.glob("palpebra-*.tar"), keep) if keep else ():
+        old.unlink()
+        out.print(f"removed {old}")
+
+
+def _contents(described: backups.Description) -> str:
+    rows = sum(table.rows for table in described.tables.values())
+    return f"{rows} rows, {len(described.clips)} clips"
+
+
+def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: int) -> None:
+    settings = Settings()
+    public = recipient or settings.backup_recipient
+    if not public:
+        raise InputError(
+            "expected the public key to encrypt for (--recipient or PALPEBRA_BACKUP_RECIPIENT); "
+            "make one by: server backup-key FILE"
+        )
+    key = recipient_of(public)
+    store = backup_store(to, settings)
+    with migrated_services(settings) as services:
+        kept_as, described = back_up_to(services, store, name, key, with_clips=with_clips)
+        ending = ending_of(settings.key)
+    out.print(f"{store.address}/{kept_as}: {_contents(described)}, encrypted")
+    ours = [Path(entry.name) for entry in store.entries() if entry.name.endswith(ending)]
+    for old in superfluous(ours, keep) if keep else ():
+        store.remove(old.name)
+        out.print(f"removed {old.name}")
+
+
+def backup_key(
+    file: Annotated[Path, typer.Argument(help="Where to write the private key.", show_default=False)],
+) -> None:
+    """Make a pair of keys for encrypted backups, and print the public one.
+
+    Set PALPEBRA_BACKUP_RECIPIENT to the public key. Keep the private key off the server, in two safe places:
+    without it no backup can be read. It is a key of age (age-encryption.org); `age -d -i FILE` reads backups.
+    Example: server backup-key /media/safe/backups.key
+    """
+    public = make_identity(file)
+    out.print(public)
+
+
+File = Annotated[
+    str,
+    typer.Argument(help="A file of `server backup`, or s3://BUCKET/PREFIX/NAME.", show_default=False),
+]
+IdentityFile = Annotated[
+    Path | None,
+    typer.Option("--identity", help="File of the private key; PALPEBRA_BACKUP_IDENTITY if not given."),
+]
+KeyFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--keys",
+        help="The key file; PALPEBRA_BACKUP_KEYS (of a backup that is not encrypted), or palpebra-keys.json "
+        "beside the backup, if not given.",
+    ),
+]
+
+
+def restore(
+    file: File,
+    keys: KeyFile = None,
+    identity: IdentityFile = None,
+    stale_keys: Annotated[
+        bool,
+        typer.Option(
+            "--stale-keys",
+            help="Take a key file that is older than the backup: recruiters' ids of later visits are lost.",
+        ),
+    ] = False,
+) -> None:
+    """Bring a backup back into an empty database (SQLite or PostgreSQL) and clip store.
+
+    The database of the settings must be empty; stop the server first. Counts and hashes are compared.
+
+    Examples:
+
+      DATABASE_URL=postgresql://me@host/new server restore backups/monday.tar
+
+      server restore s3://lab-backups/palpebra/palpebra-2026-01-31T030000.tar.age --identity backups.key
+    """
+    settings = Settings()
+    services = open_services(settings)
+    try:
+        with ExitStack() as held:
+            path = _in_the_open(file, settings, _private_key(settings, identity), held)
+            plain = not file.endswith(ENDING)
+            keys = keys or (settings.backup_keys if plain else None)
+            described = restoring.restore(services, path, out.print, keys=keys, stale_keys=stale_keys)
+    finally:
+        services.database.close()
+    out.print(f"restored what was backed up on {described.created_at}")
+
+
+def _in_the_open(file: str, settings: Settings, identity: x25519.Identity | None, held: ExitStack) -> Path:
+    """The backup as a file of this machine; what was decrypted is removed when `held` ends."""
+    if not file.startswith(SCHEME) and not file.endswith(ENDING):
+        return Path(file)
+    folder, _, name = file.rpartition("/")
+    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    beside = held.enter_context(tempfile.TemporaryDirectory(prefix=".restore-", dir=settings.data_folder))
+    kept = KeptBackup(backup_store(folder or ".", settings), name)
+    return held.enter_context(brought_here(kept, Path(beside), identity))
+
+
+def _private_key(settings: Settings, identity: Path | None) -> x25519.Identity | None:
+    return identity_in(identity) if identity is not None else identity_of(settings)
+
+
+def drill(
+    file: Annotated[
+        str,
+        typer.Argument(help="A backup, a folder or s3://BUCKET/PREFIX; PALPEBRA_BACKUP_FOLDER if not given."),
+    ] = "",
+    when_due: Annotated[
+        bool, typer.Option("--when-due", help="Only where the last drill is a week old (a day if it failed).")
+    ] = False,
+    identity: IdentityFile = None,
+    keys: KeyFile = None,
+) -> None:
+    """Bring the newest backup back beside the data, examine it and remove it; exit code 1 where it failed.
+
+    Nothing of the server's own data is touched. The server makes this drill weekly by itself where it knows
+    the folder of its backups; /metrics and `server doctor` tell how the last one went. Encrypted backups it
+    drills where it has their private key.
+
+    Examples:
+
+      server drill backups
+
+      server drill s3://lab-backups/palpebra --identity backups.key
+    """
+    settings = Settings()
+    if when_due:
+        os.nice(LOWEST_PRIORITY)  # raters come first
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the copy is removed
+        result = drills.drill_when_due(settings)
+        if result is None:
+            out.print("no drill is due")
+            return
+    else:
+        key = _private_key(settings, identity)
+        chosen = _backup_of(file or str(settings.backup_folder), settings)
+        result = drills.drill(settings, chosen, key, keys)
+    if not result.passed:
+        out.print(f"{result.backup}: the drill failed: {result.said}")
+        raise typer.Exit(1)
+    out.print(
+        f"{result.backup} came back whole: {result.rows} rows, {result.clips} clips of "
+        f"{result.backed_up_at}, in {result.seconds:.0f} s"
+    )
+
+
+def _backup_of(address: str, settings: Settings) -> Path | KeptBackup:
+    """The file itself, or the newest of a folder or bucket."""
+    if not address:
+        raise InputError("expected a backup or a folder of backups; name one, or set PALPEBRA_BACKUP_FOLDER")
+    if Path(address).is_file() and not address.endswith(ENDING):
+        return Path(address)
+    if address.endswith((".tar", ENDING)):
+        folder, _, name = address.rpartition("/")
+        store = backup_store(folder or ".", settings)
+        backup = next((KeptBackup(store, one.name) for one in store.entries() if one.name == name), None)
+    else:
+        backup = newest_backup(backup_store(address, settings))
+    if backup is None:
+        raise InputError(f"{address}: expected a backup, or a folder with palpebra-*.tar; run: server backup")
+    return backup

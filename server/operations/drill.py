@@ -1,0 +1,241 @@
+"""`server drill`: bring the newest backup back beside the data, examine it, and say how it went.
+
+A backup that nobody has ever brought back is a hope. The server makes the drill itself once a week where it
+knows the folder of its backups.
+"""
+
+import shutil
+import tarfile
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from pyrage import x25519
+
+from experiments.errors import InputError
+from experiments.files import whole_file
+from server.clock import now
+from server.context import Services, open_services
+from server.operations.backup import TABLES, Description
+from server.operations.backup_stores import backup_store
+from server.operations.checks import Finding, counts, database, identities
+from server.operations.encryption import ENDING, identity_in
+from server.operations.erasures import ledger
+from server.operations.keys_apart import beside
+from server.operations.locking import locked
+from server.operations.off_host import KeptBackup, brought_here
+from server.operations.restore import restore
+from server.operations.watched_backups import DrillResult, drill_file, last_drill, newest_backup
+from server.settings import Settings
+
+EVERY = timedelta(days=7)
+AGAIN_AFTER_FAILURE = timedelta(days=1)
+COPIES = ".drill-"
+"""How folders of copies begin."""
+UNPACKED = 15
+"""Rows in a database take up to so many times the room of their compressed text."""
+
+
+class DrillUnderWayError(InputError):
+    """Another process makes a drill."""
+
+
+def drill(
+    settings: Settings,
+    backup: Path | KeptBackup,
+    identity: x25519.Identity | None = None,
+    keys: Path | None = None,
+) -> DrillResult:
+    """Restore a backup beside the data and examine it; the result is kept, what was restored is removed.
+
+    The database is SQLite whatever the server's is: a backup has neither's form. Nothing of the server's own
+    data is touched; who was erased since the backup is erased from the copy too, before it is looked at.
+
+    Parameters
+    ----------
+    keys : Path, optional
+        Key file of a backup that is not encrypted, where it is neither beside it nor in the settings.
+
+    Raises
+    ------
+    DrillUnderWayError
+        Another process is at it.
+    """
+    with _alone(settings):
+        return _drill(settings, backup, identity, keys)
+
+
+def _drill(
+    settings: Settings,
+    backup: Path | KeptBackup,
+    identity: x25519.Identity | None,
+    keys: Path | None = None,
+) -> DrillResult:
+    if keys is None and not backup.name.endswith(ENDING):
+        keys = settings.backup_keys
+    started = time.monotonic()
+    try:
+        with (
+            tempfile.TemporaryDirectory(prefix=COPIES, dir=settings.data_folder) as folder,
+            _here(settings, backup, Path(folder), identity) as path,
+        ):
+            _check_room(settings, path)
+            result = _brought_back(_beside(settings, Path(folder)), path, keys)
+    except InputError as error:
+        result = DrillResult(at=now(), backup=backup.name, passed=False, said=str(error))
+    except Exception as error:  # whatever goes wrong is what it is there to find
+        said = f"{type(error).__name__}: {error}".splitlines()[0]
+        result = DrillResult(at=now(), backup=backup.name, passed=False, said=said)
+    result = result.model_copy(
+        update={"backup": backup.name, "seconds": round(time.monotonic() - started, 1)}
+    )
+    with whole_file(drill_file(settings)) as temporary:
+        temporary.write_text(result.model_dump_json(indent=2), encoding="utf-8")
+    return result
+
+
+@contextmanager
+def _here(
+    settings: Settings, backup: Path | KeptBackup, folder: Path, identity: x25519.Identity | None
+) -> Iterator[Path]:
+    """The backup as a file of this machine, in the open."""
+    if isinstance(backup, Path):
+        yield backup
+        return
+    size = next((entry.bytes for entry in backup.store.entries() if entry.name == backup.name), 0)
+    _need_room(settings, size + settings.free_megabytes_min * 1e6)
+    with brought_here(backup, folder, identity) as path:
+        yield path
+
+
+def _brought_back(apart: Settings, backup: Path, keys: Path | None) -> DrillResult:
+    services = open_services(apart)
+    try:
+        described = restore(services, backup, keys=keys)
+        missing = keys is None and not beside(backup).exists()
+        failed = [_key_file_missing(backup)] if missing and _needs_key_file(described) else []
+        failed += [
+            f"{finding.subject}: {finding.state}"
+            for finding in _findings(services)
+            if finding.verdict == "failed"
+        ]
+    finally:
+        services.database.close()
+    return DrillResult(
+        at=now(),
+        backup=backup.name,
+        backed_up_at=described.created_at,
+        passed=not failed,
+        said="; ".join(failed),
+        rows=sum(table.rows for table in described.tables.values()),
+        clips=len(described.clips),
+    )
+
+
+def _needs_key_file(described: Description) -> bool:
+    known = described.tables.get("recruiter_identities")
+    return described.keys_apart and known is not None and known.rows > 0
+
+
+def _key_file_missing(backup: Path) -> str:
+    return (
+        f"no key file {beside(backup)}: recruiters' ids would be lost; name it by --keys or "
+        "PALPEBRA_BACKUP_KEYS, or run: server backup"
+    )
+
+
+def _check_room(settings: Settings, backup: Path) -> None:
+    """Refuse a drill that would leave the raters without room."""
+    try:
+        with tarfile.open(backup) as tar:
+            sizes = [entry.size * (UNPACKED if entry.name.startswith(TABLES) else 1) for entry in tar]
+    except (OSError, tarfile.TarError):
+        return  # restore says what is wrong with it
+    _need_room(settings, sum(sizes) + settings.free_megabytes_min * 1e6)
+
+
+def _need_room(settings: Settings, needed: float) -> None:
+    free = shutil.disk_usage(settings.data_folder).free
+    if free < needed:
+        raise InputError(
+            f"not brought back: it may need {needed / 1e9:.1f} GB in {settings.data_folder}, there are "
+            f"{free / 1e9:.1f} GB free; make room"
+        )
+
+
+def _beside(settings: Settings, folder: Path) -> Settings:
+    """Settings of an installation of its own in `folder`, with the server's ledger of erasures."""
+    apart = Settings(
+        **settings.model_dump()
+        | {
+            "data_folder": folder,
+            "database_url": f"sqlite:///{folder / 'palpebra.sqlite'}",
+            "secret_key": "",
+            "s3_bucket": "",
+            "audit_syslog": "",
+        }
+    )
+    if ledger(settings).is_file():
+        shutil.copyfile(ledger(settings), ledger(apart))
+    return apart
+
+
+def _findings(services: Services) -> Iterator[Finding]:
+    yield from database(services)
+    yield from counts(services)
+    yield from identities(services)
+
+
+def is_due(last: DrillResult | None, moment: datetime) -> bool:
+    """Whether it is time: a week after one that passed, a day after one that did not."""
+    if last is None:
+        return True
+    return moment - last.at >= (EVERY if last.passed else AGAIN_AFTER_FAILURE)
+
+
+def drill_when_due(settings: Settings) -> DrillResult | None:
+    """Make the drill where it is due and nobody else is at it; None where nothing was to do.
+
+    Encrypted backups are left to another machine where this one has no private key.
+    """
+    address = str(settings.backup_folder)
+    backup = newest_backup(backup_store(address, settings), settings.key) if address else None
+    if backup is None or (backup.name.endswith(ENDING) and settings.backup_identity is None):
+        return None
+    try:
+        with _alone(settings):
+            if not is_due(last_drill(settings), now()):
+                return None
+            return _drill(settings, backup, identity_of(settings))
+    except DrillUnderWayError:
+        return None
+
+
+def identity_of(settings: Settings) -> x25519.Identity | None:
+    """The private key that the settings name; None where they name none."""
+    return identity_in(settings.backup_identity) if settings.backup_identity else None
+
+
+def sweep(settings: Settings) -> None:
+    """Remove the copy of a drill that was killed: it holds everybody's answers."""
+    try:
+        with _alone(settings):
+            pass
+    except DrillUnderWayError:
+        pass
+
+
+@contextmanager
+def _alone(settings: Settings) -> Iterator[None]:
+    """Hold the lock of the drills, which ends with the process; copies of a killed one go first."""
+    with ExitStack() as held:
+        try:
+            held.enter_context(locked(settings.data_folder / "restore-drill.lock", wait=False))
+        except BlockingIOError:
+            raise DrillUnderWayError("another restore drill is under way; wait until it has ended") from None
+        for copy in settings.data_folder.glob(f"{COPIES}*"):
+            shutil.rmtree(copy, ignore_errors=True)
+        yield

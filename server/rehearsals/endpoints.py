@@ -1,0 +1,48 @@
+"""The dress rehearsal of a study: simulated people in a sandbox, and what they would leave behind."""
+
+from fastapi import APIRouter
+from fastapi.responses import FileResponse
+
+from server.accounts.identity import Viewer, Writer
+from server.context import ServicesDep
+from server.errors import ERROR_RESPONSES
+from server.rehearsals import service
+from server.rehearsals.schemas import NewRehearsal, RehearsalOut, RehearsalResult
+from server.reports.endpoints import REPORT_POLICY
+
+router = APIRouter(
+    prefix="/api/admin/studies/{study}/rehearsals", tags=["studies"], responses=ERROR_RESPONSES
+)
+
+
+@router.get("/latest")
+def get_latest_rehearsal(services: ServicesDep, identity: Viewer, study: str) -> RehearsalOut | None:
+    """The latest rehearsal, and how far it is; null where there is none."""
+    with services.database.read() as session:
+        return service.latest(session, study, identity)
+
+
+@router.post("", status_code=202)
+def begin_rehearsal(services: ServicesDep, identity: Writer, study: str, body: NewRehearsal) -> RehearsalOut:
+    """Simulate people in a database of their own; it takes the place of the rehearsal before."""
+    return service.start(services, study, body, identity)
+
+
+@router.get("/{rehearsal}")
+def get_rehearsal(services: ServicesDep, identity: Viewer, study: str, rehearsal: str) -> RehearsalResult:
+    """What a rehearsal showed: orders, times, columns, report and power."""
+    with services.database.read() as session:
+        return service.result(services, session, study, identity, rehearsal)
+
+
+@router.get("/{rehearsal}/report/{file}", response_class=FileResponse)
+def get_rehearsed_report_file(
+    services: ServicesDep, identity: Viewer, study: str, rehearsal: str, file: str
+) -> FileResponse:
+    """One file of the report that the simulated people would give."""
+    with services.database.read() as session:
+        path = service.report_file(services, session, study, identity, rehearsal, file)
+    kind = "attachment" if path.suffix != ".html" else "inline"
+    headers = {"content-security-policy": REPORT_POLICY}
+    name = f"{study}-rehearsal-{path.name}"
+    return FileResponse(path, filename=name, content_disposition_type=kind, headers=headers)

@@ -1,0 +1,221 @@
+"""The rehearsal itself, in a process and a database of its own: it is not told where people's data are."""
+
+import json
+import secrets
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from experiments.assignment.groups import names
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.manifest import Manifest
+from experiments.trials.counts import expected_minutes
+from server.accounts.identity import OPERATOR
+from server.app import create_app
+from server.cli_common import migrated_services
+from server.context import Services
+from server.export.formats import runs_csv
+from server.export.pieces import csv_pieces, rating_table
+from server.export.tables import answers_table, runs_table
+from server.models import Study
+from server.rehearsals import repository
+from server.rehearsals.power import SIMULATIONS, plan_command
+from server.rehearsals.schemas import (
+    DEFINITION,
+    MANIFEST,
+    ORDER,
+    REPORT,
+    RESULT,
+    Order,
+    Power,
+    RehearsalResult,
+    RehearsedColumn,
+    RehearsedPerson,
+    RehearsedTrial,
+    Step,
+    example_of,
+)
+from server.reports.process import LONGEST_S, run_analysis
+from server.settings import Settings
+from server.simulation.http import JsonClient, Refused, running_server
+from server.simulation.people import link_and_raters
+from server.simulation.person import Person
+from server.studies.importing import add_version, create_study
+from server.studies.lookup import find_study
+from server.studies.planned import planned_experiment
+
+SHOWN_PEOPLE = 5
+Say = Callable[[float, str], None]
+
+
+def rehearse(folder: Path, say: Say) -> None:
+    """Simulate people in a sandbox and write what it showed into `folder`.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds definition, manifest and order; gets `rehearsal.json` and the report.
+    say : callable
+        Told the share that is done, and what is done next.
+    """
+    order = Order.model_validate_json((folder / ORDER).read_text(encoding="utf-8"))
+    text = (folder / DEFINITION).read_text(encoding="utf-8")
+    experiment = planned_experiment(text)
+    settings = Settings(
+        data_folder=folder / "sandbox", database_url="", s3_bucket="", secret_key=secrets.token_hex(32)
+    )
+    say(0.02, "setting up the sandbox")
+    with migrated_services(settings) as services:
+        manifest = Manifest.model_validate_json((folder / MANIFEST).read_text(encoding="utf-8"))
+        _take_in(services, text, experiment, manifest)
+        groups = names(experiment) if experiment.groups.by == "link" else [""]
+        invited = [link_and_raters(services, experiment.name, group=group) for group in groups]
+    with running_server(create_app(settings)) as address:
+        for number in range(order.participants):
+            say(0.05 + 0.5 * number / order.participants, f"person {number + 1} of {order.participants}")
+            token, raters = invited[number % len(invited)]
+            _take_part(address, token, raters(order.seed * 1_000_000 + number, order.seed))
+    with migrated_services(settings) as services:
+        say(0.55, "reading the data")
+        with services.database.read() as session:
+            study = find_study(session, experiment.name, OPERATOR, "view")
+            result = _shown(session, study, experiment, order)
+            _export(session, study, folder)
+    say(0.6, "making the report")
+    report = folder / REPORT
+    result.report_problem = run_analysis(
+        folder / DEFINITION,
+        folder / "answers.csv",
+        report,
+        origin="simulated",
+        series=1,
+        sensitivity=False,
+        runs=folder / "runs.csv",
+    )
+    result.report = sorted(path.name for path in report.iterdir()) if report.is_dir() else []
+    say(0.85, "reckoning the power")
+    result.power, result.power_problem = _power(experiment, folder, order.seed)
+    (folder / RESULT).write_text(result.model_dump_json(indent=1), encoding="utf-8")
+
+
+def _take_in(services: Services, text: str, experiment: Experiment, manifest: Manifest) -> None:
+    with services.database.write() as session:
+        study = create_study(session, experiment.name, experiment, None)
+        add_version(session, study, text, experiment, manifest, None)
+        study.status = "live"
+
+
+def _take_part(address: str, token: str, rater: Any) -> None:
+    client = JsonClient(address)
+    try:
+        Person(client, rater).take_part(token)
+    except Refused as error:
+        raise InputError(f"the server refused a simulated person: {error}") from error
+    finally:
+        client.close()
+
+
+def _shown(session: Session, study: Study, experiment: Experiment, order: Order) -> RehearsalResult:
+    runs = repository.runs(session, study)
+    people = [
+        RehearsedPerson(
+            number=number,
+            group=run.group_name,
+            status=run.status,
+            minutes=round(run.elapsed_ms / 60_000, 1),
+            trials=_trials(session, run.id),
+        )
+        for number, run in enumerate(runs[:SHOWN_PEOPLE], 1)
+    ]
+    return RehearsalResult(
+        participants=order.participants,
+        complete=sum(run.status == "complete" for run in runs),
+        answers=repository.number_of_answers(session, study),
+        expected_minutes=expected_minutes(experiment),
+        people=people,
+        columns=_columns(session, study),
+        report=[],
+        report_problem="",
+        power=None,
+        power_problem="",
+    )
+
+
+def _trials(session: Session, run: int) -> list[RehearsedTrial]:
+    trials: list[RehearsedTrial] = []
+    for index, kind, block, cell, exemplar in repository.trials(session, run):
+        if not trials or trials[-1].trial_index != index:
+            trials.append(RehearsedTrial(trial_index=index, kind=kind, block=block, clips=[]))
+        if cell is not None:
+            trials[-1].clips.append(f"{cell} {exemplar}")
+    return trials
+
+
+def _columns(session: Session, study: Study) -> list[RehearsedColumn]:
+    """Every column of both tables, with the first value that anybody left in it."""
+    columns = []
+    for make in (answers_table, runs_table):
+        table = make(session, study, "simulated")
+        rows: Sequence[Sequence[Any]] = list(table.rows)
+        for index, column in enumerate(table.columns):
+            value = next((row[index] for row in rows if row[index] not in (None, "")), None)
+            columns.append(
+                RehearsedColumn(
+                    table=table.name,
+                    name=column.name,
+                    type=column.type,
+                    meaning=column.description,
+                    example=example_of(value),
+                )
+            )
+    return columns
+
+
+def _export(session: Session, study: Study, folder: Path) -> None:
+    with (folder / "answers.csv").open("wb") as stream:
+        stream.writelines(csv_pieces(rating_table(session, study, "simulated")))
+    with (folder / "runs.csv").open("wb") as stream:
+        stream.writelines(runs_csv(session, study, "simulated"))
+
+
+def _power(experiment: Experiment, folder: Path, seed: int) -> tuple[Power | None, str]:
+    """What `analysis plan` says; or why it says nothing."""
+    try:
+        arguments, assumed = plan_command(experiment)
+    except InputError as error:
+        return None, str(error)
+    out = folder / "power.json"
+    program = str(Path(sys.executable).with_name("analysis"))
+    further = ["--simulations", str(SIMULATIONS), "--seed", str(seed)]
+    done = subprocess.run(  # noqa: S603 - the program beside this interpreter, arguments of numbers and names
+        [program, *arguments, *further, "--json", str(out)],
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
+        check=False,
+    )
+    if done.returncode:
+        lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
+        return None, lines[-1][:500] if lines else "the power could not be reckoned"
+    said = json.loads(out.read_text(encoding="utf-8"))
+    command = " ".join(["analysis", *arguments, *further])
+    known = {name: said[name] for name in ("n", "effects", "power", "text")}
+    return Power(assumed=assumed, command=command, **known), ""
+
+
+def main() -> None:
+    """`python -m server.rehearsals FOLDER`: rehearse, with a line of JSON a step on standard output."""
+
+    def say(share: float, step: str) -> None:
+        print(Step(share=share, step=step).model_dump_json(), flush=True)  # noqa: T201
+
+    try:
+        rehearse(Path(sys.argv[1]), say)
+    except (InputError, OSError, subprocess.SubprocessError) as error:
+        print(Step(problem=str(error)[:500]).model_dump_json(), flush=True)  # noqa: T201
+        sys.exit(1)

@@ -1,0 +1,170 @@
+"""Dress rehearsals: begun in the background, kept until the next one of the study."""
+
+import atexit
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+from pydantic import ValidationError
+from sqlalchemy.orm import Session
+
+from experiments.json import json_text
+from server.accounts.audit import record
+from server.accounts.identity import OPERATOR, Identity
+from server.clock import now
+from server.context import Services
+from server.errors import NotFound
+from server.models import Job
+from server.rehearsals.schemas import (
+    DEFINITION,
+    MANIFEST,
+    ORDER,
+    REPORT,
+    RESULT,
+    NewRehearsal,
+    Order,
+    RehearsalOut,
+    RehearsalResult,
+    Step,
+)
+from server.reports import repository
+from server.reports.jobs import begun, note, shown
+from server.reports.process import LONGEST_S
+from server.studies.lookup import active_version, find_study
+
+_KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
+"""What the sandbox gets of the environment: no address of a database, no key, no setting."""
+_one_at_a_time = threading.Lock()
+
+
+def start(services: Services, name: str, order: NewRehearsal, identity: Identity) -> RehearsalOut:
+    """Begin a rehearsal in the background in the place of those before; Conflict where one is under way."""
+    with services.database.write() as session:
+        study = find_study(session, name, identity, "run")
+        version = active_version(session, study)
+        parameters = {**order.model_dump(), "version": version.number}
+        in_the_way = "A rehearsal of this study goes on already; wait for it."
+        job = begun(session, study, "rehearsal", parameters, identity, in_the_way)
+        record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
+        session.flush()
+        rehearsal = _out(job)
+        before = [one.public_id for one in repository.jobs(session, study, "rehearsal") if one is not job]
+        for public_id in before:
+            repository.remove_job(session, study, "rehearsal", public_id)
+    for public_id in before:
+        shutil.rmtree(_folder(services, public_id), ignore_errors=True)
+    threading.Thread(target=_run, args=(services, name, rehearsal.id, order), daemon=True).start()
+    return rehearsal
+
+
+def latest(session: Session, name: str, identity: Identity) -> RehearsalOut | None:
+    """The rehearsal of a study; None where there is none."""
+    study = find_study(session, name, identity, "view")
+    jobs = repository.latest_jobs(session, study, "rehearsal")
+    return _out(jobs[0]) if jobs else None
+
+
+def result(
+    services: Services, session: Session, name: str, identity: Identity, public_id: str
+) -> RehearsalResult:
+    """What a rehearsal showed; NotFound while there is nothing."""
+    study = find_study(session, name, identity, "view")
+    path = _folder(services, public_id) / RESULT
+    if repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
+        raise NotFound("There is no such rehearsal, or it is not done; reload the page to see how far it is.")
+    return RehearsalResult.model_validate_json(path.read_text(encoding="utf-8"))
+
+
+def report_file(
+    services: Services, session: Session, name: str, identity: Identity, public_id: str, file: str
+) -> Path:
+    """A file of the report that simulated people would give."""
+    if file not in result(services, session, name, identity, public_id).report:
+        raise NotFound("There is no such rehearsal, or its report has no such file.")
+    return _folder(services, public_id) / REPORT / file
+
+
+def _folder(services: Services, public_id: str) -> Path:
+    return services.settings.data_folder / "rehearsals" / public_id
+
+
+def _out(job: Job) -> RehearsalOut:
+    return RehearsalOut.model_validate(
+        {
+            **shown(job, "the server was stopped while it went on"),
+            "version": job.parameters.get("version", 0),
+            "participants": job.parameters.get("participants", 0),
+        }
+    )
+
+
+def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> None:
+    """The background thread: every end, good or bad, is written to the job."""
+    folder = _folder(services, public_id)
+    try:
+        _write_inputs(services, name, folder, order)
+        with _one_at_a_time:
+            note(services, public_id, status="running", message="beginning", started_at=now())
+            problem = _in_sandbox(services, public_id, folder)
+        ended = {"status": "failed" if problem else "done", "progress": 1.0, "message": problem}
+        note(services, public_id, finished_at=now(), **ended)
+    except (OSError, subprocess.SubprocessError, NotFound) as error:
+        note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
+    finally:
+        shutil.rmtree(folder / "sandbox", ignore_errors=True)
+
+
+def _write_inputs(services: Services, name: str, folder: Path, order: NewRehearsal) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    with services.database.read() as session:
+        version = active_version(session, find_study(session, name, OPERATOR, "view"))
+        (folder / DEFINITION).write_text(version.definition_toml, encoding="utf-8")
+        (folder / MANIFEST).write_text(json_text(version.manifest), encoding="utf-8")
+    told = Order(participants=order.participants, seed=order.seed)
+    (folder / ORDER).write_text(told.model_dump_json(), encoding="utf-8")
+
+
+def _in_sandbox(services: Services, public_id: str, folder: Path) -> str:
+    """Rehearse in a process that knows no database but its own; return why it failed, or ''."""
+    environment = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
+    problem = "the rehearsal ended before it was done"
+    with subprocess.Popen(  # noqa: S603 - this interpreter, a folder of ours
+        _program(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    ) as process:
+        guard = threading.Timer(LONGEST_S, _kill, [process.pid])
+        guard.start()
+        atexit.register(_kill, process.pid)
+        try:
+            for line in process.stdout or ():
+                try:
+                    step = Step.model_validate_json(line)
+                except ValidationError:  # something else that was printed
+                    continue
+                problem = step.problem or problem
+                note(services, public_id, progress=step.share, message=step.step)
+            process.wait()
+        finally:
+            guard.cancel()
+            atexit.unregister(_kill)
+            _kill(process.pid)
+    return "" if process.returncode == 0 else problem
+
+
+def _program(folder: Path) -> list[str]:
+    return [sys.executable, "-m", "server.rehearsals", str(folder)]
+
+
+def _kill(group: int) -> None:
+    """End the rehearsal with all that it started: an analysis would go on without it."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, signal.SIGKILL)

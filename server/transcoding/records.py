@@ -1,0 +1,78 @@
+"""What has been done with the videos of an upload: a line a file, written by the worker."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from experiments.manifest import MANIFEST_NAME
+from video_conversion.prepared import VIDEO_ENDINGS, Prepared
+
+RECORDS, FRAME_RATE, BEGUN, CLIPS = ".prepared", ".frame_rate", ".begun", ".clips"
+
+
+def videos_of(folder: Path) -> list[Path]:
+    """The videos of an upload that have come whole, by name."""
+    return sorted(
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in VIDEO_ENDINGS and not path.name.startswith(".")
+    )
+
+
+def asked_rate(folder: Path) -> float | None:
+    """Frames per second that an upload's clips are to have; None: each its own."""
+    try:
+        return float((folder / FRAME_RATE).read_text(encoding="ascii"))
+    except (FileNotFoundError, ValueError):
+        return None
+
+
+def ask_rate(folder: Path, fps: float | None) -> None:
+    """Ask for clips of so many frames per second, or for each at its own rate; clips are made anew."""
+    temporary = folder / f"{FRAME_RATE}.new"
+    temporary.write_text("" if fps is None else repr(fps), encoding="ascii")
+    temporary.replace(folder / FRAME_RATE)
+
+
+def records_of(folder: Path) -> dict[str, Prepared]:
+    """What has been prepared at the rate that is asked for, by the file's name."""
+    asked = asked_rate(folder)
+    try:
+        lines = (folder / RECORDS).read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        return {}
+    records: dict[str, Prepared] = {}
+    for record in filter(None, map(_record, lines)):
+        if record.replaced:
+            records.pop(record.name, None)
+        elif record.asked_fps == asked:
+            records[record.name] = record
+    return records
+
+
+def write_record(folder: Path, record: Prepared) -> None:
+    """Add what is known of a file; the server and its worker only ever add lines."""
+    with (folder / RECORDS).open("a", encoding="utf-8") as stream:
+        stream.write(record.model_dump_json() + "\n")
+
+
+def _record(line: str) -> Prepared | None:
+    # The last line may be half written while it is read.
+    try:
+        return Prepared.model_validate_json(line)
+    except ValidationError:
+        return None
+
+
+def waiting_in(folder: Path) -> list[Path]:
+    """Videos of an upload that have not been looked into; those of a built set are taken as they are."""
+    if (folder / MANIFEST_NAME).exists():
+        return []
+    done = records_of(folder)
+    return [path for path in videos_of(folder) if path.name not in done]
+
+
+def uploads_in(root: Path) -> Iterable[Path]:
+    """Folders of uploads."""
+    return sorted(path for path in root.iterdir() if path.is_dir()) if root.is_dir() else []

@@ -1,0 +1,1 @@
+"""Synthetic training data: pictures of faces with labels read off their geometry."""

@@ -1,0 +1,83 @@
+"""The R scripts of a report's models: where R is, lme4 and clmm agree with what the report says."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from analysis.plans.clip_rating import PLAN, READING, analyse
+from analysis.plans.prepare import prepare
+from analysis.plans.sensitivity import mixed_model, ordinal_model
+from analysis.read.study_answers import load_csv
+from analysis.report.contents import Section
+from experiments.load import load_experiment
+from tests.analysis.ratings_file import rows_of, simulate, write_export
+from tests.analysis.report.r_process import needed, run_together
+
+EXP3 = load_experiment("exp3")
+
+
+def sections(folder: Path, levels: int) -> tuple[Section, Section]:
+    """The models of Exp 3 with its first levels, rated by seven people."""
+    factor = EXP3.factors[0].model_copy(update={"levels": EXP3.factors[0].levels[:levels]})
+    experiment = EXP3.model_copy(update={"factors": (factor, *EXP3.factors[1:]), "exclusions": ()})
+    file = write_export(folder / "r.csv", experiment, rows_of(experiment, simulate(experiment, 7, trials=3)))
+    analysis = analyse(prepare(experiment, PLAN, load_csv(file, experiment, READING)))
+    return mixed_model(analysis), ordinal_model(analysis)
+
+
+def written(section: Section, folder: Path, key: str = "") -> list[Path]:
+    files = section.beside(key)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in files]
+
+
+@pytest.fixture(scope="module")
+def of_r(tmp_path_factory) -> dict[str, str]:
+    """What R says of the models of two levels, of four, and of an F that was changed."""
+    needed("lme4", "lmerTest", "ordinal")
+    two, four, changed = (tmp_path_factory.mktemp(name) for name in ("two", "four", "changed"))
+    mixed, ordinal = sections(two, 2)
+    shared, none = sections(four, 4)
+    assert none.beside("") == {}
+    altered = written(mixed, changed)[0]
+    text = altered.read_text(encoding="utf-8")
+    line = re.findall(r"^mixed F,f1,.*$", text, re.MULTILINE)[0]
+    other = f"mixed F,f1,{float(line.split(',')[-1]) * 1.01!r}"
+    altered.write_text(text.replace(line, other), encoding="utf-8")
+    scripts = [
+        written(mixed, two)[0],
+        written(ordinal, two)[0],
+        written(shared, four, "eeriness")[0],
+        altered,
+    ]
+    assert {path.suffix for path in scripts} == {".R"}
+    return dict(zip(("mixed", "ordinal", "shared", "changed"), run_together(scripts), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("model", "tables"),
+    [
+        ("mixed", ("mixed criterion", "mixed F", "mixed residual SD")),
+        ("ordinal", ("ordinal likelihood", "ordinal se")),
+        ("shared", ("mixed criterion", "mixed F")),
+    ],
+)
+def test_r_agrees_with_models_also_where_contrasts_share_a_variance(of_r, model, tables) -> None:
+    assert "Every number agrees with R." in of_r[model], of_r[model]
+    for table in tables:
+        assert re.search(rf"^{table} .*agree$", of_r[model], re.MULTILINE), of_r[model]
+
+
+def test_r_finds_a_changed_f(of_r) -> None:
+    assert re.search(r"^mixed F .*DIFFER$", of_r["changed"], re.MULTILINE)
+
+
+def test_no_name_stands_in_code(tmp_path) -> None:
+    mixed, ordinal = sections(tmp_path, 2)
+    for path in written(mixed, tmp_path, "a") + written(ordinal, tmp_path, "a"):
+        assert path.name.startswith("a-")
+        text = path.read_text(encoding="utf-8")
+        assert "lower_lid" not in text
+        assert "P00" not in text

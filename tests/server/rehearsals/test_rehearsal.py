@@ -1,0 +1,82 @@
+"""A rehearsal from the button to its report: simulated people, in a database that is not people's."""
+
+import time
+from typing import Any
+
+import pytest
+
+from experiments.load import load_experiment, parse_experiment
+from server.context import Services
+from server.models import Link, Rating, StudyRun
+from server.rehearsals.power import plan_command
+from tests.helpers.admins import Admin
+from tests.helpers.studies import SHORT, Participant
+
+PATH = "/studies/short/rehearsals"
+LIMIT_S = 300
+
+
+def counts(services: Services) -> list[int]:
+    with services.database.read() as session:
+        return [session.query(table).count() for table in (StudyRun, Rating, Link)]
+
+
+def done(admin: Admin) -> Any:
+    """The latest rehearsal, once it has ended."""
+    limit = time.monotonic() + LIMIT_S
+    while (latest := admin.get(f"{PATH}/latest").json())["status"] in ("queued", "running"):
+        assert time.monotonic() < limit, latest
+        time.sleep(0.2)
+    return latest
+
+
+@pytest.mark.slow
+def test_a_rehearsal_shows_everything_and_leaves_the_data_alone(
+    services: Services, experimenter: Admin, participant: Participant
+) -> None:
+    participant.agree().rate_all()
+    before = counts(services)
+    assert experimenter.get(f"{PATH}/latest").json() is None
+    begun = experimenter.send("POST", PATH, {"participants": 2, "seed": 3})
+    assert begun.status_code == 202, begun.text
+    assert experimenter.send("POST", PATH, {}).status_code == 409
+    latest = done(experimenter)
+    assert (latest["status"], latest["message"], latest["version"]) == ("done", "", 1)
+    assert counts(services) == before
+    shown = experimenter.get(f"{PATH}/{latest['id']}").json()
+    assert (shown["participants"], shown["complete"], len(shown["people"])) == (2, 2, 2)
+    first, second = shown["people"]
+    assert len(first["trials"]) == len(second["trials"]) == 12
+    assert shown["answers"] >= 24
+    assert first["minutes"] > 0
+    kinds = {trial["kind"] for trial in first["trials"]}
+    assert kinds == {"practice", "main", "attention"}
+    assert all(bool(trial["clips"]) == (trial["kind"] != "attention") for trial in first["trials"])
+    columns = {(column["table"], column["name"]): column for column in shown["columns"]}
+    assert columns["ratings", "response"]["example"] in {str(point) for point in range(1, 8)}
+    assert columns["runs", "form_about_age"]["meaning"]
+    assert shown["report_problem"] == ""
+    page = experimenter.get(f"{PATH}/{latest['id']}/report/report.html")
+    assert (page.status_code, "simulated" in page.text.lower()) == (200, True)
+    assert experimenter.get(f"{PATH}/{latest['id']}/report/order.json").status_code == 404
+    assert shown["power_problem"] == ""
+    assert set(shown["power"]["effects"]) == {"character", "speed"}
+    assert not (services.settings.data_folder / "rehearsals" / latest["id"] / "sandbox").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("exp3", "plan anova --within lower_lid:4 --effect lower_lid=0.25"),
+        ("pairs-demo", "plan pairs --abilities 0.0,0.3,0.6,0.9"),
+    ],
+)
+def test_the_power_that_a_declaration_asks_for(name: str, command: str) -> None:
+    assert " ".join(plan_command(load_experiment(name)).arguments) == command
+
+
+def test_factors_between_participants_are_planned_as_such() -> None:
+    between = SHORT.replace('name = "character"', 'name = "character"\nbetween = true', 1)
+    between = between.replace('split_by = "character"\norder = "alternating"', "")
+    arguments = plan_command(parse_experiment(between)).arguments
+    assert arguments[2:6] == ["--within", "speed:2", "--between", "character:2"]

@@ -1,0 +1,146 @@
+"""What has to be done to a video so that every browser shows it frame by frame: in words and figures."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from video_conversion.frame_times import frame_map
+from video_conversion.video_file import NotAClip, VideoFile
+
+PLAYED_PROFILES = ("Constrained Baseline", "Baseline", "Main", "High", "Progressive High", "Constrained High")
+MIN_FPS, MAX_FPS = 1, 240
+HD_LINES = 720
+BT601, BT709, RGB, NOT_SAID = 6, 1, 0, 2
+MATRIX_NAMES = {1: "bt709", 4: "fcc", 5: "bt470bg", 6: "smpte170m", 7: "smpte240m"}
+TURNS = {90: "transpose=cclock", 180: "hflip,vflip", 270: "transpose=clock"}
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """How one file becomes a clip.
+
+    Attributes
+    ----------
+    rate : Fraction
+        Frames per second of the clip.
+    frame_map : tuple of int
+        The frame of the original that each frame of the clip shows.
+    filters : str
+        What FFmpeg does to each picture before it is encoded.
+    size_px : tuple of int
+        Width and height of the clip, both even.
+    changes : tuple of str
+        What is done, in words; empty where the file is shown as it came.
+    encodes : bool
+        False where pictures stay as they are encoded.
+    """
+
+    rate: Fraction
+    frame_map: tuple[int, ...]
+    filters: str
+    size_px: tuple[int, int]
+    changes: tuple[str, ...]
+    encodes: bool
+
+
+def conversion_of(video: VideoFile, asked_fps: float | None) -> Conversion:
+    """How `video` becomes a clip.
+
+    Parameters
+    ----------
+    video : VideoFile
+        What the file is.
+    asked_fps : float or None
+        Frames per second that clips are to have; None: each its own, which of a variable rate is the inverse
+        of the median time between frames.
+
+    Raises
+    ------
+    NotAClip
+        Its own rate is outside of what is shown, and no other was asked for.
+    """
+    rate = Fraction(asked_fps).limit_denominator(1001) if asked_fps else video.typical_rate
+    if not MIN_FPS <= rate <= MAX_FPS:
+        raise NotAClip(
+            f"it has {float(rate):g} frames per second; choose a rate of {MIN_FPS} to {MAX_FPS} for all clips"
+        )
+    keeps_times = video.rate is not None and abs(float(video.rate) - float(rate)) < 1e-6 * float(rate)
+    shown = tuple(range(len(video.times_s))) if keeps_times else frame_map(video.times_s, video.end_s, rate)
+    turned_px, filters, picture_changes = _picture(video)
+    timing = () if keeps_times else (_timing_words(video, rate, shown),)
+    changes = (*_stream_words(video), *timing, *picture_changes)
+    left_out = _left_out(video)
+    return Conversion(rate, shown, filters, turned_px, (*changes, *left_out), encodes=bool(changes))
+
+
+def _stream_words(video: VideoFile) -> tuple[str, ...]:
+    """What of the form of the file, rather than of its pictures, keeps browsers from playing it."""
+    is_h264 = video.codec == "h264" and video.profile in PLAYED_PROFILES
+    if not is_h264:
+        named = f"{video.codec} {video.profile}".strip() if video.codec == "h264" else video.codec
+        return (f"encoded as H.264, was {named}",)
+    if "mp4" not in video.container.split(","):
+        return (f"encoded anew in an MP4 file, was {video.container.split(',')[0]}",)
+    return ()
+
+
+def _timing_words(video: VideoFile, rate: Fraction, shown: tuple[int, ...]) -> str:
+    had = f"{float(video.rate):.4g} fps" if video.rate else "a variable rate"
+    left_out = len(video.times_s) - len(set(shown))
+    repeated = len(shown) - len(set(shown))
+    return f"{had} to {float(rate):.4g} fps: {repeated} frames repeated, {left_out} left out"
+
+
+def _picture(video: VideoFile) -> tuple[tuple[int, int], str, tuple[str, ...]]:
+    """Size of the clip, filters and words of what is done to pictures."""
+    width, height = video.width_px, video.height_px
+    filters, words = [], []
+    if video.pixel_aspect not in (0, 1):
+        width = max(2, round(width * video.pixel_aspect))
+        filters.append(f"scale={width}:{height}:flags=lanczos,setsar=1")
+        words.append(f"stretched to square pixels, {width} x {height}")
+    if video.rotation_deg:
+        filters.append(TURNS[video.rotation_deg])
+        words.append(f"turned by {_turn_words(video.rotation_deg)}, as the file says")
+        width, height = (width, height) if video.rotation_deg == 180 else (height, width)
+    even = (width - width % 2, height - height % 2)
+    if 0 in even:
+        raise NotAClip(f"it has {width} x {height} pixels; expected at least 2 x 2")
+    if even != (width, height):
+        filters.append(f"crop={even[0]}:{even[1]}:0:0:exact=1")
+        words.append(f"cut to even sides, {even[0]} x {even[1]}")
+    filters.append(_to_shown_pixels(video))
+    return even, ",".join(filters), (*words, *_pixel_words(video))
+
+
+def _turn_words(rotation_deg: int) -> str:
+    return {90: "90 degrees to the left", 180: "180 degrees", 270: "90 degrees to the right"}[rotation_deg]
+
+
+def _to_shown_pixels(video: VideoFile) -> str:
+    matrix = video.matrix
+    if matrix == NOT_SAID:
+        matrix = BT709 if video.height_px >= HD_LINES else BT601
+    said = "" if matrix == RGB else f"in_color_matrix={MATRIX_NAMES.get(matrix, 'bt709')}:"
+    in_range = "full" if video.colour_range == "full" else "limited"
+    return (
+        f"scale={said}in_range={in_range}:out_color_matrix=bt709:out_range=limited:"
+        "flags=lanczos+accurate_rnd+full_chroma_int+full_chroma_inp,format=yuv420p"
+    )
+
+
+def _pixel_words(video: VideoFile) -> tuple[str, ...]:
+    words = []
+    if video.pixel_format not in ("yuv420p", "yuvj420p"):
+        words.append(f"pixels to 4:2:0 with 8 bits, were {video.pixel_format}")
+    if video.colour_range == "full":
+        words.append("colour range from full to limited")
+    return tuple(words)
+
+
+def _left_out(video: VideoFile) -> tuple[str, ...]:
+    words = ["transparency left out"] if video.has_alpha else []
+    if "audio" in video.other_streams:
+        words.append("sound left out")
+    if others := [kind for kind in video.other_streams if kind != "audio"]:
+        words.append(f"{', '.join(others)} left out")
+    return tuple(words)

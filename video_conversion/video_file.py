@@ -1,0 +1,198 @@
+"""What a file that somebody sent is: every frame decoded once, or a plain sentence why it cannot be used."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+from av.error import FFmpegError
+
+from experiments.source_video import ColourRange
+from video_conversion.frame_times import LONE_FRAME_RATE, constant_rate, typical_rate
+
+MAX_S = 120.0
+MAX_PX = 4096
+MAX_FRAMES = 30_000
+FORMATS = (
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,mpegvideo,gif,apng,flv,asf,ogg,mxf,"
+    "yuv4mpegpipe,h264,hevc,ivf,dv,nut"
+)
+"""Demuxers that read one file and nothing beside it: a playlist would open whatever address it names."""
+OPEN_OPTIONS = {"protocol_whitelist": "file", "format_whitelist": FORMATS}
+WIDE_COLOUR, HDR_TRANSFERS = 9, (16, 18)
+RANGES: dict[int, ColourRange] = {1: "limited", 2: "full"}
+READ_AGAIN = "export it again from the program that made it"
+
+
+class NotAClip(Exception):
+    """The file cannot be shown; the message says why, and what would do."""
+
+
+@dataclass(frozen=True)
+class VideoFile:
+    """A file's first video, by its container and by every decoded frame.
+
+    Attributes
+    ----------
+    container, codec, profile, pixel_format : str
+        As FFmpeg calls them.
+    colour_range, matrix : str and int
+        Range, and the number of the matrix (ITU-T H.273); 2 where the file does not say.
+    width_px, height_px : int
+        Of stored pictures.
+    pixel_aspect : Fraction
+        Width of a pixel over its height.
+    rotation_deg : int
+        By how much pictures are turned counter-clockwise to be shown: 0, 90, 180 or 270.
+    other_streams : tuple of str
+        Kinds of what else the file holds, such as audio.
+    has_alpha : bool
+        True where pixels may be transparent.
+    times_s : tuple of float, shape (frames,)
+        When each frame begins, ascending, in s.
+    end_s : float
+        When the last frame ends, in s.
+    rate : Fraction or None
+        Frames per second where the rate is constant; None where it varies.
+    """
+
+    container: str
+    codec: str
+    profile: str
+    pixel_format: str
+    colour_range: ColourRange
+    matrix: int
+    width_px: int
+    height_px: int
+    pixel_aspect: Fraction
+    rotation_deg: int
+    other_streams: tuple[str, ...]
+    has_alpha: bool
+    times_s: tuple[float, ...]
+    end_s: float
+    rate: Fraction | None
+
+    @property
+    def typical_rate(self) -> Fraction:
+        """Frames per second: the constant rate, else the inverse of the median time between frames."""
+        return self.rate or typical_rate(self.times_s)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """The file as a container; NotAClip where it is none."""
+    try:
+        with av.open(str(path), options=OPEN_OPTIONS, metadata_errors="ignore") as container:
+            yield container
+    except (FFmpegError, ValueError, EOFError) as error:
+        raise NotAClip(f"it cannot be read as a video, it may be damaged; {READ_AGAIN}") from error
+
+
+def examine(path: Path) -> VideoFile:
+    """Decode every frame of a file's first video.
+
+    Raises
+    ------
+    NotAClip
+        It is no video, damaged, interlaced, in HDR or wide-gamut colours, or beyond a limit.
+    """
+    with opened(path) as container:
+        if not container.streams.video:
+            held = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
+            raise NotAClip(f"it holds {held} and no picture; expected a video")
+        stream = container.streams.video[0]
+        _check_size(stream.codec_context, container.duration)
+        frames = _Frames()
+        for frame in _decoded(container, stream):
+            frames.add(frame)
+        return _described(container, stream, frames)
+
+
+def _check_size(context: Any, duration_us: int | None) -> None:
+    if context is None or not context.width or not context.height:
+        raise NotAClip(f"its pictures have no size; {READ_AGAIN}")
+    if max(context.width, context.height) > MAX_PX:
+        raise NotAClip(
+            f"it has {context.width} x {context.height} pixels; scale it to at most {MAX_PX} a side"
+        )
+    if duration_us is not None and duration_us / 1e6 > MAX_S + 1:
+        raise NotAClip(f"it lasts {duration_us / 1e6:.0f} s; cut it to at most {MAX_S:.0f} s")
+
+
+def _decoded(container: Any, stream: Any) -> Iterator[Any]:
+    """Each frame; NotAClip for the first that is damaged, which a decoder would else patch up."""
+    stream.codec_context.options = {"err_detect": "explode"}
+    number = 0
+    try:
+        for frame in container.decode(stream):
+            if frame.is_corrupt:
+                raise NotAClip(f"its frame {number} is damaged; {READ_AGAIN}")
+            number += 1
+            if number > MAX_FRAMES:
+                raise NotAClip(f"it has more than {MAX_FRAMES} frames; cut it shorter")
+            yield frame
+    except (FFmpegError, ValueError) as error:
+        raise NotAClip(f"it cannot be decoded after its frame {number}; {READ_AGAIN}") from error
+
+
+class _Frames:
+    """What has been seen of the frames so far."""
+
+    def __init__(self) -> None:
+        self.times_s: list[float] = []
+        self.last_s = 0.0
+        self.first: Any = None
+
+    def add(self, frame: Any) -> None:
+        """Take note of one frame; NotAClip where it is not like the first."""
+        if frame.time is None:
+            raise NotAClip(f"its frames bear no times; {READ_AGAIN}")
+        if self.first is None:
+            self.first = frame
+        if frame.interlaced_frame:
+            raise NotAClip(
+                "it is interlaced, two half pictures a frame; make it progressive with "
+                "`ffmpeg -i FILE -vf bwdif OUT.mp4`"
+            )
+        if (frame.width, frame.height) != (self.first.width, self.first.height):
+            raise NotAClip(f"its pictures change their size at frame {len(self.times_s)}; {READ_AGAIN}")
+        if self.times_s and frame.time <= self.times_s[-1]:
+            raise NotAClip(f"its frame {len(self.times_s)} begins no later than the one before; {READ_AGAIN}")
+        self.times_s.append(frame.time)
+        self.last_s = float((frame.duration or 0) * frame.time_base)
+
+
+def _described(container: Any, stream: Any, frames: _Frames) -> VideoFile:
+    first, times = frames.first, frames.times_s
+    if first is None:
+        raise NotAClip(f"it holds no frame; {READ_AGAIN}")
+    if first.color_trc in HDR_TRANSFERS or first.colorspace in (WIDE_COLOUR, WIDE_COLOUR + 1):
+        raise NotAClip("its colours are HDR or wide-gamut (BT.2020); export it in BT.709 (SDR)")
+    rate = constant_rate(times, (stream.average_rate, stream.guessed_rate))
+    step = float(1 / (rate or typical_rate(times) or LONE_FRAME_RATE))
+    end = times[-1] + (step if rate else frames.last_s or step)
+    if end - times[0] > MAX_S:
+        raise NotAClip(f"it lasts {end - times[0]:.0f} s; cut it to at most {MAX_S:.0f} s")
+    pixels = first.format
+    is_rgb, is_full = pixels.is_rgb, pixels.name.startswith("yuvj") or pixels.is_rgb
+    return VideoFile(
+        container=container.format.name,
+        codec=stream.codec_context.name,
+        profile=str(stream.codec_context.profile or ""),
+        pixel_format=pixels.name,
+        colour_range="full" if is_full else RANGES.get(first.color_range, "not said"),
+        matrix=0 if is_rgb else int(first.colorspace),
+        width_px=first.width,
+        height_px=first.height,
+        pixel_aspect=stream.sample_aspect_ratio or Fraction(1),
+        rotation_deg=round(first.rotation / 90) * 90 % 360,
+        other_streams=tuple(sorted({one.type for one in container.streams if one is not stream})),
+        has_alpha=bool(re.search(r"rgba|bgra|argb|abgr|yuva|gbrap|ya8|ya16|pal8", pixels.name)),
+        times_s=tuple(times),
+        end_s=end,
+        rate=rate,
+    )
