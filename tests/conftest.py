@@ -49,7 +49,7 @@ LONGEST_FILES = tuple(
 
 # A server draws orders, seeds and tokens by chance, a browser shares its machine with strangers: a defect
 # fails each try.
-RERUNS, RERUNS_TIMED = 1, 2
+RERUNS, RERUNS_BROWSER, RERUNS_TIMED = 1, 2, 3
 
 
 class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
@@ -73,8 +73,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Those of a screen run after the others, the timed ones last; a failed test is run again."""
     items.sort(key=lambda item: rank(source_file(item)))
     for item in items:
-        tries = RERUNS_TIMED if source_file(item) in TIMED_FILES else RERUNS
-        item.add_marker(pytest.mark.flaky(reruns=tries))
+        item.add_marker(pytest.mark.flaky(reruns=reruns_of(source_file(item))))
+
+
+def reruns_of(path: str) -> int:
+    """How often a failed test of a file is run again."""
+    if path in TIMED_FILES:
+        return RERUNS_TIMED
+    return RERUNS_BROWSER if path.startswith("tests/browser/") else RERUNS
 
 
 def rank(path: str) -> tuple[bool, bool, int]:

@@ -16,12 +16,17 @@ SHORTEST_S, LONGEST_S = 0.05, 0.6
 
 
 class FaultProxy:
-    """Passes requests to `upstream`; `share` of them suffer one of FAULTS, drawn by `seed`."""
+    """Passes requests to `upstream`; `share` of them suffer one of FAULTS, drawn by `seed`.
 
-    def __init__(self, upstream_port: int, share: float, seed: int) -> None:
+    lost_once: of each address that begins so, the first request is lost; "" for none.
+    """
+
+    def __init__(self, upstream_port: int, share: float, seed: int, lost_once: str = "") -> None:
         self.upstream_port, self.share = upstream_port, share
         self.port = free_port()
         self.offline = False
+        self.lost_once = lost_once
+        self.lost: set[str] = set()
         self.counts: Counter[str] = Counter()
         self._random = random.Random(seed)
         self._loop = asyncio.new_event_loop()
@@ -64,6 +69,8 @@ class FaultProxy:
     async def _pass_on(self, request: bytes) -> bytes:
         """The answer, or nothing: the connection then closes without one."""
         self.counts["requests"] += 1
+        if self._is_lost(request.split(b" ", 2)[1].decode("latin-1")):
+            return b""
         fault = self._random.choice(FAULTS) if self._random.random() < self.share else "none"
         self.counts[fault] += 1
         if fault == "drop_request":
@@ -77,6 +84,12 @@ class FaultProxy:
             return b""
         answer = await self._forward(request)
         return b"" if fault == "drop_answer" else answer
+
+    def _is_lost(self, path: str) -> bool:
+        if not self.lost_once or not path.startswith(self.lost_once) or path in self.lost:
+            return False
+        self.lost.add(path)
+        return True
 
     async def _again_later(self, request: bytes) -> None:
         await self._pause()

@@ -1,5 +1,6 @@
 /** The message catalogue: every sentence the page itself says. Study texts come from the declaration. */
 import type { AnyMessages, Messages } from "./languages/en";
+import { loadModule } from "../ui/load-module";
 import { formOf } from "./message";
 
 export type MessageKey = keyof Messages;
@@ -12,9 +13,6 @@ const catalogues: Partial<Record<string, AnyMessages>> = {};
 
 /** Languages that the page speaks itself. English first: it stands in for all others. */
 export const SHIPPED = ["en", ...Object.keys(loaders).filter((tag) => tag !== "en")];
-
-const TRIES = 5;
-const AGAIN_MS = 1_000;
 
 const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ku", "ps", "sd", "ug", "ur", "yi"]);
 
@@ -29,13 +27,8 @@ function shipped(language: string): string {
 /** Fetch the messages of `language`, English where none are shipped. What cannot be had is tried again, then done without. */
 export async function loadMessages(language: string): Promise<void> {
   const tag = shipped(language);
-  for (let tries = 1; !catalogues[tag] && tries <= TRIES; tries += 1) {
-    try {
-      catalogues[tag] = await loaders[tag]?.();
-    } catch {
-      await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
-    }
-  }
+  const load = loaders[tag];
+  if (load && !catalogues[tag]) catalogues[tag] = await loadModule(load).catch(() => undefined);
 }
 
 /** Messages in `language` as `loadMessages` has fetched them; those of another language where it could not. */

@@ -20,6 +20,7 @@ import { choosePlayer } from "./playback/choose";
 import { IndexedDbStore } from "./outbox/indexed-db";
 import { Outbox } from "./outbox/outbox";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
+import { loadModule } from "../ui/load-module";
 import { claimTab } from "./screen/one-tab";
 import { AnswersMissing } from "./screens/finish";
 import { emptied, showNotice } from "./screens/notice";
@@ -42,6 +43,8 @@ interface Entry {
   keeping: KeptVisit;
   kept: Kept | null;
 }
+
+const loadEnd = (): Promise<typeof import("./flow/ended")> => loadModule(() => import("./flow/ended"));
 
 export async function main(root: HTMLElement): Promise<void> {
   const spoken = preferred(SHIPPED, navigator.languages);
@@ -81,7 +84,7 @@ async function visit(entry: Entry): Promise<void> {
   if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], device);
   await passGates(root, t, list);
   const lack = returns ? null : lackOfRoom(link.gates, measures(link.gates));
-  if (lack && !(await (await import("./flow/room-page")).waitForRoom(root, t, link)))
+  if (lack && !(await (await loadModule(() => import("./flow/room-page"))).waitForRoom(root, t, link)))
     return turnedAway(entry, identity, returns, lack, device);
   const tab = await oneTab(root, t, link_token);
   if (tab === "left") return;
@@ -127,7 +130,7 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
   const claimed = (claim: Claim): Promise<RunStarted> => startRun(link_token, { ...start, client_id: identity.client_id(), ...claim });
   const kept = identity.code;
   const askForCode = async (why: MessageKey): Promise<RunStarted> =>
-    (await import("./flow/code-page")).codePage(root, t, why, identity, claimed);
+    (await loadModule(() => import("./flow/code-page"))).codePage(root, t, why, identity, claimed);
   if (has_code) return askForCode("code_enter");
   try {
     return await persistently(root, t, () => claimed(kept ? { resume_code: kept } : {}));
@@ -156,7 +159,7 @@ async function turnedAway(entry: Entry, identity: Identity, returns: boolean, cl
   }
   if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, device));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
-  await (await import("./flow/ended")).ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
+  await (await loadEnd()).ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
 }
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
@@ -179,7 +182,7 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   const over = (): Promise<void> => {
     keeping.forget();
     return persistently(root, session.t, () => fetchRun(started.run_token)).then(async (now) =>
-      (await import("./flow/ended")).ended(root, session.t, now, started, identity, wayBack(session.t, link)),
+      (await loadEnd()).ended(root, session.t, now, started, identity, wayBack(session.t, link)),
     );
   };
   if (run.status !== "active") return over();
@@ -251,8 +254,8 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
   });
   root.addEventListener("taken-over", end);
   // Asked for now, so that they are here when they are wanted, also without a connection.
-  const dialog = import("./screens/stop-dialog");
-  const last = import("./screens/completion");
+  const dialog = loadModule(() => import("./screens/stop-dialog"));
+  const last = loadModule(() => import("./screens/completion"));
   root.addEventListener("stop", () => void dialog.then(({ openStopDialog }) => openStopDialog(session)));
   watch(session);
   fetchFirst(session);

@@ -137,6 +137,23 @@ def opened_at_last(visit: Visit, link: str) -> Visit:
     raise AssertionError("expected the page within 120 loads")
 
 
+def test_each_file_of_the_page_lost_once(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    """Modules, the worker that shows clips and style sheets are asked for again: no clip is broken, nothing reloaded."""
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    proxy = FaultProxy(server.port, share=0.0, seed=0).start()
+    visit = Visit(page, proxy.address).open(study.link_token)
+    proxy.lost_once = "/assets/participant/"
+    visit.begin().instructions().practice()
+    assert visit.trials(most=1) == 1
+    assert page.evaluate("[...document.querySelectorAll('link[rel=stylesheet]')].every((link) => link.sheet)")
+    visit.trials()
+    proxy.stop()
+    assert {"worker", "points"} <= {Path(path).name.split("-")[0] for path in proxy.lost}
+    assert server.rows("SELECT 1 FROM run_events WHERE type = 'clip_unavailable'") == []
+    assert {row["status"] for row in server.rows("SELECT status FROM study_runs")} == {"complete"}
+
+
 def test_a_browser_goes_through_the_same(server: ServerProcess, tmp_path: Path, page: Page) -> None:
     study = server.add_study(tmp_path / "clips", without(PLAIN, ("per_cell = 3", "per_cell = 5")))
     server.start()

@@ -35,9 +35,9 @@ def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Display]:
         yield opened
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def running(tmp_path_factory: pytest.TempPathFactory, built_page: Path) -> Iterator[ServerProcess]:
-    """One server; the bench takes in its studies itself."""
+    """A server; the bench takes in its studies itself, and a second try finds none of the first."""
     server = ServerProcess(tmp_path_factory.mktemp("scope") / "data")
     yield server.start()
     server.stop()

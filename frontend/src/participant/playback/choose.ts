@@ -1,7 +1,8 @@
 /** Frame by frame in the worker where that is possible, else the video element. */
 import type { RunState } from "../../api/schema";
+import { loadModule } from "../../ui/load-module";
 import type { ClipPlayer } from "./player";
-import { WorkerPlayer } from "./worker-player";
+import { startedWorker, WorkerPlayer } from "./worker-player";
 
 export function hasWebCodecs(): boolean {
   return "VideoDecoder" in globalThis && "OffscreenCanvas" in globalThis && "transferControlToOffscreen" in HTMLCanvasElement.prototype;
@@ -26,9 +27,10 @@ export function hasVideo(): boolean {
 
 type Display = Pick<RunState["display"], "background" | "sync_patch">;
 
-/** The fallback is fetched only where it is needed: such a browser does without the worker and its decoder. */
+/** The fallback is fetched only where it is needed: by a browser without a decoder, or one to which the worker never comes. */
 export async function choosePlayer({ background, sync_patch }: Display): Promise<ClipPlayer> {
-  if (hasWebCodecs()) return new WorkerPlayer(background, sync_patch);
-  const { VideoPlayer } = await import("./video-player");
+  const worker = hasWebCodecs() ? await startedWorker().catch(() => null) : null;
+  if (worker) return new WorkerPlayer(worker, background, sync_patch);
+  const { VideoPlayer } = await loadModule(() => import("./video-player"));
   return new VideoPlayer();
 }

@@ -12,6 +12,11 @@ export type ToWorker =
   | { type: "blank"; width: number; height: number }
   | { type: "release"; sha256: string };
 
+/** The worker's first message. */
+export interface Started {
+  type: "started";
+}
+
 export type FromWorker =
   | { type: "prepared"; sha256: string; frames: number; width: number; height: number; fps: number }
   | { type: "failed"; sha256: string; reason: string }

@@ -1,8 +1,11 @@
 /** The page's side of the worker: asks, and turns its messages into promises. */
+import { backoff } from "../outbox/backoff";
 import { ClipBroken, type ClipPlayer, type Part, type PlayOptions, type Prepared, type ShownClip } from "./player";
 import type { FromWorker, ToWorker } from "./protocol";
 
 const DECODE_LIMIT_MS = 20_000;
+const START_LIMIT_MS = 20_000;
+const MAX_STARTS = 6;
 
 interface Waiting {
   resolve: (message: FromWorker) => void;
@@ -14,17 +17,35 @@ function layoutShown(): Promise<void> {
   return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => resolve())));
 }
 
+/** A worker whose script has run: it is fetched anew where it was lost on the way. Rejects where it never comes. */
+export async function startedWorker(): Promise<Worker> {
+  for (let failures = 1; failures <= MAX_STARTS; failures++) {
+    const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    const has_started = await new Promise<boolean>((resolve) => {
+      worker.onmessage = () => resolve(true);
+      worker.onerror = () => resolve(false);
+      setTimeout(resolve, START_LIMIT_MS, false);
+    });
+    if (has_started) return worker;
+    worker.terminate();
+    await new Promise((resolve) => setTimeout(resolve, backoff(failures)));
+  }
+  throw new ClipBroken("the worker could not be started");
+}
+
 export class WorkerPlayer implements ClipPlayer {
   readonly method = "webcodecs";
   readonly element = document.createElement("canvas");
-  private readonly worker: Worker;
   private readonly prepared = new Map<string, Promise<Prepared>>();
   private readonly waiting = new Map<string, Waiting>();
 
-  constructor(background: string, sync_patch: boolean) {
-    this.worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+  constructor(
+    private readonly worker: Worker,
+    background: string,
+    sync_patch: boolean,
+  ) {
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.arrived(data);
-    this.worker.onerror = (event) => this.broken(event.message || "the worker could not be started");
+    this.worker.onerror = (event) => this.broken(event.message || "the worker stopped");
     const canvas = this.element.transferControlToOffscreen();
     this.tell({ type: "canvas", canvas, background, sync_patch }, [canvas]);
   }

@@ -5,13 +5,13 @@
 import { type Composed, composition, drawFrame, framesOf, type SingleClip, streamsOf } from "./compose";
 import { decodeClip } from "./decode";
 import type { Part } from "./player";
-import { absoluteNow, type FromWorker, type ToWorker } from "./protocol";
+import { absoluteNow, type FromWorker, type Started, type ToWorker } from "./protocol";
 import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
 import { FrameSchedule } from "./schedule";
 import type { drawSyncPatch } from "./sync-patch";
 
 interface Scope {
-  postMessage(message: FromWorker): void;
+  postMessage(message: FromWorker | Started): void;
   onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
   requestAnimationFrame(callback: (now: number) => void): number;
 }
@@ -162,3 +162,4 @@ scope.onmessage = ({ data }) => {
   else if (data.type === "warm") warm();
   else play(data.sha256, data.refresh_ms, data.fixation_ms);
 };
+scope.postMessage({ type: "started" });

@@ -1,5 +1,6 @@
 /** The rest between blocks; what draws it is loaded beside the first trials. */
 import { INT, plugin, type PluginClass, pressWhile } from "../jspsych";
+import { loadModule } from "../../ui/load-module";
 import type { Session } from "../session";
 
 export interface Parameters {
@@ -12,7 +13,7 @@ export interface Data {
 }
 
 /** Fetched with the first clips, so that it is here when its turn comes, also without a connection. */
-export const loadRest = (): Promise<typeof import("./rest")> => import("./rest");
+export const loadRest = (): Promise<typeof import("./rest")> => loadModule(() => import("./rest"));
 
 export function blockBreak(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({

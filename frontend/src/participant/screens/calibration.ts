@@ -1,6 +1,7 @@
 /** The size of the screen, measured: what does it is loaded where a study asks for it. */
 import { plugin, BOOL, FLOAT, STRING, type PluginClass } from "../jspsych";
 import type { CalibrationState } from "../../api/schema";
+import { loadModule } from "../../ui/load-module";
 import type { Session } from "../session";
 
 interface Parameters {
@@ -14,7 +15,7 @@ interface Data {
 }
 
 /** Fetched with the page's first clips, so that it is here when its turn comes, also without a connection. */
-export const loadCalibration = (): Promise<typeof import("../calibration/measure")> => import("../calibration/measure");
+export const loadCalibration = (): Promise<typeof import("../calibration/measure")> => loadModule(() => import("../calibration/measure"));
 
 export function calibration(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({

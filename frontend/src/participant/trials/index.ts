@@ -1,6 +1,7 @@
 /** The registry of trial kinds: every folder here with an index.ts, found by its name and loaded when a run needs it. */
 import type { TrialInfo } from "../../api/schema";
 import type { Node } from "../jspsych";
+import { loadModule } from "../../ui/load-module";
 import type { Session } from "../session";
 import type { Showable, TrialKind } from "./kind";
 
@@ -11,7 +12,7 @@ export function loadKind(name: string): Promise<TrialKind> {
   const load = folders[`./${name}/index.ts`];
   const names = Object.keys(folders).map((path) => path.split("/")[1]);
   return load
-    ? load()
+    ? loadModule(load)
     : Promise.reject(new Error(`expected one of the kinds of trial ${names.join(", ")}, got ${name}; load the page again`));
 }
 

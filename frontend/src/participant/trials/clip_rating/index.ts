@@ -3,6 +3,7 @@ import type { TrialInfo } from "../../../api/schema";
 import { INT, OBJECT, plugin, type PluginClass, pressWhile, trial } from "../../jspsych";
 import { absoluteNow } from "../../playback/protocol";
 import type { Session } from "../../session";
+import { loadModule } from "../../../ui/load-module";
 import type { TrialKind } from "../kind";
 import { parametersOf } from "../shared/parameters";
 import { declaredRating } from "./declared";
@@ -11,7 +12,7 @@ import { loadWidgets } from "./widget";
 
 /** What it draws comes beside the first trial, which does not wait for it, and is here when a check is. */
 function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
-  const loaded = import("./attention-check");
+  const loaded = loadModule(() => import("./attention-check"));
   return plugin<{ trial: TrialInfo }, { response: number }>({
     name: "attention-check",
     parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
@@ -34,7 +35,7 @@ export const kind: TrialKind = {
     // Asked for now, so that no scale waits; what cannot be had is asked for again where it is shown.
     const { scales, reference } = declaredRating(session);
     void loadWidgets(scales).catch(() => {});
-    const other = reference && import("./degradation").then(({ watchBothAndRate }) => watchBothAndRate);
+    const other = reference && loadModule(() => import("./degradation")).then(({ watchBothAndRate }) => watchBothAndRate);
     return trial(clipRating(session, other), parametersOf(session, what));
   },
   attention: (session, what) => trial(attentionCheck(session), { trial: () => what().trial }),

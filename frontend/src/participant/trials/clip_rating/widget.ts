@@ -1,6 +1,7 @@
 /** What a type of scale draws: a file of its name in ../scales, which exports `widget`. Found by the name. */
 import type { ShownClipRating } from "../../../api/schema";
 import type { Translate } from "../../../i18n";
+import { loadModule } from "../../../ui/load-module";
 import type { MeantPress } from "../../../ui/meant-press";
 
 export type Scale = ShownClipRating["scales"][number];
@@ -37,7 +38,7 @@ export async function loadWidgets(scales: readonly Scale[]): Promise<void> {
     if (makers.has(type)) continue;
     const load = files[`../scales/${type}.ts`];
     if (!load) throw new Error(`expected a scale this page knows, got ${type}; load the page again`);
-    makers.set(type, await load());
+    makers.set(type, await loadModule(load));
   }
 }
 

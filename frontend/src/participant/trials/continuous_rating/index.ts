@@ -2,13 +2,14 @@
 import type { TrialInfo } from "../../../api/schema";
 import { INT, OBJECT, plugin, type PluginClass, pressWhile, trial } from "../../jspsych";
 import type { Session } from "../../session";
+import { loadModule } from "../../../ui/load-module";
 import type { TrialKind } from "../kind";
 import { parametersOf } from "../shared/parameters";
 import { continuousRating, unrated } from "./screen";
 
 /** What it draws comes beside the first trial, which does not wait for it, and is here when a check is. */
 function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
-  const loaded = import("./attention-check");
+  const loaded = loadModule(() => import("./attention-check"));
   return plugin<{ trial: TrialInfo }, { chosen: number }>({
     name: "continuous-check",
     parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
