@@ -138,7 +138,7 @@ def opened_at_last(visit: Visit, link: str) -> Visit:
 
 
 def test_each_file_of_the_page_lost_once(server: ServerProcess, tmp_path: Path, page: Page) -> None:
-    """Modules, the worker that shows clips and style sheets are asked for again: no clip is broken, nothing reloaded."""
+    """Modules, the worker and style sheets are asked for again: no clip is broken, nothing reloaded."""
     study = server.add_study(tmp_path / "clips", PLAIN)
     server.start()
     proxy = FaultProxy(server.port, share=0.0, seed=0).start()
