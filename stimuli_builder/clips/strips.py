@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from stimuli_builder.characters.writing import write_bytes
-from stimuli_builder.clips.characters import find_character, shipped_names
+from stimuli_builder.clips.characters import find_character, geometry, shipped_names
 
 STRIPS_FILE = "strips.json"
 STEPS = 33
@@ -29,13 +29,23 @@ def strip(character: str, size_px: tuple[int, int] = SIZE_PX, steps: int = STEPS
     return buffer.getvalue()
 
 
+def strip_names(names: Sequence[str] = ()) -> tuple[str, ...]:
+    """Characters, of the shipped ones or of `names`, whose whole frame has a strip's shape.
+
+    A face from forehead to chin is left out: cut to a strip it would show what its eyes' character does.
+    """
+    shape = SIZE_PX[1] / SIZE_PX[0]
+    sizes = {name: geometry(name).size_px for name in names or shipped_names()}
+    return tuple(name for name, (width, height) in sizes.items() if height / width < 1.1 * shape)
+
+
 def write_strips(folder: Path, characters: Sequence[str] = ()) -> list[tuple[str, int]]:
-    """Write `NAME.webp` of each character (the shipped ones where none is named) and, last, `strips.json`.
+    """Write `NAME.webp` of each character (of `strip_names` where none is named) and, last, `strips.json`.
 
     Returns name and bytes of each.
     """
     written = []
-    for name in characters or shipped_names():
+    for name in characters or strip_names():
         content = strip(name)
         write_bytes(folder / f"{name}.webp", content)
         written.append((name, len(content)))

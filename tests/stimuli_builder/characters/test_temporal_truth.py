@@ -9,42 +9,51 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stimuli_builder.clips.characters import find_character
+from stimuli_builder.clips.characters import Geometry, find_character
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet
 
 NAMES = sorted(json.loads((Path(__file__).parent / "shipped.json").read_text()))
-SIZE = (960, 360)
-EYES = (255, 705)
-"""Columns in px of the eyes' middles: 60 mm apart at 7.5 px per mm."""
-PX_PER_MM = 7.5
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A face's levels and their luma (of green, 0-255) in the window."""
+    """A face's levels at its own size, eyes or whole face, and their luma (of green, 0-255) in the window."""
 
     levels: LevelSet
+    geometry: Geometry
     luma: NDArray[np.float32]
+
+    @property
+    def eyes(self) -> tuple[float, float]:
+        """Columns in px of the eyes' middles."""
+        middle, apart = self.geometry.size_px[0] / 2, self.px(self.geometry.inter_ocular_mm)
+        return middle - apart / 2, middle + apart / 2
+
+    def px(self, mm: float) -> float:
+        """Pixels of so many mm."""
+        return mm * self.geometry.px_per_mm
 
 
 @pytest.fixture(scope="module", params=NAMES)
 def face(request: pytest.FixtureRequest) -> Face:
-    levels = find_character(request.param).levels(SIZE)
-    return Face(levels, 255 * GAMMA[levels.levels[..., 1]])
+    character = find_character(request.param)
+    levels = character.levels(character.geometry.size_px)
+    return Face(levels, character.geometry, 255 * GAMMA[levels.levels[..., 1]])
 
 
 def test_brows_nose_and_edges_stand_still_to_the_bit(face: Face) -> None:
     closing = np.concatenate([np.zeros(20), np.linspace(0, 1, 45), np.linspace(1, 0, 75), np.zeros(20)])
     frames = np.stack(list(FramePainter(face.levels).frames(ClipCurve(closing, 20), 30, blur=True)))
-    luma = frames[:, : SIZE[1]]
+    luma = frames[:, : face.geometry.size_px[1]]
     assert np.ptp(luma.astype(int), axis=0).max() > 50
     still = np.ones(luma.shape[1:], bool)
-    for eye in EYES:
-        still[85:357, round(eye - 25 * PX_PER_MM) : round(eye + 25 * PX_PER_MM)] = False
-    still[:, round(480 - 9 * PX_PER_MM) : round(480 + 9 * PX_PER_MM)] = True
+    for eye in face.eyes:
+        still[slice(*face.geometry.blink_rows), round(eye - face.px(25)) : round(eye + face.px(25))] = False
+    nose = face.geometry.size_px[0] / 2
+    still[:, round(nose - face.px(9)) : round(nose + face.px(9))] = True
     assert still.mean() > 0.35
     assert not np.ptp(luma[:, still].astype(int), axis=0).any()
 
@@ -56,7 +65,8 @@ def test_no_level_pops(face: Face) -> None:
     # A level that is out of line doubles the steps to it and from it.
     assert (size / around).max() < 1.7
     # No patch of 1 mm changes between neighbours by more than a lash does that passes it.
-    assert max(float(cv2.blur(step, (8, 8)).max()) for step in steps) < 45
+    patch = round(face.px(1.05))
+    assert max(float(cv2.blur(step, (patch, patch)).max()) for step in steps) < 45
 
 
 def test_noise_neither_flickers_nor_sticks(face: Face) -> None:
@@ -69,9 +79,9 @@ def test_noise_neither_flickers_nor_sticks(face: Face) -> None:
 
 def test_the_lid_covers_the_catchlight_once(face: Face) -> None:
     window = face.levels.window
-    for eye in EYES:
+    for eye in face.eyes:
         column = eye - window.x
-        iris = face.luma[:, :, round(column - 4 * PX_PER_MM) : round(column + 4 * PX_PER_MM)]
+        iris = face.luma[:, :, round(column - face.px(4)) : round(column + face.px(4))]
         spot = iris[0] > iris[0].max() - 25
         shown = iris[:, spot].mean(axis=1) / iris[0, spot].mean()
         covered = int(np.argmax(shown < 0.6))

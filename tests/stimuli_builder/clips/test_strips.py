@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from stimuli_builder.clips.strips import SIZE_PX, STEPS, strip, write_strips
+from stimuli_builder.characters.example import write_example_character
+from stimuli_builder.clips.strips import SIZE_PX, STEPS, strip, strip_names, write_strips
 
 
 def test_the_eye_closes_from_the_first_frame_to_the_last() -> None:
@@ -23,3 +24,9 @@ def test_the_declaration_names_what_was_written(tmp_path: Path) -> None:
     assert declared["characters"] == ["cartoon"]
     assert (declared["closures"][0], declared["closures"][-1]) == (0.0, 1.0)
     assert written == [("cartoon", (tmp_path / "cartoon.webp").stat().st_size)]
+
+
+def test_a_character_higher_than_a_strip_gets_none(tmp_path: Path) -> None:
+    higher = str(write_example_character(tmp_path / "higher"))
+    assert strip_names(["cartoon", higher, "alder"]) == ("cartoon", "alder")
+    assert {"cartoon", "alder", "birch", "cedar", "hazel"} <= set(strip_names())
