@@ -1,6 +1,6 @@
 """Degradation mean opinion scores (ITU-T P.910): impairment by cell, and against the rated reference."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -184,8 +184,15 @@ def _said(every: tuple[CellScore, ...]) -> tuple[str, ...]:
     told = [one for one in every if np.isfinite(one.dmos)]
     if not told:
         return ("No cell has a rating.",)
+    # Scales may differ in their range: cells are compared on one scale at a time.
+    scales = tuple(dict.fromkeys(one.scale for one in told))
+    return tuple(_said_of([one for one in told if one.scale == scale], len(scales) > 1) for scale in scales)
+
+
+def _said_of(told: Sequence[CellScore], is_one_of_several: bool) -> str:
     least, most = max(told, key=lambda one: one.dmos), min(told, key=lambda one: one.dmos)
+    where = f"On {least.scale}, the" if is_one_of_several else "The"
     return (
-        f"The least impaired cell is {least.cell} (DMOS {fixed(least.dmos)}, n = {least.n}), the most "
-        f"impaired {most.cell} (DMOS {fixed(most.dmos)}, n = {most.n}).",
+        f"{where} least impaired cell is {least.cell} (DMOS {fixed(least.dmos)}, n = {least.n}), the most "
+        f"impaired {most.cell} (DMOS {fixed(most.dmos)}, n = {most.n})."
     )

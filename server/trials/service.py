@@ -183,7 +183,9 @@ def _answer(
 ) -> Answer:
     rated = rating.answer.given
     clips = [loaded.clips[ident] for ident in trial.clips.values()]
-    views = 1 if isinstance(rating.answer, CheckAnswer) else getattr(loaded.experiment.trial, "views", 1)
+    lengths = {role: loaded.lengths[loaded.clips[ident].sha256] for role, ident in trial.clips.items()}
+    is_check = isinstance(rating.answer, CheckAnswer)
+    shown_ms = max(lengths.values(), default=0.0) if is_check else loaded.experiment.trial.shown_ms(lengths)
     return Answer(
         run=run.id,
         run_id=run.public_id,
@@ -192,7 +194,7 @@ def _answer(
         play=rating.play,
         rated=rated,
         clips=tuple((clip.sha256, clip.bytes) for clip in clips),
-        clip_ms=max((1000 * views * clip.frames / clip.fps for clip in clips), default=0.0) * rated,
+        clip_ms=shown_ms * rated,
         received_at=received_at,
         answered_at=_with_zone(rating.answered_at_client),
         evidence=rating.evidence,

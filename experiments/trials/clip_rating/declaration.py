@@ -1,5 +1,6 @@
 """The keys of a [trial] whose kind is `clip_rating`."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -82,6 +83,12 @@ class ClipRating(TrialDeclaration):
     def rates(self, experiment: "Experiment", clip: ClipSpec) -> bool:
         """Every clip, but references that are not rated themselves."""
         return self.reference is None or self.reference.rates(experiment, clip)
+
+    def shown_ms(self, lengths: Mapping[str, float]) -> float:
+        """The clip as often as it is shown; where there is a reference, both in turn and what is between."""
+        if "reference" in lengths and self.reference is not None:
+            return sum(lengths.values()) + self.reference.gap_ms
+        return self.views * super().shown_ms(lengths)
 
     def fault(self, experiment: "Experiment") -> str | None:
         """More views of a long performance than a trial may log; a reference that does not fit."""

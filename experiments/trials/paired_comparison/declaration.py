@@ -1,5 +1,6 @@
 """The keys of a [trial] whose kind is `paired_comparison`."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -206,6 +207,17 @@ class PairedComparison(TrialDeclaration):
             if missing:
                 raise ValueError(f"{path} has no text in '{missing[0]}', which the question has")
         return self
+
+    def shown_ms(self, lengths: Mapping[str, float]) -> float:
+        """Both clips, at once or in turn; before them the reference, where there is one."""
+        pair = {role: length for role, length in lengths.items() if role != "reference"}
+        shown = self.presentation
+        lasted = super().shown_ms(pair)
+        if isinstance(shown, OneAfterTheOther) and pair:
+            lasted = sum(pair.values()) + shown.gap_ms
+        if self.reference is not None and "reference" in lengths:
+            lasted += lengths["reference"] + self.reference.gap_ms
+        return lasted
 
     def fault(self, experiment: "Experiment") -> str | None:
         """What in the pairs does not fit the experiment, in one line; None where all is well."""

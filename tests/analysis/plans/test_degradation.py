@@ -89,3 +89,31 @@ def test_answers_on_a_reversed_scale_are_turned(tmp_path: Path) -> None:
     assert [one | {"turned": True} for one in plain] == reversed_
     assert "The least impaired cell is both" in report
     assert "reverse-keyed scale are turned" in report
+
+
+def test_cells_are_compared_on_one_scale_at_a_time(tmp_path: Path) -> None:
+    """Scales may differ in range: the lowest cell of a slider to 100 is above the best of points to 5."""
+    question = DEMO[DEMO.index("question") : DEMO.index("\n", DEMO.index("question"))]
+    scale = DEMO[DEMO.index("[trial.scale]") : DEMO.index("[trial.reference]")]
+    ends = 'low = { en = "none", de = "kein" }\nhigh = { en = "all", de = "alle" }\n'
+    slider = f'[[trial.scales]]\nname = "sharpness"\ntype = "slider"\n{question}\n{ends}\n'
+    several = scale.replace("[trial.scale]\n", '[[trial.scales]]\nname = "impairment"\n')
+    given = {"both": (5, 60), "vertical": (3, 90), "none": (1, 70)}
+    answers = [
+        {
+            "participant": f"p{person}",
+            "run": f"r{person}",
+            "kind": "main",
+            "lower_lid": level,
+            "exemplar": "1",
+            "trial_index": str(index),
+            "scale": name,
+            "response": str(rated),
+        }
+        for index, (level, both) in enumerate(given.items())
+        for name, rated in zip(("impairment", "sharpness"), both, strict=True)
+        for person in range(4)
+    ]
+    _, report = scores(tmp_path / "several", DEMO.replace(scale, several + slider), answers)
+    assert "On impairment, the least impaired cell is both (DMOS 5.00" in report
+    assert "On sharpness, the least impaired cell is vertical (DMOS 90.00" in report

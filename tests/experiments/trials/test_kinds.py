@@ -21,6 +21,7 @@ from experiments.schema.upgrades import FORMAT
 from experiments.trials import KINDS, reserved_names, views
 from experiments.trials.counts import block_sizes, trials_per_participant
 from experiments.trials.kind import Kind
+from tests.conftest import REPOSITORY
 from tests.experiments.trials.toy import TOY
 
 ALL = [*KINDS.values(), TOY]
@@ -161,3 +162,37 @@ def test_the_toy_is_gone_afterwards() -> None:
     assert TOY.name not in KINDS
     with pytest.raises(DefinitionError, match="no such kind 'same_or_not'"):
         parse_experiment(text_with(TOY.example))
+
+
+@pytest.mark.parametrize(
+    ("demo", "lengths", "lasted"),
+    [
+        ("exp1", {"shown": 1500.0}, 1500.0),
+        ("dcr-demo", {"shown": 1000.0, "reference": 1200.0}, 4200.0),
+        ("dcr-demo", {}, 0.0),
+        ("pairs-demo", {"left": 1000.0, "right": 1300.0}, 1300.0),
+        ("threshold-demo", {"shown": 1000.0}, 1000.0),
+    ],
+)
+def test_a_showing_lasts_as_long_as_what_is_shown_in_turn(
+    demo: str, lengths: dict[str, float], lasted: float
+) -> None:
+    declared = parse_experiment(
+        (REPOSITORY / "experiments" / f"{demo}.toml").read_text(encoding="utf-8")
+    ).trial
+    assert declared.shown_ms(lengths) == lasted
+
+
+def test_a_pair_in_turn_lasts_as_long_as_both() -> None:
+    at_once = (REPOSITORY / "experiments" / "pairs-demo.toml").read_text(encoding="utf-8")
+    shown = '{ arrangement = "side_by_side", gap_mm = 8.0, if_too_narrow = "stack" }'
+    assert shown in at_once
+    declared = parse_experiment(
+        at_once.replace(shown, '{ arrangement = "one_after_the_other", gap_ms = 300 }')
+    )
+    assert declared.trial.shown_ms({"first": 1000.0, "second": 1300.0}) == 2600.0
+
+
+def test_two_intervals_last_as_long_as_both() -> None:
+    declared = parse_experiment(KINDS["threshold"].example).trial
+    assert declared.shown_ms({"first": 1000.0, "second": 1000.0}) == 2500.0
