@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterator
 
@@ -194,5 +195,6 @@ def test_a_pair_in_turn_lasts_as_long_as_both() -> None:
 
 
 def test_two_intervals_last_as_long_as_both() -> None:
-    declared = parse_experiment(KINDS["threshold"].example).trial
+    threshold = KINDS["threshold"]
+    declared = threshold.declaration.model_validate(tomllib.loads(threshold.further_examples[0])["trial"])
     assert declared.shown_ms({"first": 1000.0, "second": 1000.0}) == 2500.0
