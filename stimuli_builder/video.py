@@ -185,9 +185,15 @@ def _upright(frame: Any, picture: Picture) -> Picture:
 
 
 def _decode(path: Path, read: Callable[[Any], Picture] = grey) -> Iterator[tuple[int | None, Picture]]:
+    """Decode a file from its start; a decoder fills spoilt parts of a frame from others and only marks it."""
     with opened(path) as (container, stream):
         try:
-            for frame in container.decode(stream):
+            for number, frame in enumerate(container.decode(stream)):
+                if frame.is_corrupt:
+                    raise DamagedFileError(
+                        f"{path}: damaged, frame {number} holds bytes that cannot be decoded; "
+                        "copy the file again"
+                    )
                 yield frame.pts, read(frame)
         except av.error.FFmpegError as error:
             raise DamagedFileError(

@@ -1,6 +1,7 @@
 """Recordings that go wrong on the way: each ends in one line, or in frames that say why they are lost."""
 
 import csv
+import re
 from fractions import Fraction
 from itertools import islice
 
@@ -192,19 +193,61 @@ def test_only_the_video_s_own_length_tells_how_many_frames_are_missing(recording
     assert declared_frames(taken) == 100
 
 
-@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
-def test_no_frame_that_the_decoder_patched_is_taken(recording, tmp_path, share):
-    whole, path = tmp_path / "whole.mp4", tmp_path / "flipped.mp4"
-    written(whole, recording.pictures, fps=100, options={"movflags": "faststart"})
+def flipped(whole, path, share):
+    """Write a copy of an MP4 with three bytes flipped, that share into its pictures."""
     content = bytearray(whole.read_bytes())
     start = content.index(b"mdat") + 4
     at = start + int((len(content) - start) * share)
     content[at : at + 3] = bytes(255 - value for value in content[at : at + 3])
     path.write_bytes(bytes(content))
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(recording, tmp_path_factory):
+    return written(
+        tmp_path_factory.mktemp("whole") / "w.mp4",
+        recording.pictures,
+        fps=100,
+        options={"movflags": "faststart"},
+    )
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_no_frame_that_the_decoder_patched_is_taken(whole, recording, tmp_path, share):
+    path = flipped(whole, tmp_path / "flipped.mp4", share)
     taken = scan_before_damage(path).frame_count
     assert 0 < taken < len(recording.pictures)
     for spoilt, exact in islice(zip(frames(path), frames(whole), strict=False), taken):
         assert (spoilt == exact).all()
+
+
+def test_bytes_spoilt_in_the_middle_are_refused_and_the_refusal_says_where(whole, lesson, stimuli, tmp_path):
+    path = flipped(whole, tmp_path / "flipped.mp4", 0.5)
+    model, out = tmp_path / "m.npz", tmp_path / "t.csv"
+    save_model(lesson.model, model)
+    given = ("track", path, "--model", model, "--out", out)
+    code, _, error = stimuli(*given)
+    assert (code, error.count("\n")) == (2, 1)
+    assert re.search(r"damaged, frame \d+ holds bytes that cannot be decoded; copy the file again", error)
+    assert "--accept-damaged-end" in error
+    assert not out.exists()
+    code, said, error = stimuli(*given, "--accept-damaged-end")
+    assert (code, error) == (0, "")
+    assert "before the damage; the rest could not be read" in said or "declared; the rest" in said
+
+
+@pytest.mark.parametrize("groups", ["open-gop=1:keyint=20:bframes=3", "intra-refresh=1:keyint=20"])
+def test_frames_that_lean_on_others_across_groups_are_no_damage(recording, tmp_path, groups):
+    path = tmp_path / "groups.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=100, options={"x264-params": groups})
+        stream.height, stream.width = recording.pictures[0].shape
+        stream.pix_fmt = "yuv420p"
+        for picture in recording.pictures[:60]:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="gray")))
+        container.mux(stream.encode(None))
+    assert sum(1 for _ in frames(path)) == 60
 
 
 def test_a_file_without_a_readable_frame_is_refused_even_so(recording, tmp_path):
