@@ -1,6 +1,7 @@
 """What every test may use: the folder of real recordings, where it lies beside the checkout."""
 
 import os
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from xdist.scheduler import LoadFileScheduling
 
 # Most tests answer at once and without clips; those of evidence ask for refusals by their settings.
 os.environ.setdefault("PALPEBRA_EVIDENCE", "record")
+
+FAILED = pytest.StashKey[bool]()
 
 # The same examples in every run, however slow the machine: `--hypothesis-profile=default` looks for new ones.
 settings.register_profile(
@@ -74,6 +77,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank(source_file(item)))
     for item in items:
         item.add_marker(pytest.mark.flaky(reruns=reruns_of(source_file(item))))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Note on the test whether it failed, before it is taken down."""
+    report = yield
+    item.stash[FAILED] = report.failed or (call.when != "setup" and item.stash.get(FAILED, False))
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    """A failed test takes along all that its file and its process share: servers, databases, browsers.
+
+    The next try, and the tests after it, begin with what they would have had to themselves.
+    """
+    if item.stash.get(FAILED, False):
+        item.session._setupstate.teardown_exact(None)
 
 
 def reruns_of(path: str) -> int:
