@@ -1,6 +1,6 @@
 """Degradation mean opinion scores (ITU-T P.910): impairment by cell, and against the rated reference."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from experiments import design
 from experiments.design import ClipSpec
 from experiments.trials.clip_rating.declaration import clip_rating_of
 from experiments.trials.clip_rating.reference import RatingReference
+from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.scales import RatedScale, scales_of
 
 METHODS = (
@@ -142,7 +143,7 @@ def with_degradation(contents: Contents, prepared: Prepared) -> Contents:
     if reference is None:
         return contents
     every = scores(prepared)
-    part = Part((_table(every, prepared),), _said(every), "Degradation", key="degradation")
+    part = Part((_table(every, prepared),), extremes(every), "Degradation", key="degradation")
     named = tuple(replace(one, title=one.title or "Ratings") for one in contents.parts)
     return replace(
         contents,
@@ -180,19 +181,21 @@ def _range(low: float | None, high: float | None) -> str:
     return DASH if low is None or high is None else f"{fixed(low)} to {fixed(high)}"
 
 
-def _said(every: tuple[CellScore, ...]) -> tuple[str, ...]:
-    told = [one for one in every if np.isfinite(one.dmos)]
+def extremes(every: tuple[CellScore, ...]) -> tuple[str, ...]:
+    """The least and the most impaired cell of each scale, in words: scales of other ranges do not compare."""
+    return tuple(
+        _extremes_of([one for one in every if one.scale == scale], scale)
+        for scale in dict.fromkeys(one.scale for one in every)
+    ) or ("No cell has a rating.",)
+
+
+def _extremes_of(cells: list[CellScore], scale: str) -> str:
+    told = [one for one in cells if np.isfinite(one.dmos)]
+    on_scale = "" if scale == SCALE_NAME else f" on {scale}"
     if not told:
-        return ("No cell has a rating.",)
-    # Scales may differ in their range: cells are compared on one scale at a time.
-    scales = tuple(dict.fromkeys(one.scale for one in told))
-    return tuple(_said_of([one for one in told if one.scale == scale], len(scales) > 1) for scale in scales)
-
-
-def _said_of(told: Sequence[CellScore], is_one_of_several: bool) -> str:
+        return f"No cell has a rating{on_scale}."
     least, most = max(told, key=lambda one: one.dmos), min(told, key=lambda one: one.dmos)
-    where = f"On {least.scale}, the" if is_one_of_several else "The"
     return (
-        f"{where} least impaired cell is {least.cell} (DMOS {fixed(least.dmos)}, n = {least.n}), the most "
-        f"impaired {most.cell} (DMOS {fixed(most.dmos)}, n = {most.n})."
+        f"The least impaired cell{on_scale} is {least.cell} (DMOS {fixed(least.dmos)}, n = {least.n}), the "
+        f"most impaired {most.cell} (DMOS {fixed(most.dmos)}, n = {most.n})."
     )
