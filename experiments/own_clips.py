@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
+from experiments.factor_names import TAKES, name_and_prefix
 from experiments.trials import reserved_names
 
 Placed = dict[str, tuple[dict[str, str], int]]
@@ -148,19 +149,36 @@ def check_names(names: Iterable[str]) -> None:
 
 
 def suggest_pattern(names: Iterable[str]) -> str | None:
-    """A pattern where every name has the same number of parts between underscores; None elsewhere."""
-    stems = [PurePosixPath(name).stem.split("_") for name in names]
-    endings = {PurePosixPath(name).suffix for name in names}
-    if not stems or len({len(parts) for parts in stems}) != 1 or len(stems[0]) < 2:
+    """A pattern where every name has as many parts between underscores, or hyphens; None elsewhere.
+
+    Factors are called by what their levels give away (`factor_names`), else `factor1`, `factor2` and so on.
+    """
+    paths = [PurePosixPath(name) for name in names]
+    endings = {path.suffix for path in paths}
+    ending = endings.pop() if len(endings) == 1 else ".mp4"
+    for between in ("_", "-", " "):
+        if (stem := _suggested([path.stem for path in paths], between)) is not None:
+            return stem + ending
+    return None
+
+
+def _suggested(stems: Sequence[str], between: str) -> str | None:
+    split = [stem.split(between) for stem in stems]
+    if not split or len({len(parts) for parts in split}) != 1 or len(split[0]) < 2:
         return None
-    columns = list(zip(*stems, strict=True))
-    varying = [len(set(column)) > 1 for column in columns]
-    if not any(varying):
+    columns = list(zip(*split, strict=True))
+    varying = [position for position, column in enumerate(columns) if len(set(column)) > 1]
+    if not varying:
         return None
-    words: list[str] = []
-    for column, varies in zip(columns, varying, strict=True):
-        # A part that every name has is no factor: it stands in the pattern as it is.
-        words.append(f"{{factor{1 + sum('{' in word for word in words)}}}" if varies else column[0])
-    if varying[-1] and sum(varying) > 1 and all(part.isdigit() for part in columns[-1]):
-        words[-1] = "{" + FIRST_FIELD + "}"
-    return "_".join(words) + (endings.pop() if len(endings) == 1 else ".mp4")
+    words = [column[0] for column in columns]  # a part that every name has stands as it is
+    taken: set[str] = set()
+    for number, position in enumerate(varying, start=1):
+        guessed, head = name_and_prefix(columns[position])
+        last = position == len(columns) - 1 and len(varying) > 1
+        if last and (guessed in TAKES or (all(part.isdigit() for part in columns[position]))):
+            guessed = FIRST_FIELD
+        if guessed is None or guessed in taken:
+            guessed, head = f"factor{number}", ""
+        taken.add(guessed)
+        words[position] = f"{head}{{{guessed}}}"
+    return between.join(words)

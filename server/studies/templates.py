@@ -1,9 +1,11 @@
 """What participants do with one's own clips: trials to begin from, for an experimenter to edit further."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
 from experiments.errors import InputError
+from experiments.trials.clip_rating.scales.scale import SCALE_NAME
 from server.studies.schemas import OwnClips
 
 Levels = dict[str, list[str]]
@@ -17,6 +19,9 @@ IMPAIRMENT = (
 REFERENCE = "reference"
 """The level of a factor that names the reference by itself."""
 MIN_STIMULI = 3
+_HOW = re.compile(r"how ([a-z]{3,40}) (?:was|is|were|are|did|does|do)\b", re.IGNORECASE)
+_NOT_ASKED_FOR = {"much", "many", "often", "well", "long", "would", "pleasant"}
+"""Words behind 'how' that name no scale, and the name of the second slider."""
 
 
 def trial_of(asked: OwnClips, levels: Levels) -> dict[str, Any]:
@@ -40,10 +45,17 @@ def _points(asked: OwnClips) -> dict[str, Any]:
     return {"question": {"en": asked.question}, "low": {"en": asked.low}, "high": {"en": asked.high}}
 
 
+def _scale_name(question: str) -> str:
+    """`natural` of 'How natural was this clip?'; `rating` where a question does not say it so."""
+    fit = _HOW.match(question)
+    word = fit[1].lower() if fit else ""
+    return word if word and word not in _NOT_ASKED_FOR else SCALE_NAME
+
+
 def _sliders(asked: OwnClips) -> list[dict[str, Any]]:
     pleasant = {"question": {"en": "How pleasant was this clip?"}}
     return [
-        {"name": "asked", "type": "slider", **_points(asked)},
+        {"name": _scale_name(asked.question), "type": "slider", **_points(asked)},
         {
             "name": "pleasant", "type": "slider", **pleasant,
             "low": {"en": "very unpleasant"}, "high": {"en": "very pleasant"},

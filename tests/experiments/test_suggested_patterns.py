@@ -8,11 +8,19 @@ from experiments.own_clips import levels_from_names, suggest_pattern
 @pytest.mark.parametrize(
     ("names", "pattern"),
     [
-        (["fast_sad_1.mp4", "fast_happy_1.mp4", "slow_sad_2.mp4"], "{factor1}_{factor2}_{exemplar}.mp4"),
-        (["blink_slow_1.mp4", "blink_fast_2.mp4"], "blink_{factor1}_{exemplar}.mp4"),
+        (["fast_sad_1.mp4", "fast_happy_1.mp4", "slow_sad_2.mp4"], "{speed}_{emotion}_{exemplar}.mp4"),
+        (["blink_slow_1.mp4", "blink_fast_2.mp4"], "blink_{speed}_{exemplar}.mp4"),
         (["blink_100.mp4", "blink_200.mp4"], "blink_{factor1}.mp4"),
-        (["blink_slow_1.mp4", "blink_fast_1.mp4"], "blink_{factor1}_1.mp4"),
+        (["blink_slow_1.mp4", "blink_fast_1.mp4"], "blink_{speed}_1.mp4"),
         (["Ärm_x.mp4", "Örm_x.mp4"], "{factor1}_x.mp4"),
+        (
+            ["speed-slow_arm-left_1.mp4", "speed-fast_arm-right_2.mp4"],
+            "speed-{speed}_arm-{arm}_{exemplar}.mp4",
+        ),
+        (["rosie_dur100_take1.mp4", "hal_dur200_take2.mp4"], "{factor1}_dur{dur}_take{exemplar}.mp4"),
+        (["slow-left-1.mp4", "fast-right-2.mp4"], "{speed}-{side}-{exemplar}.mp4"),
+        (["slow_fast.mp4", "fast_slow.mp4"], "{speed}_{factor2}.mp4"),
+        (["cell-a_x.mp4", "cell-b_y.mp4"], "{factor1}_{factor2}.mp4"),
         (["one_1.mp4"], None),
         (["a_1.mp4", "b.mp4"], None),
     ],

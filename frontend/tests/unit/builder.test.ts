@@ -8,6 +8,7 @@ import { FORMS, inLanguages } from "../../src/admin/builder/bank";
 import { type Data, freeName, isTable, labelOf, listAt, type Path, valueAt, withMoved, withValue } from "../../src/admin/builder/data";
 import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
 import { type Editor, editorOf, effectOf, EXPERIMENT, type Schema, starter, starterOf } from "../../src/admin/builder/schema";
+import { helpOf } from "../../src/admin/builder/help";
 import { SECTIONS } from "../../src/admin/builder/sections";
 import { suggestionsFor } from "../../src/admin/builder/suggestions";
 
@@ -187,5 +188,23 @@ describe("words of the builder", () => {
   it("puts forms of the bank into the languages of the study", () => {
     const [first] = FORMS;
     expect(inLanguages(first?.form["title"], ["de", "fr"])).toEqual({ de: "Über Sie", fr: "About you" });
+  });
+});
+
+describe("help", () => {
+  const texts = [EXPERIMENT, ...Object.values(EXPERIMENT.$defs ?? {})].flatMap((table) => [
+    table,
+    ...Object.values(table.properties ?? {}),
+  ]);
+
+  it("names the labels of the page, never a key of the TOML", () => {
+    expect(helpOf({ description: "Nothing until `pointer_delay_ms` have passed." })).toBe(
+      "Nothing until “Pointer delay (ms)” have passed.",
+    );
+    expect(helpOf({ description: "Instead of the one: [[trial.scales]]." })).toBe("Instead of the one: “Scales”.");
+    expect(helpOf({ description: 'In ms; with `start = "fixation"`.' })).toBe("In ms; with “Start” is “fixation”.");
+    const named = texts.map(helpOf).filter((help) => /\[\[|`|\b[a-z]+_(ms|per|person|narrow|title|frames|mm|on_focus_lost)\b/.test(help));
+    // Columns of the exported data are called so there, too.
+    expect(named.filter((help) => !/px_per_mm|viewing_distance_mm/.test(help))).toEqual([]);
   });
 });

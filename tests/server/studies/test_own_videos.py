@@ -35,7 +35,7 @@ def test_videos_of_any_format_become_a_study(
     services: Services, experimenter: Admin, videos: list[tuple[str, bytes]]
 ) -> None:
     received = made_study(experimenter, videos)
-    assert received["suggested_pattern"] == "{factor1}_{exemplar}.mp4"
+    assert received["suggested_pattern"] == "{speed}_{exemplar}.mp4"
     sources = {file["name"]: file["source"] for file in received["files"]}
     assert sources["slow_2.mp4"] is None
     assert sources["slow_1.webm"]["changes"] == ["encoded as H.264, was vp9"]

@@ -37,7 +37,7 @@ OWN = ("fast_happy_1.mp4", "fast_happy_2.mp4", "fast_sad_1.mp4", "fast_sad_2.mp4
 def test_own_clips_become_a_study_by_a_file_name_pattern(experimenter: Admin) -> None:
     found = upload(experimenter, ("clips.zip", zipped(video_files(*OWN)))).json()
     assert len(found["files"]) == 8
-    assert found["suggested_pattern"] == "{factor1}_{factor2}_{exemplar}.mp4"
+    assert found["suggested_pattern"] == "{speed}_{emotion}_{exemplar}.mp4"
     body = {
         "name": "faces", "upload": found["id"], "levels": {"pattern": "{speed}_{mood}_{exemplar}.mp4"},
         "own_clips": {"title": "Faces", "question": "How friendly?", "low": "not at all", "high": "very"},

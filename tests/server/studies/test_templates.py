@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from server.studies.schemas import OwnClips
+from server.studies.templates import trial_of
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
 from tests.helpers.tiny_clips import encoded_video
@@ -69,3 +71,17 @@ def test_a_just_noticeable_difference_needs_numbers(experimenter: Admin, words: 
     files = [f"blink_{word}_{number}.mp4" for word in words for number in (1, 2)]
     refused = own_study(experimenter, "just_noticeable", files)
     assert (refused.status_code, "all numbers" in refused.json()["error"]["message"]) == (422, True)
+
+
+@pytest.mark.parametrize(
+    ("question", "name"),
+    [
+        ("How natural was this clip?", "natural"),
+        ("How alive is it?", "alive"),
+        ("How much did you like it?", "rating"),
+        ("Wie lebendig ist das?", "rating"),
+    ],
+)
+def test_a_slider_is_named_by_its_question(question: str, name: str) -> None:
+    trial = trial_of(OwnClips(template="sliders", title="Own", question=question), {})
+    assert [scale["name"] for scale in trial["scales"]] == [name, "pleasant"]

@@ -58,7 +58,7 @@ function OneScale({ scale, language }: { scale: Data; language: string }) {
   return (
     <Stack gap={6} miw={260} maw={480} w={isSlider ? "100%" : "auto"}>
       <Text ta="center">{textAt(scale["question"], [language]) || "–"}</Text>
-      {hasEnds && isSlider && <Slider min={minimum} max={maximum} defaultValue={minimum} label={null} thumbLabel="slider" />}
+      {hasEnds && isSlider && <SliderPreview minimum={minimum} maximum={maximum} />}
       {hasEnds && !isSlider && (
         <Group gap={4} justify="center" wrap="nowrap">
           {Array.from({ length: points }, (_, index) => (
@@ -77,5 +77,21 @@ function OneScale({ scale, language }: { scale: Data; language: string }) {
         </Group>
       )}
     </Stack>
+  );
+}
+
+/** As participants meet it: a line without a handle, and so without an answer, until it is touched. */
+function SliderPreview({ minimum, maximum }: { minimum: number; maximum: number }) {
+  const [value, setValue] = useState<number | null>(null);
+  return (
+    <Slider
+      className={value === null ? "untouched" : ""}
+      min={minimum}
+      max={maximum}
+      value={value ?? (minimum + maximum) / 2}
+      onChange={setValue}
+      label={null}
+      thumbLabel="slider"
+    />
   );
 }

@@ -4,6 +4,7 @@ import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "
 import { useState } from "react";
 import type { Schemas } from "../api";
 import { onDemand } from "../ui/onDemand";
+import { sizeRemark } from "./sizes";
 import type { Upload } from "./useUpload";
 
 const RATES = ["24", "25", "30", "50", "60"];
@@ -108,6 +109,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
   const { files } = received;
   const refused = files.filter(({ state }) => state === "refused").length;
   const changed = files.filter(({ source }) => source != null).length;
+  const size = sizeRemark(files);
   const twice = files.find(({ same_as }) => same_as != null);
   return (
     <Stack gap="xs">
@@ -140,6 +142,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
           {twice.name} holds the same bytes as {twice.same_as}. If they stand for different levels, one of them is the wrong file.
         </Alert>
       )}
+      {size !== null && <Alert color="yellow">{size}</Alert>}
       {!received.has_manifest && files.length > 0 && <FileTable files={inOrder(files)} onReplace={upload.replace} />}
     </Stack>
   );

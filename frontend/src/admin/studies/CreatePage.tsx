@@ -19,7 +19,7 @@ export function CreatePage() {
         maw={400}
       />
       <Tabs defaultValue="shipped">
-        <Tabs.List className="tabs-line">
+        <Tabs.List>
           <Tabs.Tab value="shipped">From a shipped experiment</Tabs.Tab>
           <Tabs.Tab value="clips">From your own clips</Tabs.Tab>
           <Tabs.Tab value="definition">From a definition (TOML)</Tabs.Tab>

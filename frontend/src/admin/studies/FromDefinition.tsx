@@ -1,10 +1,11 @@
-import { Button, Select, Stack, Text, TextInput } from "@mantine/core";
+import { Button, Select, Stack, TextInput } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, unwrap } from "../api";
 import { UploadClips } from "../clips/UploadClips";
 import { useUpload } from "../clips/useUpload";
 import { DefinitionEditor, useCheck } from "./DefinitionEditor";
+import { StillNeeded } from "./StillNeeded";
 import { useCreate } from "./useCreate";
 
 export function FromDefinition({ name }: { name: string }) {
@@ -17,6 +18,11 @@ export function FromDefinition({ name }: { name: string }) {
   const [pattern, setPattern] = useState("");
   const levels = upload?.has_manifest === true ? null : { pattern };
   const usable = useCheck(toml)?.design != null;
+  const needed = [
+    name === "" && "a short name (above)",
+    !usable && "a definition without problems",
+    upload === null && shipped === null && "clips built for it, or a shipped experiment to begin with",
+  ];
   return (
     <Stack>
       <Select
@@ -49,10 +55,10 @@ export function FromDefinition({ name }: { name: string }) {
           maw={500}
         />
       )}
-      {name === "" && <Text size="sm">Give the study a short name above.</Text>}
+      <StillNeeded parts={needed} />
       <Button
         style={{ alignSelf: "flex-start" }}
-        disabled={name === "" || !usable || (upload === null && shipped === null)}
+        disabled={needed.some(Boolean)}
         loading={create.isPending || sent.sending !== null || (sent.progress?.waiting ?? 0) > 0}
         onClick={() => create.mutate(upload === null ? { name, toml, shipped } : { name, toml, upload: upload.id, levels })}
       >

@@ -5,8 +5,12 @@ import { useState } from "react";
 import type { Schemas } from "../api";
 import { UploadClips } from "../clips/UploadClips";
 import { useUpload } from "../clips/useUpload";
+import { fieldsOf, levelsByPattern, unnamedFactors, withNames } from "./file-pattern";
+import { StillNeeded } from "./StillNeeded";
 import { TEMPLATES } from "./templates";
 import { useCreate } from "./useCreate";
+
+const MAX_ROWS = 100;
 
 export function FromOwnClips({ name }: { name: string }) {
   const upload = useUpload("new study");
@@ -21,6 +25,8 @@ export function FromOwnClips({ name }: { name: string }) {
   );
 }
 
+const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.length > 4 ? " …" : ""}`;
+
 interface LevelsProps {
   name: string;
   upload: Schemas["UploadOut"];
@@ -33,7 +39,10 @@ function Levels({ name, upload, onCreated }: LevelsProps) {
   const [csv, setCsv] = useState(`file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`);
   const [template, setTemplate] = useState(TEMPLATES[0]);
   const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
+  const [names, setNames] = useState<Record<string, string>>({});
+  const files = upload.files.map((file) => file.name);
   const create = useCreate(onCreated);
+  const needed = [name === "" && "a short name (above)", asked.title.trim() === "" && "a title of the study"];
   const field = (key: keyof typeof asked, label: string) => (
     <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
   );
@@ -57,7 +66,17 @@ function Levels({ name, upload, onCreated }: LevelsProps) {
             value={pattern}
             onChange={(event) => setPattern(event.currentTarget.value)}
           />
-          <Example pattern={pattern} files={upload.files.map((file) => file.name)} />
+          {unnamedFactors(pattern, files).map(({ field, levels }) => (
+            <TextInput
+              key={field}
+              label={`What are ${inWords(levels)}?`}
+              description={`The name of this factor in tables and figures, such as ‘robot’. Left open it is called ${field}.`}
+              value={names[field] ?? ""}
+              onChange={(event) => setNames({ ...names, [field]: event.currentTarget.value })}
+              maw={400}
+            />
+          ))}
+          <LevelsTable pattern={withNames(pattern, names)} files={files} />
         </>
       ) : (
         <Textarea
@@ -88,16 +107,16 @@ function Levels({ name, upload, onCreated }: LevelsProps) {
       {field("question", "Question")}
       {template.ends && field("low", "Lowest answer means")}
       {template.ends && field("high", "Highest answer means")}
-      {name === "" && <Text size="sm">Give the study a short name above.</Text>}
+      <StillNeeded parts={needed} />
       <Button
         style={{ alignSelf: "flex-start" }}
-        disabled={name === "" || asked.title === ""}
+        disabled={needed.some(Boolean)}
         loading={create.isPending}
         onClick={() =>
           create.mutate({
             name,
             upload: upload.id,
-            levels: by === "pattern" ? { pattern } : { csv },
+            levels: by === "pattern" ? { pattern: withNames(pattern, names) } : { csv },
             own_clips: { ...asked, template: template.value },
           })
         }
@@ -108,41 +127,42 @@ function Levels({ name, upload, onCreated }: LevelsProps) {
   );
 }
 
-/** Files of several formats follow one pattern. */
-const stemOf = (name: string) => name.replace(/\.[A-Za-z0-9]{1,4}$/, "");
-
-/** What the pattern reads from the first names. */
-function Example({ pattern, files }: { pattern: string; files: string[] }) {
-  const fields = [...pattern.matchAll(/\{([A-Za-z]\w*)\}/g)].map((match) => match[1] ?? "");
-  const source = stemOf(pattern)
-    .split(/\{[A-Za-z]\w*\}/)
-    .map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"))
-    .join("([^/]+?)");
-  const matcher = new RegExp(`^${source}$`);
+/** What the pattern reads from the names: all of a usual study, of thousands the first, those that do not fit before them. */
+function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
+  const fields = fieldsOf(pattern);
   if (fields.length === 0) return null;
+  const rows = levelsByPattern(pattern, files);
+  const strays = rows.filter(({ levels }) => levels === null).length;
   return (
-    <Table aria-label="What the pattern reads" className="wrap-anywhere">
-      <Table.Thead>
-        <Table.Tr>
-          <Table.Th>file</Table.Th>
-          {fields.map((field) => (
-            <Table.Th key={field}>{field}</Table.Th>
-          ))}
-        </Table.Tr>
-      </Table.Thead>
-      <Table.Tbody>
-        {files.slice(0, 4).map((file) => {
-          const match = matcher.exec(stemOf(file));
-          return (
-            <Table.Tr key={file}>
-              <Table.Td>{file}</Table.Td>
-              {fields.map((field, index) => (
-                <Table.Td key={field}>{match?.[index + 1] ?? "does not fit"}</Table.Td>
+    <div>
+      <Text size="sm" mb={4} role="status">
+        {strays === 0
+          ? `All ${files.length} file names fit the pattern.`
+          : `${strays} of ${files.length} file names do not fit the pattern.`}
+        {rows.length > MAX_ROWS && ` Shown are ${MAX_ROWS} of them.`}
+      </Text>
+      <div className="long-list levels" tabIndex={0} role="region" aria-label="Levels of the files">
+        <Table aria-label="What the pattern reads" className="wrap-anywhere">
+          <Table.Thead>
+            <Table.Tr>
+              <Table.Th>file</Table.Th>
+              {fields.map((field) => (
+                <Table.Th key={field}>{field}</Table.Th>
               ))}
             </Table.Tr>
-          );
-        })}
-      </Table.Tbody>
-    </Table>
+          </Table.Thead>
+          <Table.Tbody>
+            {rows.slice(0, MAX_ROWS).map(({ file, levels }) => (
+              <Table.Tr key={file}>
+                <Table.Td>{file}</Table.Td>
+                {fields.map((field, index) => (
+                  <Table.Td key={field}>{levels?.[index] ?? "does not fit"}</Table.Td>
+                ))}
+              </Table.Tr>
+            ))}
+          </Table.Tbody>
+        </Table>
+      </div>
+    </div>
   );
 }

@@ -15,6 +15,8 @@ const WORDS: Record<Status, [label: string, question: string]> = {
   closed: ["Close", "Nobody can begin any more; those under way may finish."],
 };
 
+const isOpen = (status: Status) => status === "live" || status === "pilot";
+
 export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
   const [opened, setOpened] = useState(false);
   const path = { params: { path: { study: summary.name } } };
@@ -22,8 +24,9 @@ export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] })
     (status: Status) => unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
     {
       touches: [["study", summary.name], ["studies"]],
-      done: "The status is changed.",
-      then: (detail) => setOpened(detail.summary.status === "live" || detail.summary.status === "pilot"),
+      // The dialog with the link says so itself; a message in the corner would lie over it on a phone.
+      done: ({ summary: { status } }) => (isOpen(status) ? null : "The status is changed."),
+      then: (detail) => setOpened(isOpen(detail.summary.status)),
     },
   );
   const preview = useChange(

@@ -5,7 +5,8 @@ import { notify } from "./notify";
 
 interface Options<T> {
   touches: QueryKey[];
-  done?: string;
+  /** What the corner of the page says then; null where the page says it in another way. */
+  done?: string | ((result: T) => string | null);
   then?: (result: T) => void;
   /** Done before what it touches is loaded again. */
   before?: () => void;
@@ -18,7 +19,8 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
     onSuccess: async (result) => {
       before?.();
       await Promise.all(touches.map((queryKey) => queries.invalidateQueries({ queryKey })));
-      if (done !== undefined) notify({ message: done, color: "teal" });
+      const message = typeof done === "function" ? done(result) : done;
+      if (message) notify({ message, color: "teal" });
       then?.(result);
     },
     onError: (error) => notify({ title: "That did not work", message: error.message, color: "red" }),

@@ -3,6 +3,7 @@
 import { Alert, Button, Fieldset, Menu, Select, Stack, Switch, Text } from "@mantine/core";
 import { languageName } from "../../ui/format";
 import { isTable, labelOf, listAt, type Path, pathName, tableAt, textAt } from "../data";
+import { helpOf } from "../help";
 import { type Editor, editorOf, mayBeNull, resolved, type Schema, starter, starterOf, withoutNull } from "../schema";
 import { useBuilderHere } from "../useBuilder";
 import { ElementButtons } from "./ElementButtons";
@@ -69,7 +70,7 @@ export function Variants(props: FieldProps) {
     <Stack gap="sm">
       <Select
         label={typeof props.path.at(-1) === "number" ? labelOf(editor.tag) : `${label}: ${editor.tag.replaceAll("_", " ")}`}
-        description={resolved(variant ?? {}).description?.replaceAll("`", "") ?? help}
+        description={variant === undefined ? help : helpOf(resolved(variant))}
         maw={480}
         allowDeselect={false}
         clearable={optional}
@@ -169,7 +170,7 @@ function Add({ path, of }: { path: Path; of: Schema }) {
           <Menu.Item key={tag} onClick={() => add(starterOf(editor, tag, builder.languages))}>
             {tag.replaceAll("_", " ")}
             <Text size="xs" c="dimmed" maw={380}>
-              {resolved(schema).description?.split("\n")[0]?.replaceAll("`", "")}
+              {helpOf({ description: resolved(schema).description?.split("\n\n")[0] ?? "" })}
             </Text>
           </Menu.Item>
         ))}

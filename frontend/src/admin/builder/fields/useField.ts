@@ -1,6 +1,7 @@
 /** What every editor of a key needs: its value, its label and help, what is wrong with it, and the way to set it. */
 
 import { keyName, labelOf, type Path, pathName, valueAt } from "../data";
+import { helpOf } from "../help";
 import { effectOf, resolved, type Schema } from "../schema";
 import { useBuilderHere } from "../useBuilder";
 
@@ -14,7 +15,7 @@ export function useField({ path, schema, required = false }: FieldProps) {
   const builder = useBuilderHere();
   const name = String(path.at(-1) ?? "");
   const measured = effectOf(keyName(path), builder.trialKind) === "measured";
-  const help = (resolved(schema).description ?? "").replaceAll("`", "").replaceAll(/\s+/g, " ");
+  const help = helpOf(resolved(schema));
   return {
     value: valueAt(builder.data, path),
     fallback: resolved(schema).default,

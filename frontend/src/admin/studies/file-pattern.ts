@@ -1,0 +1,64 @@
+/** What a pattern such as `{speed}_{exemplar}.mp4` reads from the names of files, as the server reads them. */
+
+const FIELD = /\{([A-Za-z]\w*)\}/g;
+/** Names that the server gives where levels do not give one away. */
+const NUMBERED = /^factor\d+$/;
+const EXEMPLAR = "exemplar";
+
+export interface FileLevels {
+  file: string;
+  /** What stands in the place of each field; null where the name does not fit. */
+  levels: string[] | null;
+}
+
+/** Files of several formats follow one pattern. */
+const stemOf = (name: string) => name.replace(/\.[A-Za-z0-9]{1,4}$/, "");
+
+export const fieldsOf = (pattern: string) => [...pattern.matchAll(FIELD)].map((match) => match[1] ?? "");
+
+/** Every file with its levels; those that do not fit come first. */
+export function levelsByPattern(pattern: string, files: readonly string[]): FileLevels[] {
+  const source = stemOf(pattern.normalize("NFC"))
+    .split(/\{[A-Za-z]\w*\}/)
+    .map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"))
+    .join("([^/]+?)");
+  const matcher = new RegExp(`^${source}$`);
+  return files
+    .map((file) => ({ file, levels: matcher.exec(stemOf(file.normalize("NFC")))?.slice(1) ?? null }))
+    .sort((a, b) => Number(a.levels !== null) - Number(b.levels !== null));
+}
+
+export interface Unnamed {
+  field: string;
+  levels: string[];
+}
+
+/** The factors whose names say nothing, each with its levels: somebody has to say what they are. */
+export function unnamedFactors(pattern: string, files: readonly string[]): Unnamed[] {
+  const read = levelsByPattern(pattern, files);
+  return fieldsOf(pattern).flatMap((field, position) =>
+    NUMBERED.test(field) ? [{ field, levels: [...new Set(read.flatMap(({ levels }) => levels?.[position] ?? []))] }] : [],
+  );
+}
+
+/** The pattern with factors called as somebody said; a name that is none, or is taken, leaves it as it is. */
+export function withNames(pattern: string, names: Readonly<Record<string, string>>): string {
+  const given = new Map<string, string>();
+  for (const field of fieldsOf(pattern)) {
+    const name = nameFrom(names[field] ?? "");
+    const taken = [...fieldsOf(pattern), ...given.values(), EXEMPLAR];
+    if (name !== "" && !taken.includes(name)) given.set(field, name);
+  }
+  return pattern.replaceAll(FIELD, (whole, field: string) => (given.has(field) ? `{${given.get(field) ?? ""}}` : whole));
+}
+
+/** "Robot type" is called `Robot_type`; letters beyond ASCII lose their marks. */
+function nameFrom(words: string): string {
+  const plain = words
+    .replaceAll("ß", "ss")
+    .normalize("NFD")
+    .replaceAll(/\p{M}/gu, "")
+    .replaceAll(/\W+/g, "_")
+    .replaceAll(/^[\d_]+|_+$/g, "");
+  return plain.slice(0, 40);
+}

@@ -1,0 +1,43 @@
+import { describe, expect, it } from "vitest";
+import { sizeRemark } from "../../src/admin/clips/sizes";
+import { levelsByPattern, unnamedFactors, withNames } from "../../src/admin/studies/file-pattern";
+
+const FILES = ["rosie_slow_1.mp4", "hal_slow_1.webm", "hal_fast_2.mp4"];
+
+describe("levels by the names of files", () => {
+  it("are shown of every file, those that do not fit first", () => {
+    const read = levelsByPattern("{robot}_{speed}_{exemplar}.mp4", [...FILES, "notes.mp4"]);
+    expect(read.map(({ file }) => file)).toEqual(["notes.mp4", ...FILES]);
+    expect(read.map(({ levels }) => levels)).toEqual([null, ["rosie", "slow", "1"], ["hal", "slow", "1"], ["hal", "fast", "2"]]);
+  });
+
+  it("fit whichever way an accent is written", () => {
+    expect(levelsByPattern("Ärm_{side}.mp4".normalize("NFD"), ["Ärm_links.mp4"])).toEqual([{ file: "Ärm_links.mp4", levels: ["links"] }]);
+  });
+
+  it("ask what a factor without a name is", () => {
+    expect(unnamedFactors("{factor1}_{speed}_{exemplar}.mp4", FILES)).toEqual([{ field: "factor1", levels: ["rosie", "hal"] }]);
+  });
+
+  it("take names as somebody types them, and leave what is no name or taken", () => {
+    const pattern = "{factor1}_{factor2}_{exemplar}.mp4";
+    expect(withNames(pattern, { factor1: "Robot type", factor2: "Größe" })).toBe("{Robot_type}_{Grosse}_{exemplar}.mp4");
+    expect(withNames(pattern, { factor1: "speed", factor2: "speed" })).toBe("{speed}_{factor2}_{exemplar}.mp4");
+    expect(withNames(pattern, { factor1: "exemplar", factor2: "12" })).toBe(pattern);
+  });
+});
+
+describe("sizes of clips", () => {
+  const wide = (name: string) => ({ name, width_px: 640, height_px: 360 });
+
+  it("are remarked where one is upright among others", () => {
+    expect(sizeRemark([wide("a.mp4"), { name: "b.mp4", width_px: 360, height_px: 640 }, wide("c.mp4")])).toBe(
+      "b.mp4 is 360 x 640 pixels, most are 640 x 360. Is one turned the wrong way? Participants see the size, too: is it meant?",
+    );
+  });
+
+  it("are no matter where all are one, or not known", () => {
+    expect(sizeRemark([wide("a.mp4"), wide("b.mp4"), { name: "c.mp4", width_px: null, height_px: null }])).toBeNull();
+    expect(sizeRemark([])).toBeNull();
+  });
+});
