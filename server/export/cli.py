@@ -60,7 +60,7 @@ def export(
     """Write a study's data: as csv, the columns of experiments/columns and one column a factor.
 
     Participants have the study's pseudonyms. The file appears under its name only when complete. Beside a CSV
-    with one row a play stand a script for R (afex, emmeans, lme4) and one for Python (pandas, pingouin).
+    with one row a play stand a script for R (afex, emmeans, lme4) and one for Python (pandas, statsmodels).
 
     Examples:
 

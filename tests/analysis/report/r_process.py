@@ -14,6 +14,7 @@ for (path in commandArgs(TRUE)) {
   setwd(dirname(path))
   env <- new.env(parent = globalenv())
   end <- structure(class = c("ended", "error", "condition"), list(message = "", call = NULL))
+  env$commandArgs <- function(...) character()
   env$quit <- function(...) stop(end)
   tryCatch(sys.source(basename(path), envir = env), ended = function(e) NULL,
     error = function(e) cat("error:", conditionMessage(e), "\\n"))
