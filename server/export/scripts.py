@@ -1,4 +1,4 @@
-"""Scripts that analyse an export with the usual packages: R (afex, emmeans, lme4), Python (pandas, statsmodels).
+"""Scripts that analyse an export with usual packages: R (afex, emmeans, lme4), Python (pandas, statsmodels).
 
 They are written anew for each study, from its declaration, and read the long table of answers.
 """
