@@ -115,5 +115,5 @@ def test_cells_are_compared_on_one_scale_at_a_time(tmp_path: Path) -> None:
         for person in range(4)
     ]
     _, report = scores(tmp_path / "several", DEMO.replace(scale, several + slider), answers)
-    assert "On impairment, the least impaired cell is both (DMOS 5.00" in report
-    assert "On sharpness, the least impaired cell is vertical (DMOS 90.00" in report
+    assert "The least impaired cell on impairment is both (DMOS 5.00" in report
+    assert "The least impaired cell on sharpness is vertical (DMOS 90.00" in report
