@@ -9,7 +9,6 @@ import numpy as np
 from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.factors import ItemFactors
 from analysis.pairs.findings import Findings
-from analysis.pairs.likelihood import counted
 from analysis.report.r_script import SCRIPT
 from analysis.report.r_text import as_csv, r_number
 from analysis.report.templating import filled
@@ -29,7 +28,7 @@ STEEPEST = 1.0
 def pairs_files(
     title: str, comparisons: Comparisons, findings: Findings, factors: ItemFactors | None, key: str = ""
 ) -> dict[str, bytes]:
-    """The script of a report of pairs and the counts it reads, by file name.
+    """The script of a report of pairs and the counts of each rater that it reads, by file name.
 
     No file where nothing was fitted, or with Firth's penalty, which R itself does not have.
     """
@@ -37,11 +36,6 @@ def pairs_files(
         return {}
     script, data = (f"{key}-{name}" if key else name for name in (SCRIPT, "comparisons.csv"))
     ties = bool(comparisons.ties)
-    counts = counted(comparisons, ties=ties)
-    rows = [
-        [int(left) + 1, int(right) + 1, *(int(count) for count in outcomes)]
-        for left, right, outcomes in zip(counts.left, counts.right, counts.outcomes, strict=True)
-    ]
     shown = factors if findings.factors is not None else None
     text = filled(
         "verify-pairs.R.j2",
@@ -51,13 +45,27 @@ def pairs_files(
         data=data,
         items=[" ".join(name.split()) for name in comparisons.items],
         ties=ties,
+        raters=len(comparisons.participants) > 1,
         factors=[] if shown is None else [_codes(shown, name, comparisons.items) for name in shown.factors],
         printed=as_csv(_printed_pairs(comparisons, findings)).strip(),
         floor="1e-3",
         limit="1e-5",
     )
-    header = ["left", "right", "left_chosen", "right_chosen", *(["tied"] if ties else [])]
-    return {script: text.encode(), data: as_csv([header, *rows]).encode()}
+    header = ["rater", "left", "right", "left_chosen", "right_chosen", *(["tied"] if ties else [])]
+    return {script: text.encode(), data: as_csv([header, *_choices(comparisons, ties)]).encode()}
+
+
+def _choices(comparisons: Comparisons, ties: bool) -> Rows:
+    """How often each rater chose either side of a pair; raters and items are numbers."""
+    given = comparisons.participant
+    rater = np.zeros_like(comparisons.left) if given is None else given
+    asked, at = np.unique(
+        np.stack([rater, comparisons.left, comparisons.right], axis=1), axis=0, return_inverse=True
+    )
+    outcomes = np.zeros((len(asked), 3 if ties else 2), dtype=np.int64)
+    np.add.at(outcomes, (at.ravel(), comparisons.outcome), 1)
+    rows: Rows = np.hstack([asked + 1, outcomes]).tolist()
+    return rows
 
 
 def _codes(factors: ItemFactors, name: str, items: Sequence[str]) -> str:
@@ -74,10 +82,15 @@ def _printed_pairs(comparisons: Comparisons, findings: Findings) -> Rows:
     rows: Rows = []
     for item in result.items:
         rows += [["ability", number[item.name], item.ability], ["se", number[item.name], item.se]]
+        if item.se_robust is not None:
+            rows.append(["robust se", number[item.name], item.se_robust])
     for c in result.contrasts:
         label = f"{number[c.first]} {number[c.second]}"
         rows += [["difference", label, c.difference], ["difference se", label, c.se]]
         rows += [["difference p", label, c.p], ["difference p Holm", label, c.p_holm]]
+        if c.se_robust is not None:
+            rows += [["difference robust se", label, c.se_robust], ["difference robust p", label, c.p_robust]]
+            rows.append(["robust p Holm", label, c.p_robust_holm])
     if findings.equal is not None:
         rows += [["equal abilities", "chi2", findings.equal.chi2], ["equal abilities", "p", findings.equal.p]]
     if findings.order is not None:

@@ -41,7 +41,8 @@ def sizes(analysis: Analysis, names: Names) -> dict[str, Any]:
 def _effect(effect: Effect, names: Names) -> list[str]:
     several = effect.multivariate
     exact = several is not None and several.exact and bool(effect.within)
-    numbers = [effect.eta_sq_partial, *effect.eta_sq_partial_ci, effect.eta_sq_generalized]
+    numbers = [effect.eta_sq_partial, effect.omega_sq_partial, *effect.eta_sq_partial_ci]
+    numbers.append(effect.eta_sq_generalized)
     if exact and several is not None:
         numbers += [*several.eta_sq_partial_ci, several.f_value, several.df_effect, several.df_error]
     else:

@@ -47,7 +47,9 @@ def written(contents: Contents, folder: Path) -> Path:
 def test_r_agrees_with_abilities_differences_and_tests(tmp_path, ties) -> None:
     said = verify_with_r([written(of_pairs(tmp_path, ties), tmp_path)])
     assert "Every number agrees with R." in said
-    for table in ("ability", "difference p Holm", "equal abilities", "advantage of a side", "factor chi2"):
+    robust = ("robust se", "difference robust se", "difference robust p", "robust p Holm")
+    tests = ("difference p Holm", "equal abilities", "advantage of a side", "factor chi2")
+    for table in ("ability", *robust, *tests):
         assert re.search(rf"^{table} .*agree$", said, re.MULTILINE), said
 
 

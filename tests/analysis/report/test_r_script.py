@@ -57,7 +57,10 @@ def test_r_agrees_with_every_number(of_r, case) -> None:
 @pytest.mark.parametrize(
     ("case", "tables"),
     [
-        ("within", "sizes    partial, sizes    general, sizes    interval, sizes    mv interv."),
+        (
+            "within",
+            "sizes    partial, sizes    general, sizes    omega, sizes    interval, sizes    mv interv.",
+        ),
         ("within", "dz       dz, dz       interval, bayes    BF10, tost     A, tost     B"),
         (
             "both",
