@@ -40,12 +40,16 @@ class TrialDeclaration(Declaration):
         del experiment, clip
         return True
 
-    def shown_ms(self, lengths: Mapping[str, float]) -> float:
-        """How long one showing of a trial lasts at least, in ms, by how long its clips last by their roles.
+    def view_ms(self, lengths: Mapping[str, float]) -> float:
+        """How long one view of a trial lasts at least, in ms, by how long its clips last by their roles.
 
         Clips at once last as long as the longest; a kind that shows them in turn says so.
         """
         return max(lengths.values(), default=0.0)
+
+    def shown_ms(self, lengths: Mapping[str, float]) -> float:
+        """How long all views before an answer last at least, in ms; a kind that asks for several says so."""
+        return self.view_ms(lengths)
 
     def fault(self, experiment: "Experiment") -> str | None:
         """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""

@@ -58,7 +58,7 @@ class Answer:
     clips : tuple of (str, int)
         Hash and size of each clip of the trial, in order.
     clip_ms : float
-        How long the longest lasts, over all views, since clips may be shown side by side; 0 where nothing was
+        How long they last, at once or in turn with what is between, over all views; 0 where nothing was
         rated.
     received_at : datetime
         By the server's clock.

@@ -21,7 +21,7 @@ class ArrivingView:
     Attributes
     ----------
     clip_ms : float
-        How long its clips last, 0 unless it was shown to its end.
+        How long it lasts, 0 unless it was shown to its end.
     given_at : datetime
         By the client's clock.
     """

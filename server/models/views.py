@@ -33,7 +33,7 @@ class View(Base):
     issued_at : datetime or None
         Of its ticket's batch, by the server's clock; null without one.
     clip_ms : float or None
-        How long its clips last, where it was shown to its end.
+        How long it lasts, where it was shown to its end: its clips at once, or in turn with what is between.
     """
 
     __tablename__ = "views"

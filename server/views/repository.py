@@ -42,6 +42,13 @@ class StoredView(NamedTuple):
     completed: bool
 
 
+class TrialClips(NamedTuple):
+    """The ids of a trial's clips by their roles; `is_check` where it is a motion check."""
+
+    by_role: dict[str, int]
+    is_check: bool
+
+
 _RUN = Query(
     select(*(_runs.c[name] for name in RunOfViews._fields))
     .where(_runs.c.token_hash == bindparam("token_hash"))
@@ -54,10 +61,10 @@ _OF_TRIAL = Query(
     .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial")),
     StoredView._make,
 )
-_CLIPS_OF_TRIAL = Query[tuple[int]](
-    select(_clips.c.version_clip_id).where(
-        _clips.c.study_run_id == bindparam("run"), _clips.c.trial_index == bindparam("trial")
-    ),
+_CLIPS_OF_TRIAL = Query[tuple[str, int, str]](
+    select(_clips.c.role, _clips.c.version_clip_id, _trials.c.kind)
+    .select_from(_clips.join(_trials))
+    .where(_clips.c.study_run_id == bindparam("run"), _clips.c.trial_index == bindparam("trial")),
     tuple,
 )
 _CLIPS_CHOSEN = Query[tuple[int]](
@@ -113,9 +120,10 @@ def stored(connection: Connection, run: int, trial: int) -> list[StoredView] | N
     return [row for row in rows if row.view_id is not None]
 
 
-def clips_of_trial(connection: Connection, run: int, trial: int) -> list[int]:
-    """The ids of a trial's clips."""
-    return [ident for (ident,) in _CLIPS_OF_TRIAL.all(connection, {"run": run, "trial": trial})]
+def clips_of_trial(connection: Connection, run: int, trial: int) -> TrialClips:
+    """A trial's clips, and whether it is a motion check."""
+    rows = _CLIPS_OF_TRIAL.all(connection, {"run": run, "trial": trial})
+    return TrialClips({role: ident for role, ident, _ in rows}, any(kind == "check" for _, _, kind in rows))
 
 
 def clips_chosen(connection: Connection, run: int, trial: int) -> list[int]:

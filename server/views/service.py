@@ -18,11 +18,8 @@ from server.trials.service import TrialNotInRun
 from server.versions import LoadedVersion, Versions
 from server.views import repository
 from server.views.frame_log import packed, unpacked
-from server.views.repository import RunOfViews, StoredView
+from server.views.repository import RunOfViews, StoredView, TrialClips
 from server.views.schemas import SeenClip, ViewIn, ViewsIn, ViewsSaved, ViewState
-
-_Lengths = Mapping[int, Mapping[str, float]]
-"""Of each trial: how long its clips last in ms, by their hashes."""
 
 
 class ViewDiffers(Conflict):
@@ -104,22 +101,26 @@ def _says_more(view: ViewIn, row: StoredView | None) -> bool:
 def _clip_ms(
     connection: Connection, loaded: LoadedVersion, run: RunOfViews, views: Sequence[ViewIn]
 ) -> list[float]:
-    """How long the longest clip of each view lasts that was shown to its end, 0 for others.
+    """How long each view lasts that was shown to its end, 0 for others.
 
-    The clips are those of its trial: a view is no shorter for naming others. Where answers decide on clips,
-    they are those that it names of all that were chosen for the trial, since others may have been since.
+    As its kind shows its trial's clips: at once or in turn, with what is between. A view is no shorter for
+    naming others. Where answers decide on clips, they are those that it names of all that were chosen for
+    the trial, since others may have been since.
     """
-    shown = [_shows(view, run) for view in views]
-    trials = {view.trial_index for view, is_shown in zip(views, shown, strict=True) if is_shown}
-    own = {trial: _lengths(loaded, repository.clips_of_trial(connection, run.id, trial)) for trial in trials}
+    shown = [view for view in views if _shows(view, run)]
+    trials = {view.trial_index for view in shown}
+    clips = {trial: repository.clips_of_trial(connection, run.id, trial) for trial in trials}
+    chosen: dict[int, dict[str, float]] = {}
     if KINDS[loaded.experiment.trial.kind].adapts:
         chosen = {
             trial: _lengths(loaded, repository.clips_chosen(connection, run.id, trial)) for trial in trials
         }
-        longest = [_longest(view, own, chosen) for view in views]
-    else:
-        longest = [max(own.get(view.trial_index, {}).values(), default=0.0) for view in views]
-    return [length if is_shown else 0.0 for length, is_shown in zip(longest, shown, strict=True)]
+    return [
+        _length(loaded, view, clips[view.trial_index], chosen.get(view.trial_index, {}))
+        if _shows(view, run)
+        else 0.0
+        for view in views
+    ]
 
 
 def _shows(view: ViewIn, run: RunOfViews) -> bool:
@@ -134,12 +135,12 @@ def _lengths(loaded: LoadedVersion, clips: Iterable[int]) -> dict[str, float]:
     return {sha256: loaded.lengths[sha256] for sha256 in hashes}
 
 
-def _longest(view: ViewIn, own: _Lengths, chosen: _Lengths) -> float:
-    """Of the clips that a view names and that were chosen for its trial; of the trial's own without any."""
-    of_trial = own.get(view.trial_index, {})
-    known = {**chosen.get(view.trial_index, {}), **of_trial}
-    named = [known[clip.clip_sha256] for clip in view.clips if clip.clip_sha256 in known]
-    return max(named or of_trial.values(), default=0.0)
+def _length(loaded: LoadedVersion, view: ViewIn, clips: TrialClips, chosen: Mapping[str, float]) -> float:
+    """Of a view by its trial's clips, or by those it names in their roles that were chosen for the trial."""
+    named: dict[str, str] = {clip.role: clip.clip_sha256 for clip in view.clips}
+    own = {role: loaded.clips[ident].sha256 for role, ident in clips.by_role.items()}
+    lengths = {role: chosen.get(named.get(role, ""), loaded.lengths[sha256]) for role, sha256 in own.items()}
+    return max(lengths.values()) if clips.is_check else loaded.experiment.trial.view_ms(lengths)
 
 
 def _tickets(

@@ -84,11 +84,15 @@ class ClipRating(TrialDeclaration):
         """Every clip, but references that are not rated themselves."""
         return self.reference is None or self.reference.rates(experiment, clip)
 
-    def shown_ms(self, lengths: Mapping[str, float]) -> float:
-        """The clip as often as it is shown; where there is a reference, both in turn and what is between."""
+    def view_ms(self, lengths: Mapping[str, float]) -> float:
+        """The clip; where there is a reference, both in turn and what is between."""
         if "reference" in lengths and self.reference is not None:
             return sum(lengths.values()) + self.reference.gap_ms
-        return self.views * super().shown_ms(lengths)
+        return super().view_ms(lengths)
+
+    def shown_ms(self, lengths: Mapping[str, float]) -> float:
+        """The view as often as the clip is shown."""
+        return self.views * self.view_ms(lengths)
 
     def fault(self, experiment: "Experiment") -> str | None:
         """More views of a long performance than a trial may log; a reference that does not fit."""

@@ -208,11 +208,11 @@ class PairedComparison(TrialDeclaration):
                 raise ValueError(f"{path} has no text in '{missing[0]}', which the question has")
         return self
 
-    def shown_ms(self, lengths: Mapping[str, float]) -> float:
+    def view_ms(self, lengths: Mapping[str, float]) -> float:
         """Both clips, at once or in turn; before them the reference, where there is one."""
         pair = {role: length for role, length in lengths.items() if role != "reference"}
         shown = self.presentation
-        lasted = super().shown_ms(pair)
+        lasted = super().view_ms(pair)
         if isinstance(shown, OneAfterTheOther) and pair:
             lasted = sum(pair.values()) + shown.gap_ms
         if self.reference is not None and "reference" in lengths:

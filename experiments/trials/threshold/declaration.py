@@ -194,11 +194,11 @@ class Threshold(TrialDeclaration):
                 raise ValueError(f"task.{name} has no text in '{missing[0]}', which the question has")
         return self
 
-    def shown_ms(self, lengths: Mapping[str, float]) -> float:
+    def view_ms(self, lengths: Mapping[str, float]) -> float:
         """The one clip, or both in turn and what is between."""
         if isinstance(self.task, TwoInterval) and lengths:
             return sum(lengths.values()) + self.task.gap_ms
-        return super().shown_ms(lengths)
+        return super().view_ms(lengths)
 
     def fault(self, experiment: "Experiment") -> str | None:
         """What in the series does not fit the experiment, in one line; None where all is well."""

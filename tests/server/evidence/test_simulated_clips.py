@@ -23,17 +23,18 @@ VIEWS = SHORT.replace('kind = "clip_rating"', 'kind = "clip_rating"\nviews = 2')
 CLIP_S = 30 / 30
 
 SHOWN_S = {
-    "reference": (DCR, 2 * CLIP_S + 2.0),
-    "views": (VIEWS, 2 * CLIP_S),
-    "side by side": (PAIRS, CLIP_S),
-    "in turn": (PAIRS.replace(SIDE_BY_SIDE, IN_TURN), 3 * CLIP_S + 0.5),
-    "two intervals": (text_with(SHORT, TWO_INTERVAL), 2 * CLIP_S + 0.1),
+    "reference": (DCR, 2 * CLIP_S + 2.0, 1),
+    "views": (VIEWS, 2 * CLIP_S, 2),
+    "side by side": (PAIRS, CLIP_S, 1),
+    "in turn": (PAIRS.replace(SIDE_BY_SIDE, IN_TURN), 3 * CLIP_S + 0.5, 1),
+    "two intervals": (text_with(SHORT, TWO_INTERVAL), 2 * CLIP_S + 0.1, 1),
 }
+"""A declaration, how long its clips last before an answer, and in how many views."""
 
 
 @pytest.mark.parametrize("name", SHOWN_S)
 def test_answers_to_trials_of_several_clips_are_taken(services: Services, tmp_path: Path, name: str) -> None:
-    text, shown_s = SHOWN_S[name]
+    text, shown_s, per_answer = SHOWN_S[name]
     study = add_study(services, tmp_path / "clips", text, frames=30)
     manner = replace(manner_called("honest"), offline=0, reloads=0, clock_jumps=0)
     [run] = act(services.settings, study.link(synthetic=True), [Rater(1, 1, {})], manner, 1)
@@ -45,3 +46,4 @@ def test_answers_to_trials_of_several_clips_are_taken(services: Services, tmp_pa
     assert lengths
     assert min(lengths) > timedelta(seconds=shown_s)
     assert min(lengths) < timedelta(seconds=shown_s + 6)
+    assert [one.clip_ms for one in views] == pytest.approx([1000 * shown_s / per_answer] * len(views))

@@ -16,7 +16,7 @@ from server.app import create_app
 from server.context import Services
 from server.export.formats import FORMATS
 from server.migrate import current_revision, downgrade, newest_revision
-from server.models import Study
+from server.models import Study, View
 from server.simulation.acting import Actor
 from server.simulation.adversaries import act, manner_called
 from server.simulation.http import JsonClient, running_server
@@ -27,7 +27,7 @@ from server.tallies.recount import Recount
 from tests.helpers.databases import run_server_command
 from tests.helpers.motion_checks import CHECKS, checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
-from tests.helpers.thresholds import YES_NO, text_with
+from tests.helpers.thresholds import TWO_INTERVAL, YES_NO, text_with
 from tests.server.trials.test_comparisons import PAIRS
 from tests.server.trials.test_continuous import STUDY as TRACES
 
@@ -174,6 +174,26 @@ def test_every_kind_of_trial_has_checks(services: Services, tmp_path: Path, text
     assert len(exported) == 2 * len({row["block"] for row in exported}) >= 2
     assert all(row["check_response"] for row in exported)
     assert all(row["expected_response"] in map(str, range(1, 10)) for row in exported)
+
+
+def test_a_view_of_a_check_lasts_as_long_as_its_own_clip(
+    client: TestClient, services: Services, tmp_path: Path
+) -> None:
+    """Though the trials of its study show two in turn."""
+    study = add_study(services, tmp_path / "clips", checked(text_with(SHORT, TWO_INTERVAL)))
+    one = Participant(client, study.link_token).agree()
+    check, trial = (of_kind(one.state(), kind)[0] for kind in ("check", "main"))
+    seen = [
+        {"id": str(uuid.uuid4()), "trial_index": shown["trial_index"], "number": 1, "outcome": "shown"}
+        | {"started_at_client": "2026-11-21T10:00:00+00:00", "clips": []}
+        for shown in (check, trial)
+    ]
+    assert one.request("POST", "/views", {"views": seen}).status_code == 200
+    with services.database.read() as session:
+        lasted = {view.trial_index: view.clip_ms for view in session.query(View)}
+    own_ms, of_trial_ms = (1000 * shown["frames"] / shown["fps"] for shown in (check, trial))
+    assert lasted[check["trial_index"]] == pytest.approx(own_ms)
+    assert lasted[trial["trial_index"]] == pytest.approx(2 * of_trial_ms + 100), "both intervals and the gap"
 
 
 def test_the_command_simulates_observers_beside_checks(services: Services, tmp_path: Path) -> None:
