@@ -10,15 +10,24 @@ from numpy.typing import NDArray
 from scipy import special
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.models.columns import Grouping
 from analysis.models.design import ModelData, ModelTerms, RandomSlopes, Slopes, model_data, slope_groups
 from analysis.models.exact import refused_where_exact
 from analysis.models.kenward_roger import KenwardRoger, kenward_roger
 from analysis.models.profile import Profile
+from analysis.models.random_part import (
+    Component,
+    components_of_people,
+    degenerate_terms,
+    formula_of,
+    terms_of,
+    theta_names,
+    untold,
+)
 from analysis.models.reml import CrossProducts, criterion, cross_products
 from analysis.models.satterthwaite import Uncertainty, uncertainty
 from analysis.models.terms import Term
-from analysis.models.variances import SINGULAR_THETA, fit_theta
+from analysis.models.units import Units, units_of
+from analysis.models.variances import fit_theta
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -49,20 +58,6 @@ class Coefficient:
     df: float
     t: float
     p_value: float
-    ci: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Component:
-    """Standard deviation of a random term; `correlations` with the group's earlier terms, where estimated.
-
-    `ci` is its profile likelihood interval, where asked for and where it is a parameter of its own.
-    """
-
-    group: str
-    term: str
-    sd: float
-    correlations: tuple[float, ...] = ()
     ci: tuple[float, float] | None = None
 
 
@@ -158,22 +153,24 @@ def fit_mixed(
         raise InputError(f"expected more than {x.shape[1] + parameters + 1} ratings, got {len(data.rating)}")
     # matrices this small only wait for a second thread
     with threadpool_limits(1, "blas"):
-        c = cross_products(x, data.rating, random_terms)
+        units = units_of(data.rating)
+        c = cross_products(x, units.scaled(data.rating), random_terms)
         with refused_where_exact(data, random_terms):
             theta = fit_theta(c)
-        fitted = _Fitted(data, random_terms, c, theta)
+        fitted = _Fitted(data, random_terms, c, theta, units)
         result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes))
-        return _with_intervals(result, c, theta) if intervals else result
+        return _with_intervals(result, c, theta, units) if intervals else result
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """Coded trials, their random terms and cross-products, and the relative SDs of the REML estimate."""
+    """Coded trials, their random terms, cross-products in units of their own, the REML estimate's theta."""
 
     data: ModelData
     terms: list[Term]
     c: CrossProducts
     theta: Floats
+    units: Units
 
 
 def _result(
@@ -184,30 +181,33 @@ def _result(
     df_method: DfMethod,
     notes: tuple[str, ...],
 ) -> MixedResult:
-    data, c, theta = fitted.data, fitted.c, fitted.theta
+    data, c, theta, units = fitted.data, fitted.c, fitted.theta, fitted.units
     at = criterion(c, theta)
-    spread: Uncertainty | KenwardRoger = uncertainty(c, theta, at)
+    sigma = at.sigma * units.scale
+    known = uncertainty(c, theta, at)
+    notes += untold(known, theta_names(data, labels, slopes, random_slopes, c.blocks[0].theta.stop))
+    spread: Uncertainty | KenwardRoger = known
     if df_method == "kenward-roger":
         spread = kenward_roger(fitted.terms, c, theta, at, slopes == "correlated")
     effects = tuple(
         MixedEffect(effect, *spread.f_test(at.beta, data.differences(effect))) for effect in data.effects
     )
     factor = c.blocks[0].factor(theta)
-    components = (*_components(labels, factor, at.sigma, slopes, data),)
+    components = (*components_of_people(labels, factor, sigma, slopes, data),)
     for group, block in zip(data.groups[1:], c.blocks[1:], strict=True):
-        terms = _terms_of(data, group, random_slopes)
-        sds = at.sigma * theta[block.theta]
+        terms = terms_of(data, group, random_slopes)
+        sds = sigma * theta[block.theta]
         components += tuple(Component(group.name, *of) for of in zip(terms, map(float, sds), strict=True))
-    degenerate = _degenerate(components, factor, at.sigma)
-    components += (Component("residual", "", at.sigma),)
+    degenerate = degenerate_terms(components, factor, sigma)
+    components += (Component("residual", "", sigma),)
     return MixedResult(
-        formula=_formula(data, labels, slopes, random_slopes),
+        formula=formula_of(data, labels, slopes, random_slopes),
         slopes=slopes,
         effects=effects,
-        coefficients=tuple(_coefficients(data, at.beta, spread)),
+        coefficients=tuple(_coefficients(data, at.beta, spread, units)),
         components=components,
-        reml_criterion=at.value,
-        sigma=at.sigma,
+        reml_criterion=at.value + 2 * at.nu * np.log(units.scale),
+        sigma=sigma,
         theta=tuple(float(t) for t in theta),
         n_ratings=c.n,
         n_participants=len(data.participants.names),
@@ -220,7 +220,7 @@ def _result(
     )
 
 
-def _with_intervals(result: MixedResult, c: CrossProducts, theta: Floats) -> MixedResult:
+def _with_intervals(result: MixedResult, c: CrossProducts, theta: Floats, units: Units) -> MixedResult:
     """Add profile intervals; standard deviations of correlated slopes are no parameters and have none."""
     profile = Profile(c, theta)
     without = len(c.blocks[0].patterns[0]) if result.slopes == "correlated" else 0
@@ -229,9 +229,12 @@ def _with_intervals(result: MixedResult, c: CrossProducts, theta: Floats) -> Mix
     ends += [profile.sd(k) for k in range(first, len(theta))]
     ends.append(profile.sigma())
     coefficients = tuple(
-        replace(row, ci=profile.coefficient(column)) for column, row in enumerate(result.coefficients)
+        replace(row, ci=units.interval(profile.coefficient(column), intercept=column == 0))
+        for column, row in enumerate(result.coefficients)
     )
-    components = tuple(replace(row, ci=ci) for row, ci in zip(result.components, ends, strict=True))
+    components = tuple(
+        replace(row, ci=ci and units.interval(ci)) for row, ci in zip(result.components, ends, strict=True)
+    )
     named = [(row.name, row.ci) for row in coefficients]
     named += [(f"{row.group} {row.term}".strip(), row.ci) for row in components]
     open_ended = [name for name, ci in named if ci and not np.isfinite(ci).all()]
@@ -243,74 +246,14 @@ def _with_intervals(result: MixedResult, c: CrossProducts, theta: Floats) -> Mix
     return replace(result, coefficients=coefficients, components=components, notes=notes)
 
 
-def _degenerate(components: tuple[Component, ...], factor: Floats, sigma: float) -> tuple[str, ...]:
-    """What a singular fit says: which variances are zero, or that random terms depend on one another."""
-    zero = [f"{c.group} {c.term}" for c in components if c.sd < SINGULAR_THETA * sigma]
-    if zero:
-        return (
-            f"singular fit: the variance of {', '.join(zero)} is estimated as zero; these terms are kept at "
-            "zero, which leaves the tests of other effects as they are",
-        )
-    if np.linalg.svd(factor, compute_uv=False).min() < SINGULAR_THETA:
-        return ("singular fit: the random terms of participants depend on one another (a correlation of 1)",)
-    return ()
-
-
-def _terms_of(data: ModelData, group: Grouping, slopes: RandomSlopes) -> list[str]:
-    sloped = slopes != "none" and data.has_slopes(group)
-    return data.random_effects(slopes) if sloped else ["intercept"]
-
-
-def _formula(data: ModelData, labels: list[str], slopes: Slopes, random_slopes: RandomSlopes) -> str:
-    bar = "|" if slopes == "correlated" else "||"
-    of_people = f"({_in_formula(labels)} {bar} {data.terms.participant})"
-    others = ""
-    for group in data.groups[1:]:
-        terms = _terms_of(data, group, random_slopes)
-        others += f" + ({_in_formula(terms)} {'||' if len(terms) > 1 else '|'} {group.name})"
-    return f"{data.terms.rating} ~ {data.fixed_part} + {of_people}{others}"
-
-
-def _in_formula(labels: Sequence[str]) -> str:
-    return " + ".join("1" if label == "intercept" else label for label in labels)
-
-
-def _components(
-    labels: list[str], factor: Floats, sigma: float, slopes: Slopes, data: ModelData
-) -> list[Component]:
-    participant = data.terms.participant
-    covariance = sigma**2 * factor @ factor.T
-    sds = np.sqrt(np.diag(covariance))
-    of_column = [label for label in labels for _ in data.columns(label)]
-    if slopes != "correlated":
-        first = [of_column.index(label) for label in labels]
-        return [Component(participant, label, float(sds[i])) for label, i in zip(labels, first, strict=True)]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = covariance / np.outer(sds, sds)
-    return [
-        Component(participant, name, float(sds[i]), tuple(float(r) for r in correlation[i, :i]))
-        for i, name in enumerate(_told_apart(of_column))
-    ]
-
-
-def _told_apart(labels: Sequence[str]) -> list[str]:
-    """Labels of a factor's several contrasts numbered from 1; others as they are."""
-    seen: dict[str, int] = {}
-    names = []
-    for label in labels:
-        seen[label] = seen.get(label, 0) + 1
-        names.append(f"{label} contrast {seen[label]}" if labels.count(label) > 1 else label)
-    return names
-
-
-def _coefficients(data: ModelData, beta: Floats, spread: Uncertainty | KenwardRoger) -> list[Coefficient]:
-    rows = []
+def _coefficients(
+    data: ModelData, fitted: Floats, spread: Uncertainty | KenwardRoger, units: Units
+) -> list[Coefficient]:
+    beta, rows = fitted + units.middle / units.scale * np.eye(len(fitted))[0], []
     for i, name in enumerate(data.column_names):
         contrast = np.eye(len(beta))[[i]]
         f_value, _, df, p = spread.f_test(beta, contrast)
-        se = float(np.sqrt(spread.covariance[i, i]))
+        estimate, se = float(beta[i]) * units.scale, float(np.sqrt(spread.covariance[i, i])) * units.scale
         t = float(np.sign(beta[i]) * np.sqrt(f_value))
-        rows.append(
-            Coefficient(name, float(beta[i]), se, df, t, float(min(p, 2 * special.stdtr(df, -abs(t)))))
-        )
+        rows.append(Coefficient(name, estimate, se, df, t, float(min(p, 2 * special.stdtr(df, -abs(t))))))
     return rows

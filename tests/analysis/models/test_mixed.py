@@ -120,7 +120,7 @@ def test_shift_and_scale_change_no_test(shift, scale):
 
 def test_one_rating_a_cell_drops_the_slope_of_the_highest_interaction():
     rows = small_data(2, clips=1)
-    result = fit_mixed(rows, "who", "y", ["A", "B"], ["A", "clip"])
+    result = fit_mixed(rows, "who", "y", ["A", "B"])
     assert "A:B" in result.notes[0]
     assert all(c.term != "A:B" for c in result.components)
 
