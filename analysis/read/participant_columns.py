@@ -47,12 +47,26 @@ def design_of(
         value = one_value_each(rows, participant, name)
         levels.append(natural_order(sorted({str(text) for text in value.values()})))
         codes[:, k] = [levels[k].index(str(value[person])) for person in people]
+        _refuse_left_out(name, levels[k], codes[:, k], [str(one) for one in value.values()])
     numbers = []
     for name in covariates:
         measured = one_value_each(rows, participant, name)
         given: NDArray[np.float64] = np.array([measured[person] for person in people], dtype=np.float64)
         numbers.append(Covariate(name, given, float(given.mean()) if centred else 0.0, centred))
     return between_design(between, levels, codes, numbers, covariate_by_group)
+
+
+def _refuse_left_out(
+    name: str, levels: Sequence[str], codes: NDArray[np.int64], everybody: Sequence[str]
+) -> None:
+    """A group of which nobody rated every cell is another matter than one that has no members."""
+    gone = sorted(set(range(len(levels))) - set(codes.tolist()))
+    if gone:
+        level = levels[gone[0]]
+        raise InputError(
+            f"nobody in {name}={level} has a rating in every cell within participants, so that all "
+            f"{everybody.count(level)} were left out; leave out this group, or the level that they lack"
+        )
 
 
 def one_value_each(rows: pd.DataFrame, participant: str, name: str) -> dict[str, object]:

@@ -98,6 +98,14 @@ def test_an_empty_group_is_named(tmp_path) -> None:
     )
 
 
+def test_a_group_of_which_nobody_rated_every_cell_is_named(tmp_path) -> None:
+    file = tmp_path / "t.csv"
+    rows = [f"{i},{'gh'[i % 2]},{t},{i + t}\n" for i in range(8) for t in range(3) if (i % 2, t) != (1, 2)]
+    file.write_text("id,group,time,y\n" + "".join(rows))
+    said = str(anova(file, "--within", "time", "--between", "group").exception)
+    assert "nobody in group=h has a rating in every cell within participants, so that all 4 were" in said
+
+
 def test_a_participant_without_a_covariate_is_left_out_and_named(tmp_path) -> None:
     file = tmp_path / "t.csv"
     file.write_text(FULL.replace("3,g,29,", "3,g,,"))
