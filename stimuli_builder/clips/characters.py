@@ -51,7 +51,8 @@ class Geometry:
         if after and (first * scale < top or after * scale > top + height_px):
             raise InputError(
                 f"a picture of {width_px} x {height_px} px cuts off what moves in a blink of '{self.name}', "
-                f"which is {whole[1]} px high at that width; ask for a greater height"
+                f"which is {whole[1]} px high at that width; ask for a greater height (its own size: "
+                f"width_px = {self.size_px[0]}, height_px = {self.size_px[1]})"
             )
         return whole, top
 

@@ -2,7 +2,7 @@
 
 import json
 from functools import partial
-from itertools import groupby
+from itertools import accumulate, groupby
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,17 @@ import av
 import numpy as np
 from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from experiments.files import whole_file, whole_text
 from experiments.manifest import Clip, Manifest
 from stimuli_builder.clips.motion_blur import samples_per_frame
 
 Rgb = NDArray[np.uint8]
-THUMBNAIL_PX = (200, 75)
+THUMBNAIL_PX = (200, 160)
+"""Box that a frame on the sheet lies in: eyes are as wide as it, a whole face as high."""
 LABEL_PX = 230
+LABEL_HEIGHT_PX = 75
 PAPER, INK = (245, 244, 241), (40, 38, 36)
 PAGE_NAME, SHEET_NAME = "preview.html", "preview.png"
 
@@ -37,22 +39,23 @@ def write_preview(manifest: Manifest, folder: Path) -> tuple[Path, Path]:
 def contact_sheet(manifest: Manifest, folder: Path) -> Rgb:
     """One row a cell: the blink of its first exemplar, frame by frame."""
     firsts = [next(clips) for _, clips in groupby(manifest.clips, key=lambda clip: clip.cell)]
-    rows = [[_small(frame) for frame in blink_frames(folder / clip.file, clip)] for clip in firsts]
-    columns = max(len(frames) for frames in rows)
-    width, height = THUMBNAIL_PX
-    sheet = Image.new("RGB", (LABEL_PX + columns * (width + 2), len(rows) * (height + 2)), PAPER)
+    rows = [[thumbnail(frame) for frame in blink_frames(folder / clip.file, clip)] for clip in firsts]
+    columns, width = max(map(len, rows)), max(frame.width for frames in rows for frame in frames)
+    heights = [max(LABEL_HEIGHT_PX, *(frame.height for frame in frames)) + 2 for frames in rows]
+    sheet = Image.new("RGB", (LABEL_PX + columns * (width + 2), sum(heights)), PAPER)
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.load_default(15)
-    for number, (clip, frames) in enumerate(zip(firsts, rows, strict=True)):
-        top = number * (height + 2)
+    tops = [0, *accumulate(heights)]
+    for top, clip, frames in zip(tops[:-1], firsts, rows, strict=True):
         draw.multiline_text((8, top + 10), _label(clip), fill=INK, font=font, spacing=4)
         for column, frame in enumerate(frames):
-            sheet.paste(Image.fromarray(frame), (LABEL_PX + column * (width + 2), top))
+            sheet.paste(frame, (LABEL_PX + column * (width + 2), top))
     return np.asarray(sheet)
 
 
-def _small(frame: Rgb) -> Rgb:
-    return np.asarray(Image.fromarray(frame).resize(THUMBNAIL_PX, Image.Resampling.LANCZOS))
+def thumbnail(frame: Rgb) -> Image.Image:
+    """A frame as the sheet shows it: smaller, in its own proportions."""
+    return ImageOps.contain(Image.fromarray(frame), THUMBNAIL_PX, Image.Resampling.LANCZOS)
 
 
 def blink_frames(path: Path, clip: Clip) -> list[Rgb]:

@@ -15,6 +15,8 @@ from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet
 
+EARLIEST_DIMMING = {"alder-face": 0.6}
+"""Of faces whose catchlight lashes stand before: what of it half the lid's way shows at least (docs/characters.md)."""
 NAMES = sorted(json.loads((Path(__file__).parent / "shipped.json").read_text()))
 
 
@@ -86,5 +88,7 @@ def test_the_lid_covers_the_catchlight_once(face: Face) -> None:
         shown = iris[:, spot].mean(axis=1) / iris[0, spot].mean()
         covered = int(np.argmax(shown < 0.6))
         assert 0 < covered < 100
-        assert shown[: covered // 2].min() > 0.8
+        assert shown[: covered // 2].min() > EARLIEST_DIMMING.get(face.levels.name, 0.8)
+        # Lashes that pass may dim it for a while, by no more than this.
+        assert (shown[:covered] - np.minimum.accumulate(shown[:covered])).max() < 0.2
         assert shown[covered:].max() < 0.85

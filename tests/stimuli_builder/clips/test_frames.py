@@ -140,7 +140,11 @@ def test_other_sizes_are_resampled_with_still_edges(
 
 @pytest.mark.parametrize(
     ("size", "line"),
-    [((48, 40), "24 px high"), ((48, 10), "cuts off what moves in a blink of 'tiny', which is 24 px high")],
+    [
+        ((48, 40), "24 px high"),
+        ((48, 10), "cuts off what moves in a blink of 'tiny', which is 24 px high"),
+        ((48, 10), "its own size: width_px = 48, height_px = 24"),
+    ],
 )
 def test_a_size_that_cannot_show_the_blink_is_refused(
     tmp_path_factory: pytest.TempPathFactory, size: tuple[int, int], line: str
