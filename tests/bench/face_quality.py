@@ -68,7 +68,8 @@ def main() -> None:
     character = load_atlas(SHIPPED / name)
     made = character.declaration.provenance
     identity = Identity.model_validate(made["face"])
-    scene = FaceScene(load_facekit(facekit), identity, "eyes", character.size_px)
+    framing = "face" if name.endswith("-face") else "eyes"
+    scene = FaceScene(load_facekit(facekit), identity, framing, character.size_px)
     rendered = midpoints(made["rendered_closures"])
     between = midpoints([level.closure for level in character.declaration.levels])
     poses = [LidPose(closure) for closure in (*rendered, *between)]

@@ -16,7 +16,7 @@ from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet
 
 EARLIEST_DIMMING = {"alder-face": 0.6}
-"""Of faces whose catchlight lashes stand before: what of it half the lid's way shows at least (docs/characters.md)."""
+"""Faces with lashes before a catchlight (docs/characters.md): what of it half the lid's way leaves."""
 NAMES = sorted(json.loads((Path(__file__).parent / "shipped.json").read_text()))
 
 
