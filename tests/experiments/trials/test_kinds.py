@@ -5,6 +5,7 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -25,19 +26,28 @@ from experiments.trials.kind import Kind
 from tests.conftest import REPOSITORY
 from tests.experiments.trials.toy import TOY
 
-ALL = [*KINDS.values(), TOY]
+RATING = KINDS["clip_rating"]
+DEGRADED = next(one for one in RATING.further_examples if 'level = "none"' in one)
+OF_EXP3 = DEGRADED.replace('"compression"', '"lower_lid"').replace('level = "none"', 'level = "both"')
+ALL = {kind.name: kind for kind in (*KINDS.values(), TOY)} | {
+    "degradation": replace(RATING, example=OF_EXP3, roles=("shown", "reference"))
+}
+"""By name; ratings after a reference are the kind of single clips, with their example and clips."""
 
 
-@pytest.fixture(params=ALL, ids=lambda kind: kind.name)
+@pytest.fixture(params=ALL)
 def kind(request: pytest.FixtureRequest) -> Iterator[Kind]:
     """The kind, registered by the one line that a new kind needs."""
-    known = request.param.name in KINDS
-    KINDS[request.param.name] = request.param
+    made = ALL[request.param]
+    before = KINDS.get(made.name)
+    KINDS[made.name] = made
     Experiment.model_rebuild(force=True)
-    yield request.param
-    if not known:
-        del KINDS[request.param.name]
+    yield made
+    if before is None:
+        del KINDS[made.name]
         Experiment.model_rebuild(force=True)
+    else:
+        KINDS[made.name] = before
 
 
 def text_with(trial: str) -> str:

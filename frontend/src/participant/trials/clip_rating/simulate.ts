@@ -11,11 +11,12 @@ import type { ClipRatingData } from "./screen";
 import type { Scale } from "./widget";
 
 export async function simulatedRating(session: Session, { trial, play }: TrialParameters): Promise<ClipRatingData> {
-  const { scales } = declaredRating(session);
+  const { scales, reference } = declaredRating(session);
   const answers = Object.fromEntries(scales.map((scale) => [scale.name, { response: anyOf(scale) }]));
   const rt = 400 + Math.round(Math.random() * 1_200);
   const playback = playbackRecord(trial.clip_sha256, [], session.screen.record());
-  const body = ratingBody(session, trial, play, { kind: "clip_rating", answers }, playback, { rt, rt_from_first_frame: rt + 1_500 });
+  const answer = { kind: "clip_rating", answers, ...(reference && { reference_gap_ms: reference.gap_ms }) } as const;
+  const body = ratingBody(session, trial, play, answer, playback, { rt, rt_from_first_frame: rt + 1_500 });
   await saveRating(session, trial, body);
   return { response: onlyResponse(answers), rt, frames_missing: 0, key_to_first_frame_ms: null, again: play > 1 };
 }
