@@ -95,11 +95,14 @@ def anova(
 
 @plan.command(name="mixed")
 def mixed(
-    difference: Annotated[float, typer.Option(help="Between the two conditions, in rating points.")],
+    difference: Annotated[
+        str,
+        typer.Option(help="Of each further condition from the first, in rating points: 0.4, or 0.2,0.4."),
+    ],
     clips: Annotated[str, typer.Option(help="Numbers of clips, each tried: 8,16,32.")] = "8,16",
     faces: Annotated[str, typer.Option(help="Numbers of faces that the clips are of, each tried: 2,4.")] = "",
     crossed: Annotated[
-        bool, typer.Option("--crossed", help="Each clip in both conditions; else half in either.")
+        bool, typer.Option("--crossed", help="Each clip in every condition; else as many in each.")
     ] = False,
     repeats: Annotated[int, typer.Option(help="Ratings of a clip by a participant.", min=1)] = 1,
     sd_participant: Annotated[float, typer.Option(help="SD of participants' mean ratings.", min=0)] = 0.6,
@@ -116,19 +119,26 @@ def mixed(
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Plan a mixed model of two conditions: participants, clips, and faces as random factors.
+    """Plan a mixed model of conditions: participants, clips, and faces as random factors.
 
     Examples:
 
       analysis plan mixed --difference 0.4 --clips 8,16,32
 
       analysis plan mixed --difference 0.4 --clips 16 --faces 2,4,8 --n 20:60:20
+
+      analysis plan mixed --difference 0.2,0.4 --clips 12,24
     """
     from analysis.power.mixed_models import MixedDesign, Spreads
 
     spreads = Spreads(sd_participant, sd_slope, sd_clip, sd_face, sd_face_slope, sd_residual)
     design = MixedDesign(
-        difference, _counts(clips, "--clips"), _counts(faces, "--faces"), crossed, repeats, spreads
+        _numbers(difference, "--difference"),
+        _counts(clips, "--clips"),
+        _counts(faces, "--faces"),
+        crossed,
+        repeats,
+        spreads,
     )
     _simulate(design, "mixed model", (n, simulations, alpha, target, seed), plot, json)
 
@@ -136,14 +146,17 @@ def mixed(
 @plan.command(name="ordinal")
 def ordinal(
     difference: Annotated[
-        float, typer.Option(help="Between the conditions, in log odds of a higher rating: 0.5 is 1.65 to 1.")
+        str,
+        typer.Option(
+            help="Of each further condition from the first, in log odds of a higher rating: 0.5 is 1.65 to 1."
+        ),
     ],
     shares: Annotated[
         str, typer.Option(help="How often each rating is given in the first condition: 5,10,20,30,20,10,5.")
     ],
     clips: Annotated[int, typer.Option(help="Clips, shared evenly by the conditions.", min=2)] = 8,
     crossed: Annotated[
-        bool, typer.Option("--crossed", help="Each clip in both conditions; else half in either.")
+        bool, typer.Option("--crossed", help="Each clip in every condition; else as many in each.")
     ] = False,
     sd_participant: Annotated[float, typer.Option(help="SD of participants, in log odds.", min=0)] = 1.0,
     sd_slope: Annotated[float, typer.Option(help="SD of participants' differences.", min=0)] = 0.5,
@@ -156,18 +169,26 @@ def ordinal(
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Plan an ordinal mixed model of two conditions: ratings as ordered categories.
+    """Plan an ordinal mixed model of conditions: ratings as ordered categories.
 
     Examples:
 
       analysis plan ordinal --difference 0.5 --shares 5,10,20,30,20,10,5 --clips 16
 
       analysis plan ordinal --difference 0.4 --shares 1,2,4,2,1 --clips 8 --crossed --n 20:60:20
+
+      analysis plan ordinal --difference 0.3,0.6 --shares 1,2,4,2,1 --clips 12
     """
     from analysis.power.ordinal_models import OrdinalDesign
 
     design = OrdinalDesign(
-        difference, _numbers(shares, "--shares"), clips, crossed, sd_participant, sd_slope, sd_clip
+        _numbers(difference, "--difference"),
+        _numbers(shares, "--shares"),
+        clips,
+        crossed,
+        sd_participant,
+        sd_slope,
+        sd_clip,
     )
     _simulate(design, "ordinal mixed model", (n, simulations, alpha, target, seed), plot, json)
 

@@ -15,6 +15,7 @@ from analysis.models.reml import criterion, cross_products
 from analysis.models.satterthwaite import uncertainty
 from analysis.models.terms import Term
 from analysis.models.variances import fit_theta
+from analysis.power.conditions import refuse_no_difference, said_of_differences
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -29,7 +30,7 @@ class Spreads:
     participant, clip, face : float
         Of the mean rating.
     participant_difference, face_difference : float
-        Of the difference between the conditions.
+        Of the difference between any two conditions.
     residual : float
     """
 
@@ -43,24 +44,24 @@ class Spreads:
 
 @dataclass(frozen=True)
 class MixedDesign:
-    """Two conditions rated by participants who all see every clip; clips of as many faces as are asked for.
+    """Conditions rated by participants who all see every clip; clips of as many faces as are asked for.
 
     Attributes
     ----------
-    difference : float
-        Between the conditions, in rating units.
+    differences : tuple of float
+        Of every further condition from the first, in rating units.
     clips : tuple of int
         Numbers of clips, each tried; shared evenly by conditions (and faces).
     faces : tuple of int
         Numbers of faces, each tried; empty where faces are no random factor.
     crossed : bool
-        Whether each clip is shown in both conditions; else half of them in either.
+        Whether each clip is shown in every condition; else in one, as many in each.
     repeats : int
         Ratings of a clip (in a condition) by a participant.
     spreads : Spreads
     """
 
-    difference: float
+    differences: tuple[float, ...]
     clips: tuple[int, ...]
     faces: tuple[int, ...] = ()
     crossed: bool = False
@@ -71,15 +72,22 @@ class MixedDesign:
     )
 
     def __post_init__(self) -> None:
+        refuse_no_difference(self.differences)
         for clips, faces in self._combinations:
-            cell = faces * (1 if self.crossed else 2)
+            cell = faces * (1 if self.crossed else self.conditions)
             if clips % cell or clips // cell < 1 or clips < 2:
                 raise InputError(
                     f"{clips} clips cannot be shared evenly by {faces} faces"
-                    f"{'' if self.crossed else ' in two conditions'}; expected a multiple of {max(cell, 2)}"
+                    f"{'' if self.crossed else f' in {self.conditions} conditions'}; expected a multiple of "
+                    f"{max(cell, 2)}"
                 )
         if self.faces and min(self.faces) < 2:
             raise InputError("expected at least two faces; leave --faces out for a study of one")
+
+    @property
+    def conditions(self) -> int:
+        """How many there are."""
+        return len(self.differences) + 1
 
     @cached_property
     def _combinations(self) -> tuple[tuple[int, int], ...]:
@@ -103,16 +111,16 @@ class MixedDesign:
         """The population in a sentence."""
         s = self.spreads
         said = (
-            f"Two conditions differ by {self.difference:g} rating points; SDs: participants "
+            f"{said_of_differences(self.differences)} rating points; SDs: participants "
             f"{s.participant:g}, their difference {s.participant_difference:g}, clips {s.clip:g}, residual "
             f"{s.residual:g}"
         )
         if self.faces:
             said += f", faces {s.face:g}, their difference {s.face_difference:g}"
         shown = (
-            "each clip is shown in both conditions"
+            "each clip is shown in every condition"
             if self.crossed
-            else "half of the clips are of either condition"
+            else "each condition has as many of the clips"
         )
         return (
             f"{said}; {shown}, rated {'once' if self.repeats == 1 else f'{self.repeats} times'} by everybody"
@@ -132,17 +140,22 @@ class MixedDesign:
         return uncertainty(c, theta, at).f_test(at.beta, data.differences("condition"))[3]
 
     def _ratings(self, data: ModelData, rng: np.random.Generator) -> Floats:
-        s, side = self.spreads, data.fixed[data.cell, 1] / 2
+        s, condition = self.spreads, data.cell
         people, clip = data.groups[0], data.groups[1]
-        y = self.difference * side + rng.normal(0, s.residual, len(side))
+        y = np.array([0.0, *self.differences])[condition] + rng.normal(0, s.residual, len(condition))
         y += rng.normal(0, s.participant, len(people.names))[people.codes]
-        y += rng.normal(0, s.participant_difference, len(people.names))[people.codes] * side
+        y += self._apart(s.participant_difference, len(people.names), rng)[people.codes, condition]
         y += rng.normal(0, s.clip, len(clip.names))[clip.codes]
         if self.faces:
             face = data.groups[2]
             y += rng.normal(0, s.face, len(face.names))[face.codes]
-            y += rng.normal(0, s.face_difference, len(face.names))[face.codes] * side
+            y += self._apart(s.face_difference, len(face.names), rng)[face.codes, condition]
         return np.asarray(y, dtype=np.float64)
+
+    def _apart(self, sd: float, levels: int, rng: np.random.Generator) -> Floats:
+        """Each level's own part in every condition (levels, conditions): any two differ with this SD."""
+        own = rng.normal(0, sd / np.sqrt(2), (levels, self.conditions))
+        return np.asarray(own - own.mean(axis=1, keepdims=True), dtype=np.float64)
 
     def _coded(self, n: int, clips: int, faces: int) -> tuple[ModelData, list[Term]]:
         """Trials and random terms of the model; those of one design are coded once."""
@@ -151,7 +164,9 @@ class MixedDesign:
             shown = [
                 (clip, condition, clip % faces)
                 for clip in range(clips)
-                for condition in ((0, 1) if self.crossed else (clip // faces % 2,))
+                for condition in (
+                    range(self.conditions) if self.crossed else (clip // faces % self.conditions,)
+                )
                 for _ in range(self.repeats)
             ]
             rows = pd.DataFrame(

@@ -1,4 +1,4 @@
-"""Power of ordinal mixed models: ratings as ordered categories, two conditions."""
+"""Power of ordinal mixed models: ratings as ordered categories."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from analysis.models.ordinal import MAXIMUM_CATEGORIES, fit_ordinal
+from analysis.power.conditions import refuse_no_difference
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -17,21 +18,21 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OrdinalDesign:
-    r"""Two conditions rated on ordered categories by participants who all see every clip.
+    r"""Conditions rated on ordered categories by participants who all see every clip.
 
     Attributes
     ----------
-    difference : float
-        Between the conditions, in log odds of a higher category.
+    differences : tuple of float
+        Of every further condition from the first, in log odds of a higher category.
     shares : tuple of float
         How often each category is given to a clip of the first condition by a participant, both of no
         leaning of their own; they are divided by their sum.
     clips : int
         Shared evenly by the conditions.
     crossed : bool
-        Whether each clip is shown in both conditions; else half of them in either.
+        Whether each clip is shown in every condition; else in one, as many in each.
     sd_participant, sd_slope, sd_clip : float
-        In log odds: of participants, of their differences between the conditions, of clips.
+        In log odds: of participants, of their differences between any two conditions, of clips.
 
     Notes
     -----
@@ -39,7 +40,7 @@ class OrdinalDesign:
     cumulated shares.
     """
 
-    difference: float
+    differences: tuple[float, ...]
     shares: tuple[float, ...]
     clips: int
     crossed: bool = False
@@ -52,8 +53,17 @@ class OrdinalDesign:
             raise InputError(
                 f"expected the shares of 2 to {MAXIMUM_CATEGORIES} categories, all above 0: 5,15,30,30,20"
             )
-        if self.clips < 2 or (not self.crossed and self.clips % 2):
-            raise InputError(f"{self.clips} clips cannot be shared evenly by two conditions")
+        refuse_no_difference(self.differences)
+        if self.clips < 2 or (not self.crossed and self.clips % self.conditions):
+            raise InputError(
+                f"{self.clips} clips cannot be shared evenly by {self.conditions} conditions; expected a "
+                f"multiple of {self.conditions}, or --crossed"
+            )
+
+    @property
+    def conditions(self) -> int:
+        """How many there are."""
+        return len(self.differences) + 1
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -69,11 +79,12 @@ class OrdinalDesign:
     def population(self) -> str:
         """The population in a sentence."""
         shares = ", ".join(f"{share:.0%}" for share in self._shares)
-        shown = "each shown in both conditions" if self.crossed else "half of either condition"
-        odds = f"{np.exp(self.difference):.3g}"
+        shown = "each shown in every condition" if self.crossed else "as many of each condition"
+        odds = ", ".join(f"{np.exp(difference):.3g}" for difference in self.differences)
+        which = "the second" if self.conditions == 2 else "the further conditions"
         return (
             f"Ratings in {len(self.shares)} categories with shares {shares} in the first condition; the odds "
-            f"of a higher category are {odds} times as large in the second; SDs in log odds: participants "
+            f"of a higher category are {odds} times as large in {which}; SDs in log odds: participants "
             f"{self.sd_participant:g}, their difference {self.sd_slope:g}, clips {self.sd_clip:g}; "
             f"{self.clips} clips, {shown}, rated once by everybody"
         )
@@ -89,15 +100,17 @@ class OrdinalDesign:
         """Clip and condition of each of a participant's trials (trials, 2)."""
         clip = np.arange(self.clips)
         if not self.crossed:
-            return np.stack([clip, clip % 2], axis=1)
-        return np.stack([np.tile(clip, 2), np.repeat([0, 1], self.clips)], axis=1)
+            return np.stack([clip, clip % self.conditions], axis=1)
+        every = np.arange(self.conditions)
+        return np.stack([np.tile(clip, self.conditions), np.repeat(every, self.clips)], axis=1)
 
     def drawn(self, n: int, rng: np.random.Generator) -> pd.DataFrame:
         """One data set: participant, clip, condition and rating (1 for the first category) of each trial."""
         clip, condition = np.tile(self._shown, (n, 1)).T
         person = np.repeat(np.arange(n), len(self._shown))
-        slope = self.difference + self.sd_slope * rng.normal(size=n)
-        eta = self.sd_participant * rng.normal(size=n)[person] + slope[person] * condition
+        own = self.sd_slope / np.sqrt(2) * rng.normal(size=(n, self.conditions))
+        apart = np.array([0.0, *self.differences]) + own - own[:, :1]
+        eta = self.sd_participant * rng.normal(size=n)[person] + apart[person, condition]
         eta = eta + self.sd_clip * rng.normal(size=self.clips)[clip]
         thresholds = special.logit(np.cumsum(self._shares)[:-1])
         noise = special.logit(rng.uniform(size=len(eta)))

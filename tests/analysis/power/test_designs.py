@@ -72,7 +72,7 @@ def test_ties_come_as_often_as_asked_and_cost_power() -> None:
 
 def test_ordinal_ratings_have_their_shares_and_their_odds() -> None:
     shares = (0.1, 0.2, 0.3, 0.25, 0.15)
-    design = OrdinalDesign(0.7, shares, 10, sd_participant=0, sd_slope=0, sd_clip=0)
+    design = OrdinalDesign((0.7,), shares, 10, sd_participant=0, sd_slope=0, sd_clip=0)
     rows = design.drawn(4000, np.random.default_rng(1))
     first, second = (rows.loc[rows["condition"] == side, "rating"] for side in (0, 1))
     given = first.value_counts(normalize=True).sort_index()
@@ -85,7 +85,7 @@ def test_ordinal_ratings_have_their_shares_and_their_odds() -> None:
 def test_an_ordinal_model_has_the_power_of_whiteheads_formula() -> None:
     """Of independent ratings the variance of the log odds ratio is 12 / (N (1 - sum of mean shares^3))."""
     shares, theta, n, clips = np.array([0.25, 0.25, 0.25, 0.25]), 0.8, 12, 10
-    design = OrdinalDesign(theta, tuple(shares), clips, sd_participant=0, sd_slope=0, sd_clip=0)
+    design = OrdinalDesign((theta,), tuple(shares), clips, sd_participant=0, sd_slope=0, sd_clip=0)
     lower = special.expit(special.logit(np.cumsum(shares)[:-1]) - theta)
     mean = (shares + np.diff([0, *lower, 1])) / 2
     shift = theta / np.sqrt(12 / (n * clips * (1 - (mean**3).sum())))
@@ -99,7 +99,7 @@ def test_an_ordinal_model_has_the_power_of_whiteheads_formula() -> None:
 )
 def test_an_ordinal_design_that_cannot_be_is_refused(shares, clips, message) -> None:
     with pytest.raises(InputError, match=message):
-        OrdinalDesign(0.5, shares, clips)
+        OrdinalDesign((0.5,), shares, clips)
 
 
 def test_cells_correlate_as_asked(monkeypatch) -> None:
@@ -122,7 +122,7 @@ class _Nothing:
 def test_ratings_of_a_mixed_model_spread_as_they_say() -> None:
     """Variance of the difference: of people / N, of clips 4 / clips, of the rest 4 / ratings."""
     spreads = Spreads(0.5, 0.6, 0.4, 0.0, 0.0, 0.8)
-    design = MixedDesign(0.5, (8,), spreads=spreads)
+    design = MixedDesign((0.5,), (8,), spreads=spreads)
     data, _ = design._coded(10, 8, 1)
     side = data.fixed[data.cell, 1]
     rng = np.random.default_rng(5)
@@ -132,8 +132,33 @@ def test_ratings_of_a_mixed_model_spread_as_they_say() -> None:
     assert differences.var() == pytest.approx(0.6**2 / 10 + 4 * 0.4**2 / 8 + 4 * 0.8**2 / 80, rel=0.08)
 
 
+def test_three_conditions_have_the_power_of_the_noncentral_f() -> None:
+    """Crossed clips and no repeats: F of the person by condition interaction on 2, 2 (N - 1) df."""
+    n, clips, means = 12, 4, np.array([0.0, 0.3, 0.6])
+    design = MixedDesign((0.3, 0.6), (clips,), crossed=True, spreads=Spreads(0.5, 0.8, 0.0, 0.0, 0.0, 0.5))
+    data, _ = design._coded(n, clips, 1)
+    rng = np.random.default_rng(2)
+    draws = [design._ratings(data, rng) for _ in range(1500)]
+    cells = np.array([[y[data.cell == k].mean() for k in range(3)] for y in draws])
+    assert (cells - cells[:, :1]).mean(axis=0) == pytest.approx(means, abs=0.03)
+    # the variance of a person's cell mean that is not the person's: 0.8^2 / 2, and the rest over the clips
+    error = 0.8**2 / 2 + 0.5**2 / clips
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        assert (cells[:, a] - cells[:, b]).var() == pytest.approx(2 * error / n, rel=0.12)
+    size = n * ((means - means.mean()) ** 2).sum() / error
+    exact = stats.ncf.sf(stats.f.isf(0.05, 2, 2 * (n - 1)), 2, 2 * (n - 1), size)
+    assert simulate_design(design, "x", [n], 150, seed=4).power[0, 0] == pytest.approx(exact, abs=0.12)
+
+
+def test_three_conditions_of_an_ordinal_model_have_their_odds() -> None:
+    design = OrdinalDesign((0.5, -0.4), (1.0, 1.0, 1.0), 6, sd_participant=0, sd_slope=0, sd_clip=0)
+    rows = design.drawn(6000, np.random.default_rng(1))
+    odds = [np.log((y > 2).mean() / (y <= 2).mean()) for _, y in rows.groupby("condition")["rating"]]
+    assert np.array(odds) - odds[0] == pytest.approx([0, 0.5, -0.4], abs=0.07)
+
+
 def test_more_clips_and_faces_find_more() -> None:
-    design = MixedDesign(0.5, (8, 16), (2, 4), spreads=Spreads(face=0.2, face_difference=0.3))
+    design = MixedDesign((0.5,), (8, 16), (2, 4), spreads=Spreads(face=0.2, face_difference=0.3))
     assert design.effects == (
         "8 clips of 2 faces",
         "8 clips of 4 faces",
@@ -143,7 +168,7 @@ def test_more_clips_and_faces_find_more() -> None:
     p = design.p_values(6, np.random.default_rng(1))
     assert len(p) == 4
     assert all(0 <= one <= 1 for one in p)
-    clips = MixedDesign(0.6, (4, 24), spreads=Spreads(clip=0.6, participant_difference=0.0))
+    clips = MixedDesign((0.6,), (4, 24), spreads=Spreads(clip=0.6, participant_difference=0.0))
     few, many = simulate_design(clips, "x", [10], 25, seed=3).power[:, 0]
     assert many > few + 0.2
 
@@ -239,6 +264,8 @@ def call(capsys, monkeypatch, tmp_path):
         "anova --within face:3 --between group:2 --effect face:group=0.3",
         "mixed --difference 0.5 --clips 4 --faces 2",
         "ordinal --difference 0.5 --shares 1,2,1 --clips 2 --crossed",
+        "mixed --difference 0.3,0.6 --clips 3",
+        "ordinal --difference 0.3,0.6 --shares 1,2,1 --clips 3",
         "pairs --abilities 0,0.3,0.6 --sd-rater 0.4 --tie 0.2",
         "thresholds --levels 100,120,140 --threshold 120 --difference 10 --spread 10 --sd-people 5",
     ],
@@ -265,6 +292,10 @@ def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypat
         ("anova --within face:3 --effect face=0.2 --correlation 1.5", "can all correlate by 1.5"),
         ("mixed --difference 0.5 --clips 5", "expected a multiple of 2"),
         ("mixed --difference 0.5 --faces 1", "at least two faces"),
+        ("mixed --difference 0.2,0.4 --clips 8", "in 3 conditions; expected a multiple of 3"),
+        ("ordinal --difference 0.2,0.4 --shares 1,1 --clips 8", "by 3 conditions; expected a multiple of 3"),
+        ("mixed --difference ,", "how far each further condition lies"),
+        ("mixed --difference nan", "how far each further condition lies"),
         ("ordinal --difference 0.5 --shares 1,a", "numbers separated by commas"),
         ("anova --within face:3 --effect face=0.2 --covariate 1", "between -1 and 1"),
         ("pairs --abilities 0,1 --tie 1", "probability of ties"),
