@@ -35,6 +35,12 @@ def get_rehearsal(services: ServicesDep, identity: Viewer, study: str, rehearsal
         return service.result(services, session, study, identity, rehearsal)
 
 
+@router.post("/{rehearsal}/cancel", status_code=204)
+def cancel_rehearsal(services: ServicesDep, identity: Writer, study: str, rehearsal: str) -> None:
+    """End a rehearsal that waits or goes on."""
+    service.cancel(services, study, identity, rehearsal)
+
+
 @router.get("/{rehearsal}/report/{file}", response_class=FileResponse)
 def get_rehearsed_report_file(
     services: ServicesDep, identity: Viewer, study: str, rehearsal: str, file: str

@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 import threading
-from contextlib import suppress
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -20,6 +22,7 @@ from server.clock import now
 from server.context import Services
 from server.errors import NotFound
 from server.models import Job
+from server.operations.locking import locked
 from server.rehearsals.schemas import (
     DEFINITION,
     MANIFEST,
@@ -33,13 +36,17 @@ from server.rehearsals.schemas import (
     Step,
 )
 from server.reports import repository
-from server.reports.jobs import begun, note, shown
+from server.reports.jobs import begun, is_under_way, note, shown
 from server.reports.process import LONGEST_S
 from server.studies.lookup import active_version, find_study
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
 """What the sandbox gets of the environment: no address of a database, no key, no setting."""
-_one_at_a_time = threading.Lock()
+_LOCK = ".one-at-a-time"
+"""Held by the one rehearsal of a server, whichever of its processes runs it."""
+_CANCELLED = "cancelled"
+"""File that asks for the end, from whichever process the button reached."""
+_LOOK_EVERY_S = 0.2
 
 
 def start(services: Services, name: str, order: NewRehearsal, identity: Identity) -> RehearsalOut:
@@ -103,14 +110,55 @@ def _out(job: Job) -> RehearsalOut:
     )
 
 
+def cancel(services: Services, name: str, identity: Identity, public_id: str) -> None:
+    """End a rehearsal that waits or goes on, with all that it started; one that is over stays as it is."""
+    with services.database.write() as session:
+        study = find_study(session, name, identity, "run")
+        job = repository.find_job(session, study, "rehearsal", public_id)
+        if job is None:
+            raise NotFound("There is no such rehearsal; reload the page.")
+        if not is_under_way(job):
+            return
+        job.status, job.message, job.finished_at = "cancelled", "", now()
+        record(session, identity, "rehearsal cancelled", "study", name)
+    folder = _folder(services, public_id)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / _CANCELLED).touch()
+
+
+def _is_cancelled(folder: Path) -> bool:
+    """Whether its end was asked for, or another rehearsal has taken its place."""
+    return (folder / _CANCELLED).exists() or not (folder / ORDER).exists()
+
+
+@contextmanager
+def _turn(services: Services, folder: Path) -> Iterator[bool]:
+    """Wait until no process of this server has a rehearsal going on; false where cancelled meanwhile."""
+    while not _is_cancelled(folder):
+        with ExitStack() as held:
+            try:
+                held.enter_context(locked(services.settings.data_folder / "rehearsals" / _LOCK, wait=False))
+            except BlockingIOError:
+                time.sleep(_LOOK_EVERY_S)
+                continue
+            yield True
+            return
+    yield False
+
+
 def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> None:
     """The background thread: every end, good or bad, is written to the job."""
     folder = _folder(services, public_id)
     try:
         _write_inputs(services, name, folder, order)
-        with _one_at_a_time:
+        with _turn(services, folder) as mine:
+            if not mine:
+                return
             note(services, public_id, status="running", message="beginning", started_at=now())
             problem = _in_sandbox(services, public_id, folder)
+        if _is_cancelled(folder):
+            note(services, public_id, status="cancelled", message="", finished_at=now())
+            return
         ended = {"status": "failed" if problem else "done", "progress": 1.0, "message": problem}
         note(services, public_id, finished_at=now(), **ended)
     except (OSError, subprocess.SubprocessError, NotFound) as error:
@@ -141,8 +189,8 @@ def _in_sandbox(services: Services, public_id: str, folder: Path) -> str:
         env=environment,
         start_new_session=True,
     ) as process:
-        guard = threading.Timer(LONGEST_S, _kill, [process.pid])
-        guard.start()
+        over = threading.Event()
+        threading.Thread(target=_guard, args=(process.pid, folder, over), daemon=True).start()
         atexit.register(_kill, process.pid)
         try:
             for line in process.stdout or ():
@@ -154,10 +202,19 @@ def _in_sandbox(services: Services, public_id: str, folder: Path) -> str:
                 note(services, public_id, progress=step.share, message=step.step)
             process.wait()
         finally:
-            guard.cancel()
+            over.set()
             atexit.unregister(_kill)
             _kill(process.pid)
     return "" if process.returncode == 0 else problem
+
+
+def _guard(group: int, folder: Path, over: threading.Event) -> None:
+    """End the rehearsal where it is cancelled, or takes too long."""
+    limit = time.monotonic() + LONGEST_S
+    while not over.wait(_LOOK_EVERY_S):
+        if _is_cancelled(folder) or time.monotonic() > limit:
+            _kill(group)
+            return
 
 
 def _program(folder: Path) -> list[str]:

@@ -1,6 +1,7 @@
 """The process of a rehearsal: one at a time, gone with all that it started, in place of the one before."""
 
 import os
+import subprocess
 import sys
 import threading
 import time
@@ -30,6 +31,13 @@ child = subprocess.Popen(hangs, stdout=subprocess.DEVNULL)
 path = Path(sys.argv[1], "child")
 path.with_suffix(".new").write_text(str(child.pid))
 path.with_suffix(".new").rename(path)
+"""
+HOLDS = """
+import fcntl, sys
+lock = open(sys.argv[1], "a")
+fcntl.flock(lock, fcntl.LOCK_EX)
+print(flush=True)
+sys.stdin.read()
 """
 HANGS = BEGINS_A_CHILD + "child.wait()"
 LASTS = """
@@ -119,7 +127,7 @@ def test_a_rehearsal_takes_the_place_of_the_one_before(
     second = experimenter.send("POST", PATH, {}).json()
     until(lambda: is_over(experimenter))
     assert latest(experimenter)["id"] == second["id"] != first["id"]
-    assert [path.name for path in folder_of(services).iterdir()] == [second["id"]]
+    assert [path.name for path in folder_of(services).iterdir() if path.is_dir()] == [second["id"]]
     with services.database.read() as session:
         assert session.query(Job).count() == 1
 
@@ -143,6 +151,52 @@ def test_a_rehearsal_waits_for_that_of_another_study(
     (folder_of(services) / "go").touch()
     until(lambda: is_over(owner) and is_over(owner, "other"))
     assert (latest(owner)["status"], latest(owner, "other")["status"]) == ("done", "done")
+
+
+def test_a_rehearsal_is_cancelled_with_all_that_it_started(
+    services: Services, experimenter: Admin, study: StudyInDatabase, program: Callable[[str], None]
+) -> None:
+    program(HANGS)
+    public_id = experimenter.send("POST", PATH, {}).json()["id"]
+    child = folder_of(services) / public_id / "child"
+    until(child.exists)
+    assert experimenter.send("POST", f"{PATH}/{public_id}/cancel", {}).status_code == 204
+    assert latest(experimenter)["status"] == "cancelled"
+    process = int(child.read_text())
+    until(lambda: is_gone(process))
+    assert experimenter.send("POST", f"{PATH}/{public_id}/cancel", {}).status_code == 204
+    assert experimenter.send("POST", f"{PATH}/another/cancel", {}).status_code == 404
+    program(ENDS)
+    experimenter.send("POST", PATH, {})
+    until(lambda: is_over(experimenter))
+    assert latest(experimenter)["status"] == "done"
+
+
+def test_a_rehearsal_waits_for_one_in_another_process_of_the_server(
+    services: Services, experimenter: Admin, study: StudyInDatabase, program: Callable[[str], None]
+) -> None:
+    """It can be cancelled meanwhile, and never begins."""
+    program(ENDS)
+    lock = folder_of(services) / ".one-at-a-time"
+    lock.parent.mkdir(parents=True, exist_ok=True)
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDS, str(lock)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as other:  # fmt: skip
+        assert other.stdout is not None
+        assert other.stdin is not None
+        other.stdout.readline()
+        public_id = experimenter.send("POST", PATH, {}).json()["id"]
+        until((folder_of(services) / public_id / "order.json").exists)
+        assert latest(experimenter)["status"] == "queued"
+        experimenter.send("POST", f"{PATH}/{public_id}/cancel", {})
+        assert latest(experimenter)["status"] == "cancelled"
+        second = experimenter.send("POST", PATH, {}).json()["id"]
+        until((folder_of(services) / second / "order.json").exists)
+        assert latest(experimenter)["status"] == "queued"
+        other.stdin.close()
+    until(lambda: is_over(experimenter))
+    assert latest(experimenter)["status"] == "done"
 
 
 def test_of_two_who_ask_at_once_one_is_refused(

@@ -74,6 +74,7 @@ NEEDED: dict[Right, set[str]] = {
         "DELETE runs/{run}/exclusion",
         "POST reports",
         "POST rehearsals",
+        "POST rehearsals/{rehearsal}/cancel",
         "PUT archive",
     },
     "edit": {"DELETE ", "POST versions", "POST runs/{run}/erase", "POST copies", "POST seal"},

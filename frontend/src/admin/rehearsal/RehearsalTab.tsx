@@ -64,19 +64,36 @@ export function RehearsalTab() {
   );
 }
 
+const WORDS: Record<Rehearsal["status"], string> = {
+  queued: "Rehearsing",
+  running: "Rehearsing",
+  done: "Rehearsed",
+  failed: "Failed",
+  cancelled: "Cancelled",
+};
+
 function Latest({ study, rehearsal }: { study: string; rehearsal: Rehearsal }) {
-  const { status, progress, message } = rehearsal;
+  const { id, status, progress, message } = rehearsal;
+  const mayEnd = useMay(study, "run");
+  const path = { params: { path: { study, rehearsal: id } } };
+  const cancel = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/rehearsals/{rehearsal}/cancel", path)), {
+    touches: [["rehearsal", study]],
+  });
   return (
     <Stack>
       <Group gap="sm" role="status" aria-label="Rehearsal">
         <Text size="sm">
-          {status === "done" ? "Rehearsed" : status === "failed" ? "Failed" : "Rehearsing"}, version {rehearsal.version} with{" "}
-          {rehearsal.participants} people, {when(rehearsal.created_at)}
+          {WORDS[status]}, version {rehearsal.version} with {rehearsal.participants} people, {when(rehearsal.created_at)}
         </Text>
         {isUnderWay(rehearsal) && (
           <>
             <Progress w={200} value={100 * progress} animated aria-label="Progress of the rehearsal" />
             <Text size="sm">{message}</Text>
+            {mayEnd && (
+              <Button size="compact-sm" variant="default" loading={cancel.isPending} onClick={() => cancel.mutate(undefined)}>
+                Cancel
+              </Button>
+            )}
           </>
         )}
       </Group>

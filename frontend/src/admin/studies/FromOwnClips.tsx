@@ -53,8 +53,8 @@ function Levels({ name, upload, onCreated }: LevelsProps) {
         value={by}
         onChange={setBy}
         data={[
-          { value: "pattern", label: "Levels from file names" },
-          { value: "csv", label: "Levels from a table" },
+          { value: "pattern", label: "By file names" },
+          { value: "csv", label: "By a table" },
         ]}
       />
       {by === "pattern" ? (
@@ -142,7 +142,7 @@ function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
         {rows.length > MAX_ROWS && ` Shown are ${MAX_ROWS} of them.`}
       </Text>
       <div className="long-list levels" tabIndex={0} role="region" aria-label="Levels of the files">
-        <Table aria-label="What the pattern reads" className="wrap-anywhere">
+        <Table aria-label="What the pattern reads">
           <Table.Thead>
             <Table.Tr>
               <Table.Th>file</Table.Th>
@@ -154,7 +154,7 @@ function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
           <Table.Tbody>
             {rows.slice(0, MAX_ROWS).map(({ file, levels }) => (
               <Table.Tr key={file}>
-                <Table.Td>{file}</Table.Td>
+                <Table.Td className="wrap-anywhere">{file}</Table.Td>
                 {fields.map((field, index) => (
                   <Table.Td key={field}>{levels?.[index] ?? "does not fit"}</Table.Td>
                 ))}
