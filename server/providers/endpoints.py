@@ -12,7 +12,7 @@ from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, ApiError
 from server.mail import can_send
 from server.numbers import Number
-from server.providers import service
+from server.providers import attempts, logins, service
 from server.providers.declaration import ProviderId
 from server.providers.protocol import NotRecognised
 from server.providers.schemas import (
@@ -38,7 +38,7 @@ def _set_login_cookie(response: Response, services: Services, token: str) -> Non
     response.set_cookie(
         LOGIN_COOKIE,
         token,
-        max_age=service.ATTEMPT_MINUTES * 60,
+        max_age=attempts.ATTEMPT_MINUTES * 60,
         httponly=True,
         samesite="lax",
         secure=services.settings.is_https,
@@ -65,9 +65,9 @@ async def begin_sign_in(
 ) -> Elsewhere:
     """Begin to sign in with a provider: where the browser goes, and a cookie by which it is known again."""
     check_origin(request, services)
-    service.provider_of(services, provider)
+    attempts.provider_of(services, provider)
     _enter(services, request, f"provider {provider}")
-    begun = await run_in_threadpool(service.begin, services, provider, "sign in", body.next)
+    begun = await run_in_threadpool(attempts.begin, services, provider, "sign in", body.next)
     _set_login_cookie(response, services, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
 
@@ -78,7 +78,7 @@ async def begin_invited(
 ) -> Elsewhere:
     """Begin to make an invited account that signs in with a provider: where the browser goes."""
     check_origin(request, services)
-    service.provider_of(services, provider)
+    attempts.provider_of(services, provider)
     _enter(services, request, f"provider {provider}")
     begun = await run_in_threadpool(service.begin_invited, services, provider, token)
     _set_login_cookie(response, services, begun.browser)
@@ -90,9 +90,9 @@ async def begin_link(
     services: ServicesDep, me: Myself, provider: ProviderId, body: BeginLink, response: Response
 ) -> Elsewhere:
     """Begin to give one's own account a login with a provider; asks for the password once more."""
-    service.provider_of(services, provider)
+    attempts.provider_of(services, provider)
     await must_prove(services, me, body.proof)
-    begun = await run_in_threadpool(service.begin, services, provider, "link", "/account", me)
+    begun = await run_in_threadpool(attempts.begin, services, provider, "link", "/account", me)
     _set_login_cookie(response, services, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
 
@@ -115,15 +115,15 @@ async def come_back(
     """
     page = "/sign-in"
     try:
-        service.provider_of(services, provider)
+        attempts.provider_of(services, provider)
         if not browser or not state:
             raise NotRecognised("This sign-in was begun in another browser.")
         services.sign_ins.come_back(address_of(request))
-        attempt = await run_in_threadpool(service.take, services, provider, state, browser)
+        attempt = await run_in_threadpool(attempts.take, services, provider, state, browser)
         page = "/account" if attempt.purpose == "link" else page
         if not code:
             raise NotRecognised("The service to sign in with said no.")
-        secrets = service.secrets_of(services.settings.key, browser, state)
+        secrets = attempts.secrets_of(services.settings.key, browser, state)
         whom = await services.providers.of(provider).recognise(code, iss, secrets)
         finished = await run_in_threadpool(service.finish, services, provider, attempt, whom, user_agent)
     except ApiError as refusal:
@@ -163,7 +163,7 @@ async def end_by_provider(
     Who sends what is no logout token is kept waiting, not the provider: its people may all sign out at once.
     A token that comes again ends nothing that was begun since.
     """
-    service.provider_of(services, provider)
+    attempts.provider_of(services, provider)
     client = services.providers.of(provider)
     with services.sign_ins.logout(provider, address_of(request)):
         ended = await client.signed_out(logout_token)
@@ -185,10 +185,10 @@ def _go_on(response: Response, services: Services, finished: service.Finished) -
 def list_logins(services: ServicesDep, me: Myself) -> list[LoginOut]:
     """One's own logins with providers."""
     with services.database.read() as session:
-        return [LoginOut.model_validate(row) for row in service.own_logins(session, me)]
+        return [LoginOut.model_validate(row) for row in logins.own_logins(session, me)]
 
 
 @router.delete("/logins/{login_id}", status_code=204)
 def remove_login(services: ServicesDep, me: FreshMyself, login_id: Number) -> None:
     """Take a login off one's own account."""
-    service.remove_login(services, me, login_id)
+    logins.remove_login(services, me, login_id)

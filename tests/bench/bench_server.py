@@ -1,8 +1,10 @@
 """The experimenter's side under much data: export of a million rows, the monitor with 500 runs x 400 trials.
 
     python tests/bench/bench_server.py [rows, default 1000000]
+    python tests/bench/bench_server.py ROWS postgres
 
-Real servers on SQLite. Prints one table; the monitor's page is opened in Chromium where there is one.
+Real servers on SQLite, or the pages and exports alone on a PostgreSQL of its own. Prints one table; the
+monitor's page is opened in Chromium where there is one.
 """
 
 import os
@@ -20,11 +22,13 @@ from sqlalchemy import text
 
 from server.accounts import invitations
 from server.cli_common import migrated_services
+from server.models import StudyRun
 from tests.bench.server_data import add_runs
 from tests.browser.conftest import CHROMIUM_FLAGS, CHROMIUM_NAMES
 from tests.browser.server_process import ServerProcess
 from tests.helpers.admins import PASSWORD
 from tests.helpers.studies import SHORT
+from tools.load_database import load_database
 
 TRIALS = 400
 RUNS = 500
@@ -38,13 +42,16 @@ def print_line(name: str, value: str, must: str = "") -> None:
     sys.stdout.flush()
 
 
-def filled(folder: Path, runs: int, trials: int = TRIALS) -> ServerProcess:
+def filled(folder: Path, runs: int, trials: int = TRIALS, database: str = "") -> ServerProcess:
     """A server's data folder with the short study and that many complete runs."""
-    process = ServerProcess(folder / "data")
+    process = ServerProcess(folder / "data", database_url=database)
     study = process.add_study(folder / "clips", SHORT)
     begun = time.monotonic()
     with migrated_services(process.settings) as services:
         add_runs(services, study, runs, trials)
+        if database:  # as its own housekeeping does within a minute
+            with services.database.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as one:
+                one.execute(text("VACUUM ANALYZE"))
     print_line(f"filling the database with {runs * trials:,} ratings", f"{time.monotonic() - begun:.1f} s")
     return process
 
@@ -82,8 +89,8 @@ def peak_mb(pid: int) -> float:
     return int(status.partition("VmHWM:")[2].split()[0]) / 1024
 
 
-def export(folder: Path, rows: int) -> None:
-    process = filled(folder, max(1, rows // TRIALS)).start()
+def export(folder: Path, rows: int, database: str = "") -> None:
+    process = filled(folder, max(1, rows // TRIALS), database=database).start()
     try:
         owner = Owner(process)
         assert process.process is not None
@@ -104,9 +111,9 @@ LINKS = 5_000
 RATED_RUNS, MANY_RUNS = 6_000, 100_000
 
 
-def pages(folder: Path, rows: int) -> None:
+def pages(folder: Path, rows: int, database: str = "") -> None:
     """The pages of a study with very many ratings, links and runs, each asked for by itself."""
-    process = filled(folder, RATED_RUNS, max(1, rows // RATED_RUNS))
+    process = filled(folder, RATED_RUNS, max(1, rows // RATED_RUNS), database)
     try:
         shown(process.start(), f"{RATED_RUNS:,} runs", "ada")
         process.stop()
@@ -136,18 +143,22 @@ def shown(process: ServerProcess, what: str, name: str) -> None:
 def more_runs(process: ServerProcess, total: int) -> None:
     """Runs without a rating, so that there are `total`."""
     with migrated_services(process.settings) as services, services.database.write() as session:
-        names = [row[1] for row in session.execute(text("PRAGMA table_info(study_runs)"))]
-        own = {"id": "NULL", "public_id": "'m' || i", "client_id": "'m' || i", "token_hash": "'m' || i"}
+        names = [column.name for column in StudyRun.__table__.columns]
+        own = {"id": "id + i", "public_id": "'m' || i", "client_id": "'m' || i", "token_hash": "'m' || i"}
         values = ", ".join(own.get(name, name) for name in names)
         series = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < :more)"
         there = session.execute(text("SELECT count(*) FROM study_runs")).scalar_one()
-        one = "(SELECT * FROM study_runs ORDER BY id LIMIT 1)"
+        one = "(SELECT * FROM study_runs ORDER BY id DESC LIMIT 1) AS one"
         statement = f"INSERT INTO study_runs ({', '.join(names)}) {series} SELECT {values} FROM {one}, n"
         session.execute(text(statement), {"more": total - there})
 
 
 def command_line(process: ServerProcess, folder: Path, rows: int) -> None:
-    environment = {"PALPEBRA_DATA_FOLDER": str(process.settings.data_folder), "PALPEBRA_SECRET_KEY": "bench"}
+    environment = {
+        "PALPEBRA_DATA_FOLDER": str(process.settings.data_folder),
+        "PALPEBRA_SECRET_KEY": process.settings.secret_key,
+        "DATABASE_URL": process.settings.database_url,
+    }
     begun, out = time.monotonic(), folder / "short.csv"
     command = [sys.executable, "-m", "server", "export", "short", "--origin", "all", "--out", str(out)]
     running = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
@@ -219,8 +230,18 @@ def change(process: ServerProcess, number: int) -> None:
         session.execute(text(statement), {"stage": stage, "now": moment, "most": CHANGED})
 
 
+def on_postgres(rows: int) -> None:
+    """The pages and exports, each on a database of its own."""
+    for measure in (pages, export):
+        with tempfile.TemporaryDirectory() as folder, load_database("postgres", Path(folder)) as database:
+            measure(Path(folder), rows, database.url)
+
+
 def main() -> None:
     rows = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    if sys.argv[2:] == ["postgres"]:
+        on_postgres(rows)
+        return
     for measure in (monitor, lambda folder: pages(folder, rows), lambda folder: export(folder, rows)):
         with tempfile.TemporaryDirectory() as folder:
             measure(Path(folder))

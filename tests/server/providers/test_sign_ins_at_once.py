@@ -15,7 +15,7 @@ from server.clock import now
 from server.context import Services
 from server.errors import ApiError
 from server.models import LoginAttempt
-from server.providers import service
+from server.providers import attempts, service
 from server.providers.declaration import Provider, RoleRule
 from server.providers.protocol import NotRecognised, Recognised
 from server.settings import Settings
@@ -159,7 +159,7 @@ def test_what_nobody_began_takes_no_turn_to_write(
 ) -> None:
     monkeypatch.setattr(services.database, "write", None)
     with pytest.raises(NotRecognised):
-        service.take(services, "uni", "a state", "a cookie")
+        attempts.take(services, "uni", "a state", "a cookie")
 
 
 @pytest.mark.postgres
