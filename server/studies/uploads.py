@@ -1,18 +1,17 @@
 """Uploads of own clips: streamed to a folder of their own, unpacked with limits, and what became of them."""
 
-import re
 import secrets
 import shutil
 import time
-import zipfile
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import IO
 
-from experiments.files import whole_file
 from experiments.manifest import MANIFEST_NAME
 from experiments.own_clips import check_names, one_form, suggest_pattern
-from server.errors import ApiError, Invalid, NotFound
+from server.errors import Invalid, NotFound
+from server.studies.packed import MAX_FILES, unpack
 from server.studies.schemas import UploadedFile, UploadOut, UploadProgress
+from server.studies.uploaded_file import UploadTooLarge, copy, safe_name
 from server.transcoding.records import (
     ask_rate,
     asked_rate,
@@ -20,26 +19,13 @@ from server.transcoding.records import (
     videos_of,
     write_record,
 )
-from video_conversion.prepared import VIDEO_ENDINGS, Prepared, clip_name
+from video_conversion.prepared import Prepared, clip_name
 
 KEEP_S = 24 * 3600
-MAX_FILES = 5000
-MAX_UNPACKED_BYTES = 4 * 1024**3
 MAX_KEPT_BYTES = 16 * 1024**3
 """Of all files of one upload."""
-MAX_RATIO = 200
-TABLES = (".csv", ".json")
-CHUNK_BYTES = 1 << 20
 _WHOSE = ".account"
 """File of an upload's folder with the number of the account that sent it."""
-NAME = re.compile(r"\w[^\x00-\x1f\x7f]*")
-
-
-class UploadTooLarge(ApiError):
-    """The upload is larger than this server takes."""
-
-    status = 413
-    code = "too_large"
 
 
 def new_upload(folder: Path, account: int, fps: float | None = None) -> tuple[str, Path]:
@@ -86,7 +72,7 @@ def receive(folder: Path, name: str, source: IO[bytes], limit: int) -> None:
     if name.lower().endswith(".zip"):
         packed = folder / ".zip"
         try:
-            _copy(source, packed, limit)
+            copy(source, packed, limit)
             unpack(packed, folder)
         finally:
             packed.unlink(missing_ok=True)
@@ -94,70 +80,7 @@ def receive(folder: Path, name: str, source: IO[bytes], limit: int) -> None:
         target = folder / safe_name(name)
         if target.exists():
             raise Invalid(f"'{target.name}' came more than once; file names must differ.")
-        _copy(source, target, limit)
-
-
-def safe_name(path: str) -> str:
-    """The file's own name; Invalid where the path climbs out or is not a clip or table."""
-    pure = PurePosixPath(path.replace("\\", "/"))
-    if pure.is_absolute() or ".." in pure.parts or not pure.name or pure.name.startswith("."):
-        raise Invalid(f"The file '{path[:100]}' has a path that is not allowed; expected plain file names.")
-    if pure.suffix.lower() not in VIDEO_ENDINGS + TABLES:
-        raise Invalid(
-            f"The file '{pure.name[:100]}' is neither a video ({', '.join(VIDEO_ENDINGS)}) nor a CSV table."
-        )
-    if len(pure.name) > 150:
-        raise Invalid(f"The file name '{pure.name[:100]}...' is too long; 150 characters are the most.")
-    name = one_form(pure.name)
-    if not NAME.fullmatch(name):
-        raise Invalid(f"The file name '{name[:100]}' should begin with a letter or digit; rename the file.")
-    return name
-
-
-def unpack(packed: Path, folder: Path) -> None:
-    """Unpack a zip: flat, bounded in number and size, no name twice."""
-    try:
-        with zipfile.ZipFile(packed) as archive:
-            members = [m for m in archive.infolist() if not m.is_dir() and not _is_litter(m.filename)]
-            _check_members(members)
-            for member in members:
-                with archive.open(member) as source:
-                    _copy(source, folder / safe_name(member.filename), member.file_size)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
-        raise Invalid("The zip file is damaged or encrypted; please pack it again.") from error
-
-
-def _is_litter(path: str) -> bool:
-    return path.startswith("__MACOSX/") or PurePosixPath(path).name in (".DS_Store", "Thumbs.db")
-
-
-def _check_members(members: list[zipfile.ZipInfo]) -> None:
-    if len(members) > MAX_FILES:
-        raise UploadTooLarge(f"The zip holds {len(members)} files; {MAX_FILES} is the most.")
-    unpacked = sum(member.file_size for member in members)
-    if unpacked > MAX_UNPACKED_BYTES:
-        raise UploadTooLarge(
-            f"The zip unpacks to {unpacked >> 20} MiB; {MAX_UNPACKED_BYTES >> 20} is the most."
-        )
-    for member in members:
-        if member.file_size > MAX_RATIO * max(member.compress_size, 1024):
-            raise Invalid(f"The zip's file '{member.filename[:100]}' unpacks to far more than a clip would.")
-    names = [safe_name(member.filename) for member in members]
-    if repeated := sorted({name for name in names if names.count(name) > 1}):
-        raise Invalid(f"The zip holds '{repeated[0]}' more than once; file names must differ.")
-    check_names(names)
-
-
-def _copy(source: IO[bytes], target: Path, limit: int, called: str = "") -> None:
-    written = 0
-    with whole_file(target) as temporary, temporary.open("wb") as stream:
-        while piece := source.read(CHUNK_BYTES):
-            written += len(piece)
-            if written > limit:
-                raise UploadTooLarge(
-                    f"'{called or target.name}' is larger than the {limit >> 20} MiB accepted."
-                )
-            stream.write(piece)
+        copy(source, target, limit)
 
 
 def check_room(folder: Path) -> None:
@@ -214,7 +137,7 @@ def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int) ->
     check_names(clip_name(one) for one in (*others, target.name))
     staged = folder / f".{secrets.token_hex(8)}{target.suffix}"
     try:
-        _copy(source, staged, limit, target.name)
+        copy(source, staged, limit, target.name)
         known.unlink()
         write_record(folder, Prepared(name=known.name, asked_fps=None, replaced=True))
         staged.replace(target)
