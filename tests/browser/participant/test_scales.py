@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
+from server.simulation.http import JsonClient
+from server.simulation.person import Person, Rater
+from tests.browser.analysed import analysed
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit, axe_violations
@@ -73,14 +76,29 @@ def test_keys_and_mouse_answer_points_and_sliders(server: ServerProcess, tmp_pat
     page.locator(".beside").click()
     assert page.locator(".slider.untouched").count() == 1
     page.locator(".scales ~ .actions .primary").click()
-    page.wait_for_selector(".ready, .break")
-    rows = server.rows_soon("SELECT payload FROM trial_ratings ORDER BY time_elapsed", 3)
-    first, second, third = (json.loads(row["payload"])["answers"] for row in rows)
+    for _ in range(3):
+        page.wait_for_selector(".ready, .break")
+        if page.query_selector(".break"):
+            page.click(".primary:enabled")
+        at_the_scales(page)
+        page.keyboard.press("2")
+        page.keyboard.press("ArrowLeft")
+        page.keyboard.press("Enter")
+    visit.trials()
+    rows = server.rows_soon("SELECT payload FROM trial_ratings ORDER BY time_elapsed", 6)
+    first, second, third = (json.loads(row["payload"])["answers"] for row in rows[:3])
     assert (first["natural"]["response"], first["eerie"]["response"]) == (3, 51)
     assert second["natural"]["response"] == 2
     assert 90 <= second["eerie"]["response"] <= 100
     assert (third["eerie"]["response"], third["eerie"]["not_applicable"]) == (None, True)
     assert visit.problems == []
+    # The analysis asks for a second person, who needs no browser.
+    client = JsonClient(server.address)
+    assert Person(client, Rater(1, 1, {})).take_part(study.link_token)
+    client.close()
+    said = analysed(server, study.name, tmp_path)
+    assert "origin participant" in said
+    assert all(name in said for name in ("natural", "eerie", "Reliability of the scales"))
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (720, 450)], ids=["phone", "200% zoom"])
