@@ -1,4 +1,4 @@
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it, vi } from "vitest";
 import type { Gates } from "../../src/api/schema";
 import { aTrial } from "./a-trial";
 import { luminance } from "../../src/participant/flow/appearance";
@@ -8,7 +8,9 @@ import { refreshRate } from "../../src/participant/screen/refresh-rate";
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
 import { deviation, randomStart, settled, spreadPercent } from "../../src/participant/calibration/spread";
 import { distanceFrom } from "../../src/participant/calibration/distance";
+import type { Session } from "../../src/participant/session";
 import { keyFor, valueOf } from "../../src/participant/trials/shared/scale-keys";
+import { clipSize } from "../../src/participant/trials/shared/stage";
 
 describe("actual size", () => {
   it("shows the inter-ocular distance as declared", () => {
@@ -20,6 +22,20 @@ describe("actual size", () => {
     expect(clipWidth(aTrial({ inter_ocular_px: null }), 60, 4)).toBe(520);
     expect(clipWidth(aTrial({ inter_ocular_px: null, width_mm: null }), 60, 4)).toBe(800);
     expect(clipWidth(aTrial(), 60, null)).toBe(800);
+  });
+
+  describe("in a window", () => {
+    afterEach(() => vi.unstubAllGlobals());
+    const width = (px_per_mm: number | null, innerWidth: number): number => {
+      vi.stubGlobal("window", { innerWidth });
+      return clipSize({ run: { display: { inter_ocular_mm: 60 } }, screen: { px_per_mm } } as unknown as Session, aTrial()).width;
+    };
+    it("is kept once it was measured, so that a narrower one is seen to cut the clip off", () => {
+      expect([width(4, 1_280), width(4, 390)]).toEqual([480, 480]);
+    });
+    it("gives way to the window where nothing was measured", () => {
+      expect([width(null, 390), width(null, 1_280)]).toEqual([390, 800]);
+    });
   });
 
   const before: ScreenShape = { device_pixel_ratio: 1, screen_width_px: 1_920, screen_height_px: 1_080 };

@@ -181,12 +181,17 @@ def go_to(page: Page, at_ms: float) -> None:
 
 def wait_painted(page: Page, at_ms: float) -> None:
     """Wait until the canvas shows this moment."""
-    page.wait_for_function(
-        """at => {
-            const { paintedMs } = document.querySelector(".replay-window canvas").dataset;
-            return Math.abs(Number(paintedMs) - at) < 0.001;
-        }""",
-        arg=at_ms,
+    # Not wait_for_function: unless true at once it is evaluated by the page, whose policy forbids that.
+    page.evaluate(
+        """at => new Promise((resolve) => {
+            const look = () => {
+                const { paintedMs } = document.querySelector(".replay-window canvas").dataset;
+                if (Math.abs(Number(paintedMs) - at) < 0.001) resolve();
+                else requestAnimationFrame(look);
+            };
+            look();
+        })""",
+        at_ms,
     )
 
 

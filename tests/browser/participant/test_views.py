@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.browser.served import LATEST_RUN, Served, go_back, reload_in_next_clip, serve, start_clip
 from tests.browser.server_process import ServerProcess
@@ -154,10 +154,11 @@ def window(chromium: Browser) -> Iterator[Page]:
     opened.close()
 
 
-def smaller(page: Page) -> None:
-    box = page.locator(".clip").bounding_box()
-    assert box is not None
-    page.set_viewport_size({"width": int(box["width"] * 0.7), "height": int(box["height"] * 0.7)})
+CLIP_SIZE = "[document.querySelector('.clip')].map((clip) => [clip.offsetWidth, clip.offsetHeight])[0]"
+
+
+def narrower(page: Page) -> None:
+    page.set_viewport_size({"width": int(page.evaluate(CLIP_SIZE)[0] * 0.7), "height": 800})
 
 
 def zoomed(page: Page) -> None:
@@ -201,7 +202,7 @@ def disturbed_view(
 def test_what_disturbs_a_view_is_recorded_and_flags_it(studies: Served, window: Page) -> None:
     studies.visit("long_clips", window)
     assert "focus_lost" in disturbed_view(studies, window, other_tab, 1)
-    assert {"window_too_small", "clip_cut_off"} <= disturbed_view(studies, window, smaller, 2)
+    assert {"window_too_small", "clip_cut_off"} <= disturbed_view(studies, window, narrower, 2)
     assert "zoomed" in disturbed_view(studies, window, zoomed, 3)
 
 
@@ -210,9 +211,23 @@ def test_a_zoom_before_the_start_key_disturbs_the_view_too(studies: Served, wind
     assert "zoomed" in disturbed_view(studies, window, zoomed, 1, before=True)
 
 
+def test_a_clip_without_a_measured_size_follows_the_window_until_its_start(
+    studies: Served, window: Page
+) -> None:
+    studies.visit("short_clips", window)
+    clip = window.locator(".clip")
+    width, height = window.evaluate(CLIP_SIZE)
+    window.set_viewport_size({"width": width // 2, "height": 800})
+    expect(clip).to_have_css("width", f"{width // 2}px")
+    expect(clip).to_have_css("height", f"{height // 2}px")
+    as_before(window)
+    expect(clip).to_have_css("width", f"{width}px")
+
+
 def leave_full_screen(page: Page) -> None:
     page.evaluate("document.exitFullscreen()")
-    page.wait_for_function("document.fullscreenElement === null")
+    # Asked from outside: the page's policy lets no function be waited for that is not true at once.
+    expect(page.locator(":fullscreen")).to_have_count(0)
 
 
 @pytest.mark.parametrize("before", [False, True], ids=["in the clip", "before the start key"])

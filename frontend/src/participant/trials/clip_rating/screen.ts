@@ -48,7 +48,7 @@ export function clipRating(session: Session, other: Promise<WatchAndRate> | null
 
 async function runTrial(session: Session, display: HTMLElement, parameters: TrialParameters, show: WatchAndRate): Promise<ClipRatingData> {
   const { trial } = parameters;
-  const stage = showStage(session, display, clipSize(session, trial));
+  const stage = showStage(session, display, () => clipSize(session, trial));
   const body = await show(session, stage, parameters).catch(
     unlessBroken(session, display, trial, () => unrated(session, trial, parameters.play)),
   );

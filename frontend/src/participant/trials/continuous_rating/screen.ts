@@ -43,7 +43,7 @@ export function continuousRating(session: Session): PluginClass<TrialParameters>
 
 async function runTrial(session: Session, display: HTMLElement, parameters: TrialParameters): Promise<ContinuousData> {
   const { trial, play, next } = parameters;
-  const stage = showStage(session, display, clipSize(session, trial));
+  const stage = showStage(session, display, () => clipSize(session, trial));
   const body = await watch(session, stage, parameters).catch(unlessBroken(session, display, trial, () => unrated(session, trial, play)));
   await saveRating(session, trial, body);
   release(session, trial, next);

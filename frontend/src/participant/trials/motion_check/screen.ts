@@ -76,8 +76,7 @@ function way(session: Session, clipStage: Stage): Way {
 }
 
 function stageFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
-  const { width, height } = clipSize(session, trial);
-  const clipStage = stage(session.player.element, width, height, session.t("clip_name"));
+  const clipStage = stage(session.player.element, () => clipSize(session, trial), session.t("clip_name"));
   display.replaceChildren(clipStage.element);
   return clipStage;
 }

@@ -43,6 +43,8 @@ export function waitForStart(
       event.preventDefault();
       start(event);
     }, signal);
+    window.addEventListener("resize", stage.fit, { signal });
+    stage.fit();
     go.focus({ preventScroll: true });
   });
 }

@@ -16,28 +16,35 @@ export interface Stage {
   /** Where the prompt, the scale and the feedback appear, below the clip. */
   below: HTMLElement;
   setPlaying(playing: boolean): void;
+  /** Give the clip its size in the window as it is now. */
+  fit: () => void;
   layout: Layout;
 }
 
-export function stage(clip: HTMLElement, width_px: number, height_px: number, name: string): Stage {
+export function stage(clip: HTMLElement, size: () => Size, name: string): Stage {
   const marks = ["tl", "tr", "bl", "br"].map((corner) => h("i", { class: `mark mark-${corner}` }));
   const frame = h("div", { class: "clip", role: "img", "aria-label": name }, clip, ...marks);
-  frame.style.width = `${width_px}px`;
-  frame.style.height = `${height_px}px`;
+  const fit = (): void => {
+    const { width, height } = size();
+    frame.style.width = `${width}px`;
+    frame.style.height = `${height}px`;
+  };
+  fit();
   const below = h("div", { class: "below" });
   const element = h("section", { class: "trial" }, h("div", { class: "above" }), frame, below);
-  return { element, below, setPlaying: (playing) => element.classList.toggle("playing", playing), layout: layout() };
+  return { element, below, setPlaying: (playing) => element.classList.toggle("playing", playing), fit, layout: layout() };
 }
 
-/** One clip at actual size; only where calibration is optional can it be too wide: it is then as wide as the window. */
+/** One clip at actual size, whatever the window is; where no size was measured it is at most as wide as the window. */
 export function clipSize({ run, screen }: Session, trial: TrialInfo): Size {
-  const width = Math.min(clipWidth(trial, run.display.inter_ocular_mm, screen.px_per_mm), window.innerWidth);
+  const own = clipWidth(trial, run.display.inter_ocular_mm, screen.px_per_mm);
+  const width = screen.px_per_mm === null ? Math.min(own, window.innerWidth) : own;
   return { width, height: clipHeight(trial, width) };
 }
 
 /** The place of clips of this size, with the way out, as all that is on the screen. */
-export function showStage(session: Session, display: HTMLElement, { width, height }: Size, name: MessageKey = "clip_name"): Stage {
-  const clipStage = stage(session.player.element, width, height, session.t(name));
+export function showStage(session: Session, display: HTMLElement, size: () => Size, name: MessageKey = "clip_name"): Stage {
+  const clipStage = stage(session.player.element, size, session.t(name));
   clipStage.element.append(stopButton(session));
   display.replaceChildren(clipStage.element);
   return clipStage;

@@ -66,7 +66,7 @@ export function unrated(session: Session, trial: TrialInfo, play: number): Ratin
 async function watchAndAnswer(session: Session, display: HTMLElement, parameters: TrialParameters): Promise<RatingBody> {
   const { trial, play } = parameters;
   const declared = declaredThreshold(session);
-  const stage = showStage(session, display, clipSize(session, trial), trial.clips.length > 1 ? "pair_name" : "clip_name");
+  const stage = showStage(session, display, () => clipSize(session, trial), trial.clips.length > 1 ? "pair_name" : "clip_name");
   const before = viewsBefore(trial, play).at(-1);
   if (before) sayAlreadySeen(session, stage);
   const shown = before ?? (await watch(session, stage, parameters));
