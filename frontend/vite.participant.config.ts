@@ -1,3 +1,5 @@
+import { readFileSync, writeFileSync } from "node:fs";
+import { resolve } from "node:path";
 import { defineConfig, type Plugin } from "vite";
 
 const BASE = "/assets/participant/";
@@ -7,7 +9,7 @@ const NAMED = "[name]-[hash:6].js";
 const LATER = "[hash:6].js";
 /** What every kind of trial and the pages beside them need. */
 const SHARED =
-  /src\/ui\/|participant\/(session|screens\/support|jspsych|playback\/(protocol|record)|views\/|trials\/(rating|save-rating|shared\/(stage|already-seen|parameters|prepare|showing|feedback|broken)))/;
+  /src\/ui\/|participant\/(session|request|screens\/(support|notice)|jspsych|playback\/(protocol|record)|views\/|trials\/(rating|save-rating|shared\/(stage|already-seen|parameters|prepare|showing|feedback|broken)))/;
 
 /** Tells the service worker the names of the built files, which it keeps. */
 function listFiles(): Plugin {
@@ -22,12 +24,23 @@ function listFiles(): Plugin {
   };
 }
 
+/** Takes comments and indentation from the script for old browsers, which is copied as it is and loaded by everybody. */
+function shortenBootCheck(): Plugin {
+  return {
+    name: "shorten-boot-check",
+    writeBundle({ dir = "" }) {
+      const file = resolve(dir, "boot-check.js");
+      writeFileSync(file, readFileSync(file, "utf8").replace(/^\s*(\/\/.*\n\s*)?/gm, ""));
+    },
+  };
+}
+
 // The server answers /assets/participant/NAME with dist/participant/NAME, and /run/TOKEN with its index.html.
 export default defineConfig({
   root: "src/participant",
   base: BASE,
   publicDir: "public",
-  plugins: [listFiles()],
+  plugins: [listFiles(), shortenBootCheck()],
   build: {
     outDir: "../../dist/participant",
     emptyOutDir: true,

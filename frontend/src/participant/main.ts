@@ -5,10 +5,10 @@ import { Refused } from "./request";
 import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Translate } from "../i18n";
 import { setLanguage, setScales, setSurround } from "./flow/appearance";
 import { fetchFirst } from "./flow/blocks";
-import { abilities, type Abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
+import { abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
 import { type Kept, KeptVisit } from "./flow/kept-visit";
-import { fetchRun, passGates, persistently, reach, screenOutDevice, showClosedGate, showRefusal, startRun, wayBack } from "./flow/link";
+import { fetchRun, persistently, reach, startRun, wayBack } from "./flow/link";
 import { describeDevice, flush, openSession } from "./flow/open-session";
 import { asksForCode, type Claim } from "./flow/resume-code";
 import { serveOffline } from "./flow/serve-offline";
@@ -34,7 +34,7 @@ const RETURNS = 3;
 const RETURNED = "palpebra returns";
 
 /** What is known when the link has answered, or an earlier visit answers for it. */
-interface Entry {
+export interface Entry {
   root: HTMLElement;
   t: Translate;
   link_token: string;
@@ -44,6 +44,7 @@ interface Entry {
   kept: Kept | null;
 }
 
+const loadRefusal = (): Promise<typeof import("./flow/refusal")> => loadModule(() => import("./flow/refusal"));
 const loadEnd = (): Promise<typeof import("./flow/ended")> => loadModule(() => import("./flow/ended"));
 
 export async function main(root: HTMLElement): Promise<void> {
@@ -64,7 +65,7 @@ export async function main(root: HTMLElement): Promise<void> {
     t = translator(language);
     await visit({ root, t, link_token, link, language, keeping, kept });
   } catch (error) {
-    if (error instanceof Refused) showRefusal(root, t, error.code, error.message);
+    if (error instanceof Refused) (await loadRefusal()).showRefusal(root, t, error.code, error.message);
     else fail(error);
   }
 }
@@ -75,17 +76,18 @@ async function visit(entry: Entry): Promise<void> {
   // A visit that this browser or this personal link has begun may go on though no new one may begin.
   const returns = kept !== null || identity.isKnown || link.resumable;
   if (link.status !== "open" && !returns) {
-    showRefusal(root, t, link.status, "", wayBack(t, link));
+    (await loadRefusal()).showRefusal(root, t, link.status, "", wayBack(t, link));
     return;
   }
   const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
   const device = await abilities(store.durable);
   const list = findings(device, link.gates);
-  if (list[0]?.closed) return turnedAway(entry, identity, returns, list[0], device);
-  await passGates(root, t, list);
+  const turned = async (closed: GateFinding): Promise<void> =>
+    (await loadRefusal()).turnedAway(entry, identity, returns, closed, device, () => begun(entry, identity, { language, has_code: false }));
+  if (list[0]?.closed) return turned(list[0]);
+  if (list.length > 0) await (await loadRefusal()).passGates(root, t, list);
   const lack = returns ? null : lackOfRoom(link.gates, measures(link.gates));
-  if (lack && !(await (await loadModule(() => import("./flow/room-page"))).waitForRoom(root, t, link)))
-    return turnedAway(entry, identity, returns, lack, device);
+  if (lack && !(await (await loadModule(() => import("./flow/room-page"))).waitForRoom(root, t, link))) return turned(lack);
   const tab = await oneTab(root, t, link_token);
   if (tab === "left") return;
   if (tab === "first" && !(await goesOn(entry, identity))) {
@@ -139,27 +141,6 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
     if (!why) throw error;
     return askForCode(why);
   }
-}
-
-/** A closed gate: explained; where the study screens devices, a visit that has not got further ends here with a way back. */
-async function turnedAway(entry: Entry, identity: Identity, returns: boolean, closed: GateFinding, device: Abilities): Promise<void> {
-  const { root, t, link_token, link, language, kept } = entry;
-  const explain = (): void => showClosedGate(root, t, link_token, closed, device, wayBack(t, link));
-  // A run begun in another browser is left to that one: starting it here would take it over.
-  const elsewhere = returns && !identity.isKnown;
-  if (!link.screens_devices || kept || elsewhere) {
-    explain();
-    return;
-  }
-  const started = await begun(entry, identity, { language, has_code: false });
-  const before = await persistently(root, t, () => fetchRun(started.run_token));
-  if (before.status === "active" && before.consented_at) {
-    explain();
-    return;
-  }
-  if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, device));
-  const run = await persistently(root, t, () => fetchRun(started.run_token));
-  await (await loadEnd()).ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
 }
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */

@@ -1,10 +1,9 @@
 /** From the link to a run: is it open, can this browser show it, and which visit is it? */
 import type { LinkState, RunStarted, RunState } from "../../api/schema";
-import { BUSY, call, NetworkError, Refused, isTemporary, request } from "../request";
-import type { MessageKey, Translate } from "../../i18n";
+import { BUSY, call, NetworkError, Refused, isTemporary } from "../request";
+import type { Translate } from "../../i18n";
 import { backoff } from "../outbox/backoff";
 import { type Back, showNotice } from "../screens/notice";
-import type { Abilities, GateFinding } from "./gates";
 import { filledIn } from "./identity";
 import type { Kept } from "./kept-visit";
 import { withoutPractice } from "./placed";
@@ -42,45 +41,9 @@ export async function fetchRun(token: string): Promise<RunState> {
 export const startRun = (link_token: string, body: object): Promise<RunStarted> =>
   call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body });
 
-const REFUSALS: Record<string, MessageKey> = {
-  link_unknown: "link_unknown",
-  study_closed: "link_closed",
-  run_too_old: "run_too_old",
-  run_left: "run_left",
-  study_full: "link_full",
-  link_expired: "link_expired",
-  study_paused: "link_paused",
-  closed: "link_closed",
-  expired: "link_expired",
-  full: "link_full",
-  paused: "link_paused",
-  used: "link_used",
-};
-
 /** The way back to the recruiter for who takes no part. A visit that an earlier page has kept knows none. */
 export function wayBack(t: Translate, { way_back }: Partial<Pick<LinkState, "way_back">>): Back {
   return way_back ? { label: t("done_return"), href: filledIn(way_back, location.search) } : null;
-}
-
-/** Tell why this link leads nowhere: by the link's status or the server's refusal. */
-export function showRefusal(root: HTMLElement, t: Translate, code: string, message = "", back: Back = null): void {
-  const key = REFUSALS[code];
-  const title = t(code === "link_unknown" ? "link_unknown_title" : "link_title");
-  showNotice(root, { title, text: key ? t(key) : message || t("link_closed"), back });
-}
-
-/** Tell why this browser cannot show the study, and tell the server. */
-export function showClosedGate(
-  root: HTMLElement,
-  t: Translate,
-  link_token: string,
-  closed: GateFinding,
-  device: Abilities,
-  back: Back,
-): void {
-  showNotice(root, { title: t("gate_title"), text: t(closed.reason, closed.values), back });
-  // Nothing waits for this: the participant reads the page, the experimenter the count.
-  void request("POST", "/api/unsupported", { body: { link_token, reason: closed.reason, data: device } }).catch(() => {});
 }
 
 /** The link, or what an earlier visit kept of it and its run where the server does not answer. */
@@ -96,23 +59,5 @@ export async function reach(
   } catch (error) {
     if (!isNoAnswer(error)) throw error;
     return { link: kept.link, kept };
-  }
-}
-
-/** End a run because this browser cannot show the study, where the study screens devices. */
-export async function screenOutDevice(run_token: string, closed: GateFinding, device: Abilities): Promise<void> {
-  const body = { reason: closed.reason, data: device };
-  // Asked twice, where the first answer was lost, the run is closed already.
-  await call("POST", "/api/run/screen-out", { token: run_token, body }).catch((error: unknown) => {
-    if (!(error instanceof Refused && error.code === "run_closed")) throw error;
-  });
-}
-
-/** Where the browser can only nearly show the study, ask whether to go on all the same. */
-export async function passGates(root: HTMLElement, t: Translate, list: GateFinding[]): Promise<void> {
-  for (const { reason, values } of list) {
-    await new Promise<void>((resolve) => {
-      showNotice(root, { title: t("gate_open_title"), text: t(reason, values), actions: [{ label: t("gate_continue"), press: resolve }] });
-    });
   }
 }

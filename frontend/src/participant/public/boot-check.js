@@ -1,23 +1,48 @@
-// For browsers too old for the page itself: old JavaScript on purpose, so that it runs where nothing else does.
+// Why the page has not begun. Old JavaScript on purpose, so that it runs where nothing else does.
 (function () {
   var modules = "noModule" in document.createElement("script");
-  function failed() {
+  var lost = false;
+  var old =
+    "<h1>This browser is too old for the study</h1>" +
+    "<p>Please open the link in a recent Chrome, Edge, Firefox or Safari, on a computer.</p>" +
+    '<p lang="de">Dieser Browser ist zu alt f\u00fcr die Studie. Bitte \u00f6ffnen Sie den Link in einem aktuellen ' +
+    "Chrome, Edge, Firefox oder Safari auf einem Computer.</p>";
+  var away =
+    '<h1>The connection failed</h1><p><a href="">Load the page again</a></p>' +
+    '<p lang="de">Die Verbindung ist ausgefallen. <a href="">Seite neu laden</a></p>';
+  function tell(text) {
     var root = document.getElementById("study");
-    if (!root || root.getAttribute("data-started")) return;
-    root.innerHTML =
-      '<div class="page"><h1>This browser is too old for the study</h1>' +
-      "<p>Please open the link in a recent Chrome, Edge, Firefox or Safari, on a computer.</p>" +
-      '<p lang="de">Dieser Browser ist zu alt f\u00fcr die Studie. Bitte \u00f6ffnen Sie den Link in einem aktuellen ' +
-      "Chrome, Edge, Firefox oder Safari auf einem Computer.</p></div>";
+    if (!root || root.getAttribute("data-started")) return false;
+    root.innerHTML = '<div class="page">' + text + "</div>";
+    return true;
+  }
+  function failed() {
+    if (lost || !tell(old)) return;
     var parts = location.pathname.split("/");
     var report = new XMLHttpRequest();
     report.open("POST", "/api/unsupported");
     report.setRequestHeader("Content-Type", "application/json");
     report.send(JSON.stringify({ link_token: parts[parts.length - 1], reason: "old_browser", data: { user_agent: navigator.userAgent } }));
   }
-  if (modules)
-    window.addEventListener("load", function () {
-      setTimeout(failed, 8000);
-    });
-  else failed();
+  // A script that did not come: loaded again three times, then by hand, as where nothing can be counted.
+  function again(event) {
+    if (event.target.nodeName !== "SCRIPT" || !tell(away)) return;
+    lost = true;
+    var loads = 3;
+    try {
+      loads = Number(sessionStorage.loads || 0);
+      sessionStorage.loads = (loads + 1) % 4;
+    } catch (denied) {
+      // Nothing can be counted: by hand.
+    }
+    if (loads < 3)
+      setTimeout(function () {
+        location.reload();
+      }, 1000);
+  }
+  if (!modules) return failed();
+  window.addEventListener("error", again, true);
+  window.addEventListener("load", function () {
+    setTimeout(failed, 8000);
+  });
 })();

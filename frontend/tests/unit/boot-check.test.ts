@@ -1,0 +1,81 @@
+import { readFileSync } from "node:fs";
+import { runInNewContext } from "node:vm";
+import { describe, expect, it } from "vitest";
+
+const SCRIPT = readFileSync(new URL("../../src/participant/public/boot-check.js", import.meta.url), "utf8");
+
+/** A page in which the script has run, before anything else has; `storage` is what the tab keeps over reloads. */
+class Opened {
+  told = "";
+  reports: string[] = [];
+  reloads = 0;
+  started = false;
+  private readonly listeners: Record<string, (event: object) => void> = {};
+  private readonly later: (() => void)[] = [];
+
+  constructor({ modules = true, storage }: { modules?: boolean; storage?: Record<string, unknown> } = {}) {
+    const root = {
+      getAttribute: () => (this.started ? "yes" : null),
+      set innerHTML(text: string) {
+        tell(text);
+      },
+    };
+    const tell = (text: string): void => void (this.told = text);
+    const sent = (body: string): void => void this.reports.push(body);
+    const window = { addEventListener: (type: string, listener: (event: object) => void) => (this.listeners[type] = listener) };
+    const page = {
+      window,
+      document: { createElement: () => (modules ? { noModule: false } : {}), getElementById: () => root },
+      navigator: { userAgent: "test" },
+      location: { pathname: "/run/abc", reload: () => (this.reloads += 1) },
+      setTimeout: (work: () => void) => this.later.push(work),
+      XMLHttpRequest: class {
+        open(): void {}
+        setRequestHeader(): void {}
+        send(body: string): void {
+          sent(body);
+        }
+      },
+    };
+    runInNewContext(SCRIPT, storage ? { ...page, sessionStorage: storage } : page);
+  }
+
+  /** What the browser does next: an event, and whatever was put off. */
+  happens(type: string, nodeName?: string): this {
+    this.listeners[type]?.({ target: { nodeName } });
+    for (const work of this.later.splice(0)) work();
+    return this;
+  }
+}
+
+const lose = (storage?: Record<string, unknown>): Opened => new Opened(storage && { storage }).happens("error", "SCRIPT").happens("load");
+
+describe("a page that has not begun", () => {
+  it("is loaded again where a script was lost, three times, then by hand, and is never called too old", () => {
+    const storage = {};
+    const opened = [1, 2, 3, 4].map(() => lose(storage));
+    expect(opened.map(({ reloads }) => reloads)).toEqual([1, 1, 1, 0]);
+    for (const { told, reports } of opened) {
+      expect(told).toContain('The connection failed</h1><p><a href="">Load the page again');
+      expect(reports).toEqual([]);
+    }
+    expect(lose(storage).reloads, "by hand the count begins anew").toBe(1);
+  });
+  it("is not loaded again by itself where nothing can be counted", () => {
+    const { told, reloads } = lose();
+    expect([told.includes("The connection failed"), reloads]).toEqual([true, 0]);
+  });
+  it.each([
+    ["knows no modules", new Opened({ modules: false })],
+    ["cannot read the script", new Opened({ storage: {} }).happens("error").happens("load")],
+  ])("is too old where it %s, and the server learns it", (_what, { told, reports, reloads }) => {
+    expect(told).toContain("too old for the study");
+    expect(reports.map((body) => JSON.parse(body) as object)).toMatchObject([{ link_token: "abc", reason: "old_browser" }]);
+    expect(reloads).toBe(0);
+  });
+  it("is left alone once it has begun, whatever is lost then", () => {
+    const opened = new Opened({ storage: {} });
+    opened.started = true;
+    expect(opened.happens("error", "SCRIPT").happens("load")).toMatchObject({ told: "", reports: [], reloads: 0 });
+  });
+});
