@@ -119,11 +119,12 @@ def cancel(services: Services, name: str, identity: Identity, public_id: str) ->
             raise NotFound("There is no such rehearsal; reload the page.")
         if not is_under_way(job):
             return
+        # The file first: a rehearsal whose turn comes in between would be shown as running again.
+        folder = _folder(services, public_id)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / _CANCELLED).touch()
         job.status, job.message, job.finished_at = "cancelled", "", now()
         record(session, identity, "rehearsal cancelled", "study", name)
-    folder = _folder(services, public_id)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / _CANCELLED).touch()
 
 
 def _is_cancelled(folder: Path) -> bool:
