@@ -18,6 +18,20 @@ import {
 } from "../../src/labelling/review";
 import { parseTable } from "../../src/labelling/csv";
 import { traceOf, tracePath, zoomedWindow } from "../../src/labelling/trace";
+import {
+  atFrame,
+  atNeighbour,
+  NO_WORK,
+  withAccepted,
+  withEyes,
+  withLabels,
+  withMove,
+  withoutCurrent,
+  withRedo,
+  withUndo,
+  withVideo,
+  type Work,
+} from "../../src/labelling/work";
 
 const SIZE = [640, 480] as const;
 const flat = (value: number): Grey => ({ width: 4, height: 4, values: new Uint8ClampedArray(16).fill(value) });
@@ -57,6 +71,66 @@ describe("undo", () => {
     expect(undone(undone(history)).now).toBe(0);
     expect(redone(undone(history)).now).toBe(3);
     expect(changed(undone(history), 9).future).toEqual([]);
+  });
+});
+
+describe("the work on a video", () => {
+  const unread = () => Promise.reject(new Error("no pixels here"));
+  const video = { name: "a.mp4", size: SIZE, frameCount: 30, frame: unread, thumbnails: unread, close: () => undefined };
+  const looked = { candidates: [0, 10, 20], pictures: [10, 100, 200].map(flat) };
+  const opened = withVideo(NO_WORK, video, looked);
+  const shape = templateShape(2, SIZE);
+  const accepted = (work: Work): number[] => [...work.history.now].filter(([, frame]) => frame.accepted).map(([number]) => number);
+
+  it("begins with unlike frames and nothing to save", () => {
+    expect([opened.chosen, opened.current, opened.history.now.size]).toEqual([[0, 10, 20], 0, 0]);
+    expect(opened.history.now).toBe(opened.saved);
+    for (const same of [atFrame(NO_WORK, 3), atNeighbour(NO_WORK, 1), withAccepted(NO_WORK, shape), withoutCurrent(NO_WORK)]) {
+      expect(same).toBe(NO_WORK);
+    }
+  });
+  it("accepts what stimuli takes, and says what it would refuse", () => {
+    expect(accepted(withAccepted(opened, shape))).toEqual([0]);
+    const crossed = withPoint(shape, 1, at(shape, 3), SIZE);
+    const refused = withAccepted(opened, crossed);
+    expect([accepted(refused), refused.problem]).toEqual([[], expect.stringContaining("points 2 and 3 cross")]);
+    expect(atNeighbour(refused, 1).problem).toBeNull();
+  });
+  it("takes acceptance back when a point is moved out of order, and keeps it for a fine move", () => {
+    const done = withAccepted(opened, shape);
+    const [x, y] = at(shape, 3);
+    const fine = withMove(done, shape, { index: 3, to: [x, y - 1], kind: "point", step: null });
+    expect([accepted(fine), fine.problem]).toEqual([[0], null]);
+    const crossed = withMove(done, shape, { index: 1, to: [x, y], kind: "point", step: null });
+    expect([accepted(crossed), crossed.problem]).toEqual([[], expect.stringContaining("cross")]);
+    expect([accepted(withUndo(crossed)), withUndo(crossed).problem]).toEqual([[0], null]);
+    expect(accepted(withRedo(withUndo(crossed)))).toEqual([]);
+  });
+  it("goes from frame to frame inside the video; one asked for joins those to label", () => {
+    expect(atNeighbour(opened, -1)).toBe(opened);
+    expect(atNeighbour(atNeighbour(opened, 1), 1).current).toBe(20);
+    expect(atFrame(opened, 99)).toMatchObject({ current: 29, chosen: [0, 10, 20, 29] });
+    expect(atFrame(opened, -1)).toMatchObject({ current: 0, chosen: [0, 10, 20] });
+  });
+  it("removes a frame's points so that undo brings them back", () => {
+    const removed = withoutCurrent(withAccepted(opened, shape));
+    expect(accepted(removed)).toEqual([]);
+    expect(accepted(withUndo(removed))).toEqual([0]);
+  });
+  it("takes labels of this video with their markers, and refuses another's", () => {
+    const text = (size: readonly number[], frame: number): string =>
+      JSON.stringify({ image_size_px: size, frames: { [frame]: shape }, mid_upper: [[2], [11]], origin: "me" });
+    const loaded = withLabels(withAccepted(opened, shape), "a.json", parseLabels("a.json", text(SIZE, 12)));
+    expect([accepted(loaded), loaded.current, loaded.chosen]).toEqual([[12], 12, [0, 12, 20]]);
+    expect(loaded.markers).toMatchObject({ midUpper: [[2], [11]], rest: { origin: "me" } });
+    expect([loaded.history.now === loaded.saved, withUndo(loaded).history.now]).toEqual([true, loaded.saved]);
+    expect(() => withLabels(opened, "a.json", parseLabels("a.json", text([900, 480], 1)))).toThrow("900 x 480 pixels");
+    expect(() => withLabels(opened, "a.json", parseLabels("a.json", text(SIZE, 30)))).toThrow("ends at frame 29");
+  });
+  it("begins anew with another number of eyes, the frames to label kept", () => {
+    const one = withEyes({ ...withAccepted(opened, shape), selected: 12 }, 1);
+    expect(one).toMatchObject({ eyes: 1, selected: null, chosen: [0, 10, 20], markers: { midLower: [[7]] } });
+    expect(one.history.now.size).toBe(0);
   });
 });
 

@@ -3,12 +3,11 @@
 import { Button, Group, Text } from "@mantine/core";
 import { type PointerEvent, useEffect, useRef } from "react";
 import { EYE_POINTS, eyeCount, eyeOf, nearestPoint, type Point, pointName, type Shape, type Size } from "../../labelling/points";
+import type { MoveKind } from "../../labelling/work";
 import { useShortcuts } from "../ui/useShortcuts";
 import { toPicture, toScreen, useView, type View } from "./useView";
 
 const REACH_PX = 11;
-
-export type MoveKind = "point" | "eye" | "stretch";
 
 interface Props {
   picture: HTMLCanvasElement;
