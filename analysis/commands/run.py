@@ -60,10 +60,19 @@ def run(
     ] = None,
     series: Annotated[
         int | None,
-        typer.Option(min=1, help="Data series; without it the latest.", show_default=False),
+        typer.Option(
+            min=1,
+            help="Data series: the answers of all versions that measure the same; without it the latest.",
+            show_default=False,
+        ),
     ] = None,
     version: Annotated[
-        int | None, typer.Option(min=1, help="One version of the study alone.", show_default=False)
+        int | None,
+        typer.Option(
+            min=1,
+            help="The answers given under this version of the study alone, without the rest of its series.",
+            show_default=False,
+        ),
     ] = None,
     scale: Annotated[
         str | None,
@@ -98,6 +107,8 @@ def run(
       analysis run exp2 --database postgresql://me@host/palpebra --study spring
 
       analysis run exp1 --origin pilot --series 2
+
+      analysis run exp1 --version 3
 
       analysis run sliders-demo --scale eeriness
 

@@ -135,8 +135,7 @@ def _without_repeats(
 def _refuse_nobody(exclusions: Exclusions, source: str, pool: Pool) -> None:
     if not exclusions.n_runs:
         aside = f" (set aside: {'; '.join(exclusions.set_aside)})" if exclusions.set_aside else ""
-        of_origin = f" of origin '{pool.origin}'" if pool.origin else ""
-        raise NoRatingsError(f"{source} has no ratings{of_origin} yet{aside}")
+        raise NoRatingsError(f"{source} has no ratings{pool} yet{aside}")
     if exclusions.rows.empty:
         excluded = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
         raise NoRatingsError(f"{source}: no participant remains after the declared exclusions: {excluded}")

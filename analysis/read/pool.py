@@ -9,6 +9,8 @@ import pandas as pd
 
 from experiments.errors import InputError
 
+VERSION, SERIES = "study_version", "data_series"
+"""The columns with the version of the study under which an answer was given, and that version's series."""
 DECLARATION = "definition_sha256"
 """The column with the hash of the declaration under which an answer was given."""
 
@@ -24,11 +26,20 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True)
 class Pool:
-    """What is wanted of a study's rows; None leaves the choice to the rows themselves."""
+    """What is wanted of a study's rows; None leaves the choice to the rows themselves.
+
+    A `version` is the answers given under it alone, a `series` those of all versions that measure the same.
+    """
 
     origin: Origin | None = None
     series: int | None = None
     version: int | None = None
+
+    def __str__(self) -> str:
+        """What was asked for, in words: ` of origin 'pilot' in data series 2`; empty where nothing was."""
+        origin = f" of origin '{self.origin}'" if self.origin else ""
+        series = f" in data series {self.series}" if self.series else ""
+        return origin + series + (f" under version {self.version}" if self.version else "")
 
 
 def pooled(
@@ -36,10 +47,10 @@ def pooled(
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """The rows of this pool, and in words which they are and what was left aside.
 
-    Without a wish the origin is the first of participant, pilot and simulated that there is, and the series
-    the latest that has answers given under the declaration with this hash, else the latest; rows of others
-    are left aside and counted. Sources without these columns (exports of older programs) tell the origin by
-    `phase` and `synthetic`, and have one series.
+    Without a wish the origin is the first of participant, pilot and simulated that there is (in the version
+    or series asked for), and the series the latest that has answers given under the declaration with this
+    hash, else the latest; rows of others are left aside and counted. Sources without these columns (exports
+    of older programs) tell the origin by `phase` and `synthetic`, and have one series.
 
     Raises
     ------
@@ -47,22 +58,23 @@ def pooled(
         A series or version that the rows do not have.
     """
     said: list[str] = []
+    rows = _of_number(rows, VERSION, pool.version, source, said)
+    rows = _of_number(rows, SERIES, pool.series, source, said)
     rows = _of_origin(rows, pool.origin, said)
-    rows = _of_number(rows, "study_version", pool.version, source, said)
-    series = _series_of(rows, declaration_sha256) if pool.series is None else pool.series
-    rows = _of_number(rows, "data_series", series, source, said)
-    return rows, (*_named(rows), *said, *_declarations(rows, declaration_sha256))
+    rows = _of_number(rows, SERIES, _series_of(rows, declaration_sha256), source, said)
+    return rows, (*_named(rows, pool), *said, *_declarations(rows, declaration_sha256))
 
 
-def _named(rows: pd.DataFrame) -> Iterator[str]:
-    if "data_series" in rows.columns and len(series := _numbers(rows["data_series"])) == 1:
-        yield f"answers of data series {series[0]}, origin {', '.join(pd.unique(origins(rows)))}"
+def _named(rows: pd.DataFrame, pool: Pool) -> Iterator[str]:
+    if SERIES in rows.columns and len(series := _numbers(rows[SERIES])) == 1:
+        alone = f", version {pool.version} alone" if pool.version else ""
+        yield f"answers of data series {series[0]}{alone}, origin {', '.join(pd.unique(origins(rows)))}"
 
 
 def _series_of(rows: pd.DataFrame, declaration_sha256: str) -> int | None:
-    if "data_series" not in rows.columns:
+    if SERIES not in rows.columns:
         return None
-    series = rows["data_series"]
+    series = rows[SERIES]
     if DECLARATION in rows.columns:
         own = _numbers(series[(rows[DECLARATION] == declaration_sha256).to_numpy()])
         if own:
@@ -120,12 +132,25 @@ def _of_number(
     if not there:
         raise InputError(f"{source} does not say the {what} of its rows; leave the choice of one out")
     if chosen not in there:
-        raise InputError(f"{source} has no {what} {chosen}, but {', '.join(map(str, there))}")
+        raise InputError(f"{source} has no answers of {what} {chosen}; there are those of {_known(rows)}")
     if len(there) == 1:
         return rows
     mine = (rows[column].astype(str) == str(chosen)).to_numpy()
     said.append(f"{what} {chosen}: {(~mine).sum()} rows of others left aside")
     return rows[mine]
+
+
+def _known(rows: pd.DataFrame) -> str:
+    """The series of these rows with their versions, in words."""
+    if VERSION not in rows.columns or SERIES not in rows.columns:
+        column = VERSION if VERSION in rows.columns else SERIES
+        return f"{column.replace('_', ' ')} {', '.join(map(str, _numbers(rows[column])))}"
+    groups = rows[[SERIES, VERSION]].drop_duplicates().groupby(SERIES)[VERSION]
+    versions = {str(series): _numbers(numbers) for series, numbers in groups}
+    return ", ".join(
+        f"data series {series} (version{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))})"
+        for series, numbers in versions.items()
+    )
 
 
 def _numbers(column: pd.Series) -> list[int]:

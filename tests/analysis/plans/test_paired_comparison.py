@@ -1,6 +1,7 @@
 """A study of pairs from its export: the same rules as ratings, abilities, and what cannot be fitted said."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -144,6 +145,49 @@ def test_origins_are_not_pooled(tmp_path, rows) -> None:
     assert (found.n_participants, found.synthetic) == (1, False)
     assert any("origin participant: 132 rows of other origins left aside" in said for said in found.decisions)
     assert report(tmp_path, mixed, pool=Pool(Origin.ALL)).n_participants == 12
+
+
+def in_three_versions(rows):
+    """Version 1 of simulated people, 2 and 3 of the second series, version 3 of participants alone."""
+    own = definition_sha256(DEMO)
+    both = in_two_series(rows, own, own)
+    third = {"data_series": 2, "study_version": 3, "run_origin": "participant", "synthetic": 0}
+    return both + [row | third | {"run": f"{row['run']}-3"} for row in rows]
+
+
+def test_a_version_is_the_answers_given_under_it_alone(tmp_path, rows) -> None:
+    found = report(tmp_path, in_three_versions(rows), pool=Pool(version=2))
+    assert found.n_participants == 12
+    assert found.decisions[:2] == (
+        "answers of data series 2, version 2 alone, origin simulated",
+        f"study version 2: {2 * len(rows)} rows of others left aside",
+    )
+    # The first origin there is would be participant: of this version there is another.
+    assert not report(tmp_path, in_three_versions(rows), pool=Pool(version=3)).synthetic
+    said = report(tmp_path, in_three_versions(rows), pool=Pool(series=2)).decisions
+    assert said[0] == "answers of data series 2, origin participant"
+
+
+@pytest.mark.parametrize(
+    ("pool", "words"),
+    [
+        (Pool(version=4), "no answers of study version 4; there are those of data series 1 (version 1), "),
+        (Pool(series=3), "no answers of data series 3; there are those of data series 1 (version 1), "),
+        (Pool(version=3, series=1), "no answers of data series 1; there are those of data series 2 (version"),
+        (Pool(Origin.PILOT, version=3), "has no ratings of origin 'pilot' under version 3 yet"),
+    ],
+)  # fmt: skip
+def test_an_unknown_version_or_series_is_told_those_there_are(tmp_path, rows, pool, words) -> None:
+    with pytest.raises(InputError, match=re.escape(words)) as refused:
+        report(tmp_path, in_three_versions(rows), pool=pool)
+    if pool.version == 4:
+        assert str(refused.value).endswith("data series 2 (versions 2, 3)")
+
+
+def test_rows_without_versions_are_told_so(tmp_path, rows) -> None:
+    bare = [{key: value for key, value in row.items() if key != "study_version"} for row in rows]
+    with pytest.raises(InputError, match="does not say the study version of its rows; leave the choice"):
+        report(tmp_path, bare, pool=Pool(version=1))
 
 
 BEST = "photorealistic/model"
