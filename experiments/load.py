@@ -14,6 +14,7 @@ from experiments.errors import InputError, did_you_mean
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
 from experiments.toml_lines import line_of
+from experiments.wrong_values import is_follower, wrong_value
 
 FOLDER = Path(__file__).parent
 _LOCATION = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
@@ -87,12 +88,21 @@ def parse_experiment(text: str, source: str = "definition") -> Experiment:
         path, _, message = str(error).partition(": ")
         raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error
     try:
-        return Experiment.model_validate(data)
+        # TOML tells texts, numbers and truth values apart: none is taken for another.
+        return Experiment.model_validate(_with_tuples(data), strict=True)
     except ValidationError as error:
         # A misspelt key is also a missing one: name the misspelling first.
-        details = sorted(error.errors(), key=lambda detail: detail["type"] == "missing")
+        causes = (detail for detail in error.errors() if not is_follower(detail))
+        details = sorted(causes, key=lambda detail: detail["type"] == "missing")
         problems = [_problem(detail, text) for detail in details]
         raise DefinitionError(source, problems) from error
+
+
+def _with_tuples(data: Any) -> Any:
+    """The data with lists as tuples, which is what a strict reading takes for a list."""
+    if isinstance(data, dict):
+        return {key: _with_tuples(value) for key, value in data.items()}
+    return tuple(map(_with_tuples, data)) if isinstance(data, list) else data
 
 
 def _line_in(message: str) -> int | None:
@@ -102,28 +112,22 @@ def _line_in(message: str) -> int | None:
 
 def _problem(detail: Any, text: str) -> Problem:
     location = tuple(_without_tags(detail["loc"]))
-    if detail["type"] == "union_tag_invalid":
+    kind, message = detail["type"], wrong_value(detail | {"loc": location})
+    if location and location[-1] == "[key]":  # The name of a table's key, which stands before it.
+        location, message = location[:-1], f"the key {message}"
+    if kind == "union_tag_invalid":
         location = (*location, detail["ctx"]["discriminator"].strip("'"))
-    path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
-    message = str(detail["msg"]).removeprefix("Value error, ")
-    if not location and (named := _LOCATION.match(message)):
-        path, message = named[1], named[2]
-        location = tuple(path.split("."))
-    if detail["type"] == "extra_forbidden":
+        allowed = [tag.strip(" '") for tag in str(detail["ctx"]["expected_tags"]).split(",")]
+        tag = str(detail["ctx"]["tag"])
+        message = f"no such {location[-1]} '{tag}'{did_you_mean(tag, allowed)}"
+    elif kind == "union_tag_not_found":
+        message = f"the key {detail['ctx']['discriminator'].strip(chr(39))} is required and missing"
+    elif kind == "extra_forbidden":
         word = str(location[-1])
         message = f"unknown key '{word}'{did_you_mean(word, _keys_at(detail['loc'][:-1]))}"
-    elif detail["type"] == "union_tag_invalid":
-        context = detail["ctx"]
-        allowed = [tag.strip(" '") for tag in str(context["expected_tags"]).split(",")]
-        tag = str(context["tag"])
-        message = f"no such {location[-1]} '{tag}'{did_you_mean(tag, allowed)}"
-    elif detail["type"] == "union_tag_not_found":
-        name = detail["ctx"]["discriminator"].strip("'")
-        message = f"the key {name} is required and missing"
-    elif detail["type"] == "missing":
-        message = "this key is required and missing"
-    elif "input" in detail and isinstance(detail["input"], str | int | float | bool):
-        message = f"{message}, got {detail['input']!r}"
+    elif not location and (named := _LOCATION.match(message)):
+        location, message = tuple(named[1].split(".")), named[2]
+    path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
     return Problem(line_of(text, location), path, message)
 
 

@@ -11,6 +11,7 @@ from experiments.base import Declaration
 from experiments.checks import CheckName
 from experiments.errors import InputError
 from experiments.source_video import SourceVideo
+from experiments.wrong_values import wrong_value
 
 MANIFEST_NAME = "manifest.json"
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
@@ -145,7 +146,7 @@ def read_manifest(folder: Path) -> Manifest:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: {key}: {first['msg']}; build the clips again") from error
+        raise InputError(f"{path}: {key}: {wrong_value(first)}; build the clips again") from error
 
 
 def check_files(manifest: Manifest, folder: Path) -> None:

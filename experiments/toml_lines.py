@@ -19,8 +19,10 @@ def line_of(text: str, location: Sequence[object]) -> int | None:
     places = _places(text)
     prefix = list(location)
     while prefix:
-        if tuple(prefix) in places:
-            return places[tuple(prefix)]
+        # `[[a]]` has no line of its own where one says `a`: its first element's is meant.
+        for key in (tuple(prefix), (*prefix, 0)):
+            if key in places:
+                return places[key]
         prefix.pop()
     return None
 

@@ -8,6 +8,7 @@ from pydantic_core import ErrorDetails
 
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
+from experiments.wrong_values import wrong_value
 from server.errors import ApiError
 from server.settings import Settings
 
@@ -74,7 +75,7 @@ def _call(*, standalone_mode: bool) -> object:
 def _setting(problem: ErrorDetails) -> str:
     name = "__".join(map(str, problem["loc"])).upper() or "a setting"
     shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
-    return f"{shown}: {problem['msg']}, got {problem['input']!r}; see docs/settings.md"
+    return f"{shown}: {wrong_value(problem)}; see docs/settings.md"
 
 
 def main() -> None:

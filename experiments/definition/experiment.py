@@ -33,6 +33,7 @@ from experiments.rules import (
 )
 from experiments.trials import KINDS, reserved_names
 from experiments.trials.union import AnyTrial
+from experiments.wrong_values import wrong_value
 
 STORED = "stored"
 """Context of the validation of a declaration that a database holds: names taken since then stay allowed."""
@@ -134,7 +135,7 @@ class Experiment(Declaration):
         except ValueError as error:
             raise ValueError(f"render.{error}") from None
         factor = {"name": "character", "label": "Character", "character": names}
-        return {**data, "factors": [*factors, factor], "render": {**render, "character": names[0]}}
+        return {**data, "factors": (*factors, factor), "render": {**render, "character": names[0]}}
 
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Self:
@@ -206,7 +207,7 @@ class Experiment(Declaration):
                 try:
                     level.render.applied_to(self.render)
                 except ValidationError as error:
-                    reason = error.errors()[0]["msg"].removeprefix("Value error, ")
+                    reason = wrong_value(error.errors()[0])
                     raise ValueError(f"factors: level '{level.name}' of '{factor.name}': {reason}") from None
         return self
 

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from experiments.base import Declaration, LevelName, Name
 from experiments.definition.names import refuse_repeats
 from experiments.rendering import RenderOverrides
+from experiments.wrong_values import shown
 
 
 class Level(Declaration):
@@ -22,11 +23,11 @@ class Level(Declaration):
     """What clips of this level change of [render]. Levels that change nothing give the same clips."""
 
 
-def names_listed(value: Any) -> list[str]:
+def names_listed(value: Any) -> tuple[str, ...]:
     """The characters of a list; ValueError where it is none or one of them is no name."""
-    names = list(value) if isinstance(value, list | tuple) else []
+    names = tuple(value) if isinstance(value, list | tuple) else ()
     if not names or not all(isinstance(name, str) and _names_a_folder(name) for name in names):
-        raise ValueError(f'character: expected a list such as ["alder", "birch"], got {value!r}')
+        raise ValueError(f'character: expected a list such as ["alder", "birch"], got {shown(value)}')
     return names
 
 
@@ -71,7 +72,7 @@ class Factor(Declaration):
             return data
         if data.get("levels"):
             raise ValueError("a level for each `character`, or `levels` of its own: leave one of them out")
-        levels = [level_of_character(name) for name in names_listed(listed)]
+        levels = tuple(level_of_character(name) for name in names_listed(listed))
         return {**data, "character": (), "levels": levels}
 
     @model_validator(mode="after")

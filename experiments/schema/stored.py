@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from experiments.definition.experiment import STORED, Experiment
 from experiments.errors import InputError
 from experiments.schema.upgrades import upgraded
+from experiments.wrong_values import wrong_value
 
 
 def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
@@ -20,6 +21,6 @@ def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
         path = ".".join(str(part) for part in first["loc"])
         name = definition.get("name", "without a name")
         raise InputError(
-            f"the stored definition {name} (format {number}) cannot be read: {path}: {first['msg']}; "
+            f"the stored definition {name} (format {number}) cannot be read: {path}: {wrong_value(first)}; "
             "use the version of this program that stored it, and report this"
         ) from error

@@ -1,6 +1,5 @@
 """`character.toml`: what a folder of pictures must say to be a character. See docs/characters.md."""
 
-import re
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from experiments.errors import InputError
+from experiments.wrong_values import wrong_value
 
 DECLARATION_FILE = "character.toml"
 Closure = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -179,8 +179,7 @@ def read_declaration(folder: Path) -> Declaration:
 def _first_fault(error: ValidationError) -> str:
     fault = error.errors()[0]
     where = ".".join(str(part) for part in fault["loc"])
-    message = re.sub("^Value error, ", "", fault["msg"])
-    return f"{where}: {message}" if where else message
+    return f"{where}: {wrong_value(fault)}" if where else wrong_value(fault)
 
 
 def declaration_toml(declaration: Declaration) -> str:

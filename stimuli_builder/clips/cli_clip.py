@@ -102,10 +102,11 @@ def settings_from(**values: object) -> "RenderSettings":
     from pydantic import ValidationError
 
     from experiments.rendering import RenderSettings
+    from experiments.wrong_values import wrong_value
 
     try:
         return RenderSettings.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         option = str(first["loc"][-1]) if first["loc"] else "value"
-        raise InputError(f"{option}: {first['msg']}, got {first.get('input')!r}") from error
+        raise InputError(f"{option}: {wrong_value(first)}") from error

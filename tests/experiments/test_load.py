@@ -23,7 +23,7 @@ EXP1 = locate("exp1").read_text(encoding="utf-8")
         ("motion_blur = false", "motion_blr = false", 50, "did you mean 'motion_blur'?"),
         ('rule = "incomplete"', 'rule = "incomplet"', 99, "did you mean 'incomplete'?"),
         ("more_than = 0.2", "mor_than = 0.2", 103, "did you mean 'more_than'?"),
-        ("expected_seconds = 7.3", "expected_seconds = -1", 80, "greater than 0, got -1"),
+        ("expected_seconds = 7.3", "expected_seconds = -1", 80, "expected more than 0, got -1"),
         ("maximum = 120", "maximun = 120", 127, "did you mean 'maximum'?"),
         (
             'own_per = ["profile"]',

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from experiments.errors import InputError, did_you_mean
+from experiments.wrong_values import wrong_value
 from stimuli_builder.characters.facekit.kit import MODES, Array, FaceKit
 
 IDENTITIES_FILE = Path(__file__).with_name("identities.toml")
@@ -110,7 +111,7 @@ def load_identity(name: str, file: Path = IDENTITIES_FILE) -> Identity:
     except ValidationError as error:
         fault = error.errors()[0]
         where = ".".join(str(part) for part in (name, *fault["loc"]))
-        raise InputError(f"{file}: {where}: {fault['msg']}") from error
+        raise InputError(f"{file}: {where}: {wrong_value(fault)}") from error
 
 
 def identity_of_seed(seed: int) -> Identity:

@@ -113,7 +113,7 @@ def test_what_is_wrong_is_named_and_led_to(dashboard: Dashboard) -> None:
     expect(page.get_by_role("button", name="Save as a new version")).to_be_disabled()
     page.get_by_role("link", name="Study", exact=True).click()
     page.get_by_role("link", name=re.compile(r"^blocks\.repeats")).click()
-    expect(page.get_by_text("Input should be greater than or equal to 1").first).to_be_visible()
+    expect(page.get_by_text("expected 1 or more, got 0").first).to_be_visible()
 
 
 def test_a_form_of_the_bank_is_saved_as_a_new_version(dashboard: Dashboard) -> None:

@@ -90,9 +90,9 @@ def test_series_are_the_other_factors_levels_where_none_are_declared() -> None:
         ("trials = 12, ", "", "trial.stop.trials: expected the most trials of a series"),
         ("at_least = 8", "at_least = 12", "sd and entropy never end one"),
         ("trials = 12", "trials = 13", "13 trials of a series do not divide into 2 blocks"),
-        ("sd = 20.0", "sd = 0.0", "greater than 0"),
-        ("[trial]", "[trial]\nlapse = 0.4", "less than or equal to 0.2"),
-        ('asks = "yes_no"', 'asks = "yes_no", guess = 0.95', "less than or equal to 0.9"),
+        ("sd = 20.0", "sd = 0.0", "expected more than 0, got 0.0"),
+        ("[trial]", "[trial]\nlapse = 0.4", "expected at most 0.2, got 0.4"),
+        ('asks = "yes_no"', 'asks = "yes_no", guess = 0.95', "expected at most 0.9, got 0.95"),
         ('asks = "yes_no"', 'asks = "yes_no", guess = 0.9', "guess 0.9 and lapse 0.15 leave nothing"),
         ("[trial]", '[trial]\nfunction = "weibull"\ndirection = "falling"', "got a falling function"),
         (

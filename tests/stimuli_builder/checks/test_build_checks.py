@@ -160,10 +160,10 @@ def test_the_command_says_what_it_made(copied: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("per_block = 2", "per_block = 11", "less than or equal to 10"),
+        ("per_block = 2", "per_block = 11", "expected at most 10, got 11"),
         ("clips = 5", "clips = 3", "expected at least the 4 checks"),
         ('"first_eye"]', '"letter"]', "letter"),
-        ("clips = 5", "clips = 5\ncontrast = 0.0", "greater than 0"),
+        ("clips = 5", "clips = 5\ncontrast = 0.0", "expected more than 0, got 0.0"),
         ("clips = 5", "clips = 5\ndifficulty = nan", "finite"),
         (
             "clips = 5",
