@@ -1,23 +1,22 @@
 """Capsules from the dashboard: built in the background, kept to be downloaded."""
 
-import subprocess
 import threading
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from experiments.errors import InputError
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
 from server.capsules.build import CapsuleContents, build_capsule
 from server.capsules.schemas import CapsuleOut, NewCapsule
 from server.clock import now
 from server.context import Services
-from server.errors import ApiError, Conflict, NotFound
+from server.errors import Conflict, NotFound
 from server.models import Job
 from server.reports import repository
-from server.reports.jobs import begun, is_under_way, note, shown
+from server.reports.jobs import begun, in_background, is_under_way, note, shown
 from server.studies.lookup import find_study
 
 _one_at_a_time = threading.Lock()
@@ -28,6 +27,7 @@ def start(services: Services, name: str, order: NewCapsule, identity: Identity) 
     with services.database.write() as session:
         study = find_study(session, name, identity, "export")
         job = begun(
+            services,
             session,
             study,
             "capsule",
@@ -38,7 +38,7 @@ def start(services: Services, name: str, order: NewCapsule, identity: Identity) 
         record(session, identity, "data downloaded", "study", name, what="capsule", origin=order.origin)
         session.flush()
         capsule = _capsule_out(services, job)
-    threading.Thread(target=_build, args=(services, name, capsule.id, order), daemon=True).start()
+    in_background(services, capsule.id, partial(_build, services, name, capsule.id, order))
     return capsule
 
 
@@ -67,7 +67,7 @@ def remove(services: Services, name: str, public_id: str, identity: Identity) ->
         job = repository.find_job(session, study, "capsule", public_id)
         if job is None:
             raise NotFound("There is no such capsule; reload the page to see which there are.")
-        if is_under_way(job):
+        if is_under_way(services, job):
             raise Conflict("This capsule is being made; delete it when it is done.")
         repository.remove_job(session, study, "capsule", public_id)
         record(session, identity, "capsule removed", "study", name, capsule=public_id)
@@ -79,7 +79,7 @@ def remove_old(services: Services, name: str) -> None:
     oldest = now() - timedelta(days=services.settings.capsule_keep_days)
     with services.database.write() as session:
         study = find_study(session, name, OPERATOR, "view")
-        ended = [job for job in repository.jobs(session, study, "capsule") if not is_under_way(job)]
+        ended = [job for job in repository.jobs(session, study, "capsule") if not is_under_way(services, job)]
         recent = [job for job in ended if job.created_at >= oldest]
         surplus = [job for job in recent if job.status == "done"][services.settings.capsules_kept :]
         gone = [job.public_id for job in ended if job not in recent or job in surplus]
@@ -99,7 +99,7 @@ def _capsule_out(services: Services, job: Job) -> CapsuleOut:
     is_there = job.status == "done" and path.is_file()
     return CapsuleOut.model_validate(
         {
-            **shown(job, "the server was stopped while it was made"),
+            **shown(services, job, "the server was stopped while it was made"),
             "origin": job.parameters.get("origin", "participant"),
             "clips": job.parameters.get("clips", True),
             "bytes": path.stat().st_size if is_there else None,
@@ -109,21 +109,18 @@ def _capsule_out(services: Services, job: Job) -> CapsuleOut:
 
 
 def _build(services: Services, name: str, public_id: str, order: NewCapsule) -> None:
-    """The background thread: every end, good or bad, is written to the job."""
+    """The background thread's work."""
     target = _zip_of(services, public_id)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with _one_at_a_time:
-            note(services, public_id, status="running", started_at=now())
-            made = build_capsule(
-                services,
-                name,
-                CapsuleContents(order.origin, order.clips, order.sensitivity),
-                target,
-                lambda share, step: note(services, public_id, progress=share, message=step),
-            )
-        ended = {"status": "done", "progress": 1.0, "message": "", "result": {"sha256": made.sha256}}
-        note(services, public_id, finished_at=now(), **ended)
-        remove_old(services, name)
-    except (InputError, ApiError, OSError, subprocess.SubprocessError) as error:
-        note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with _one_at_a_time:
+        note(services, public_id, status="running", started_at=now())
+        made = build_capsule(
+            services,
+            name,
+            CapsuleContents(order.origin, order.clips, order.sensitivity),
+            target,
+            lambda share, step: note(services, public_id, progress=share, message=step),
+        )
+    ended = {"status": "done", "progress": 1.0, "message": "", "result": {"sha256": made.sha256}}
+    note(services, public_id, finished_at=now(), **ended)
+    remove_old(services, name)

@@ -21,3 +21,19 @@ def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
         path.chmod(0o600)
         fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         yield
+
+
+def is_left(path: Path) -> bool:
+    """Whether a lock file is there and no process holds it: its process ended before its work."""
+    try:
+        lock = path.open("rb")
+    except FileNotFoundError:
+        return False
+    import fcntl
+
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+    return True

@@ -19,7 +19,7 @@ router = APIRouter(
 def get_latest_rehearsal(services: ServicesDep, identity: Viewer, study: str) -> RehearsalOut | None:
     """The latest rehearsal, and how far it is; null where there is none."""
     with services.database.read() as session:
-        return service.latest(session, study, identity)
+        return service.latest(services, session, study, identity)
 
 
 @router.post("", status_code=202)

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -36,7 +37,7 @@ from server.rehearsals.schemas import (
     Step,
 )
 from server.reports import repository
-from server.reports.jobs import begun, is_under_way, note, shown
+from server.reports.jobs import begun, in_background, is_under_way, note, shown
 from server.reports.process import LONGEST_S
 from server.studies.lookup import active_version, find_study
 
@@ -56,24 +57,24 @@ def start(services: Services, name: str, order: NewRehearsal, identity: Identity
         version = active_version(session, study)
         parameters = {**order.model_dump(), "version": version.number}
         in_the_way = "A rehearsal of this study goes on already; wait for it."
-        job = begun(session, study, "rehearsal", parameters, identity, in_the_way)
+        job = begun(services, session, study, "rehearsal", parameters, identity, in_the_way)
         record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
         session.flush()
-        rehearsal = _out(job)
+        rehearsal = _out(services, job)
         before = [one.public_id for one in repository.jobs(session, study, "rehearsal") if one is not job]
         for public_id in before:
             repository.remove_job(session, study, "rehearsal", public_id)
     for public_id in before:
         shutil.rmtree(_folder(services, public_id), ignore_errors=True)
-    threading.Thread(target=_run, args=(services, name, rehearsal.id, order), daemon=True).start()
+    in_background(services, rehearsal.id, partial(_run, services, name, rehearsal.id, order))
     return rehearsal
 
 
-def latest(session: Session, name: str, identity: Identity) -> RehearsalOut | None:
+def latest(services: Services, session: Session, name: str, identity: Identity) -> RehearsalOut | None:
     """The rehearsal of a study; None where there is none."""
     study = find_study(session, name, identity, "view")
     jobs = repository.latest_jobs(session, study, "rehearsal")
-    return _out(jobs[0]) if jobs else None
+    return _out(services, jobs[0]) if jobs else None
 
 
 def result(
@@ -100,10 +101,10 @@ def _folder(services: Services, public_id: str) -> Path:
     return services.settings.data_folder / "rehearsals" / public_id
 
 
-def _out(job: Job) -> RehearsalOut:
+def _out(services: Services, job: Job) -> RehearsalOut:
     return RehearsalOut.model_validate(
         {
-            **shown(job, "the server was stopped while it went on"),
+            **shown(services, job, "the server was stopped while it went on"),
             "version": job.parameters.get("version", 0),
             "participants": job.parameters.get("participants", 0),
         }
@@ -117,7 +118,7 @@ def cancel(services: Services, name: str, identity: Identity, public_id: str) ->
         job = repository.find_job(session, study, "rehearsal", public_id)
         if job is None:
             raise NotFound("There is no such rehearsal; reload the page.")
-        if not is_under_way(job):
+        if not is_under_way(services, job):
             return
         # The file first: a rehearsal whose turn comes in between would be shown as running again.
         folder = _folder(services, public_id)
@@ -148,7 +149,7 @@ def _turn(services: Services, folder: Path) -> Iterator[bool]:
 
 
 def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> None:
-    """The background thread: every end, good or bad, is written to the job."""
+    """The background thread's work."""
     folder = _folder(services, public_id)
     try:
         _write_inputs(services, name, folder, order)
@@ -162,8 +163,6 @@ def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> 
             return
         ended = {"status": "failed" if problem else "done", "progress": 1.0, "message": problem}
         note(services, public_id, finished_at=now(), **ended)
-    except (OSError, subprocess.SubprocessError, NotFound) as error:
-        note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
     finally:
         shutil.rmtree(folder / "sandbox", ignore_errors=True)
 

@@ -1,22 +1,41 @@
-"""Work in the background that a row of `jobs` tells of: reports and capsules."""
+"""Work in the background that a row of `jobs` tells of: reports, capsules and rehearsals."""
 
+import logging
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
+from experiments.errors import InputError
 from server.accounts.identity import Identity
 from server.clock import now
 from server.context import Services
-from server.errors import Conflict
+from server.errors import ApiError, Conflict
 from server.models import Job, Study
+from server.operations.locking import is_left, locked
 from server.reports import repository
 from server.reports.process import LONGEST_S
 from server.reports.repository import JobKind
 from server.tokens import new_public_id
 
+LOG = logging.getLogger(__name__)
+FORESEEN = (InputError, ApiError, OSError, subprocess.SubprocessError)
+"""Errors whose own words tell the experimenter what to do."""
+UNFORESEEN = "the server met an error that it did not expect; its log says which, please tell its operator"
+UNDER_WAY = ("queued", "running")
+WRITE_AGAIN_S = (1, 2, 4, 8, 15, 30, 60)
+"""How long to wait before the end of a job is written again, where the database did not take it."""
+
 
 def begun(
+    services: Services,
     session: Session,
     study: Study,
     kind: JobKind,
@@ -26,7 +45,7 @@ def begun(
 ) -> Job:
     """A new job that waits; Conflict with the words `in_the_way` where one of its kind is under way."""
     repository.lock_study(session, study)  # two that ask at once would each see none under way
-    if any(is_under_way(job) for job in repository.latest_jobs(session, study, kind)):
+    if any(is_under_way(services, job) for job in repository.latest_jobs(session, study, kind)):
         raise Conflict(in_the_way)
     job = Job(
         public_id=new_public_id(),
@@ -40,9 +59,46 @@ def begun(
     return job
 
 
-def shown(job: Job, stopped: str) -> dict[str, Any]:
+def in_background(services: Services, public_id: str, work: Callable[[], None]) -> None:
+    """Do a job's work in a thread of its own; an error in it, foreseen or not, ends the job as failed.
+
+    While it goes on a lock file is held: where a process dies with its jobs, others see it by that.
+    """
+    held = ExitStack()
+    with suppress(ImportError):  # a system without such locks: the job's age alone tells
+        held.enter_context(locked(_lock_of(services, public_id)))
+    threading.Thread(target=_run, args=(services, public_id, work, held), daemon=True).start()
+
+
+def _run(services: Services, public_id: str, work: Callable[[], None], held: ExitStack) -> None:
+    with held:
+        try:
+            work()
+        except FORESEEN as error:
+            _fail(services, public_id, str(error)[:500])
+        except Exception:
+            LOG.exception("job %s", public_id)
+            _fail(services, public_id, UNFORESEEN)
+        _lock_of(services, public_id).unlink(missing_ok=True)
+
+
+def _fail(services: Services, public_id: str, message: str) -> None:
+    for wait_s in WRITE_AGAIN_S:
+        try:
+            return note(services, public_id, status="failed", message=message, finished_at=now())
+        except SQLAlchemyError:
+            LOG.warning("the end of job %s could not be written; again in %d s", public_id, wait_s)
+            time.sleep(wait_s)
+    return note(services, public_id, status="failed", message=message, finished_at=now())
+
+
+def _lock_of(services: Services, public_id: str) -> Path:
+    return services.settings.data_folder / "jobs" / public_id
+
+
+def shown(services: Services, job: Job, stopped: str) -> dict[str, Any]:
     """What the page shows of a job of any kind; `stopped` is said where the server was stopped meanwhile."""
-    stale = is_abandoned(job)
+    stale = is_abandoned(services, job)
     return {
         "id": job.public_id,
         "status": "failed" if stale else job.status,
@@ -53,19 +109,20 @@ def shown(job: Job, stopped: str) -> dict[str, Any]:
 
 
 def note(services: Services, public_id: str, **values: Any) -> None:
-    """Write how far a job is, or how it ended."""
+    """Write how far a job is, or how it ended; one that has ended stays as it is."""
     with services.database.write() as session:
         job = repository.job_called(session, public_id)
-        if job is not None:
+        if job is not None and job.status in UNDER_WAY:
             for name, value in values.items():
                 setattr(job, name, value)
 
 
-def is_under_way(job: Job) -> bool:
+def is_under_way(services: Services, job: Job) -> bool:
     """Whether a job waits or runs."""
-    return job.status in ("queued", "running") and not is_abandoned(job)
+    return job.status in UNDER_WAY and not is_abandoned(services, job)
 
 
-def is_abandoned(job: Job) -> bool:
-    """Whether the server that ran it was stopped: no job takes this long."""
-    return job.status in ("queued", "running") and now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
+def is_abandoned(services: Services, job: Job) -> bool:
+    """Whether its process has ended; where that was another computer's, no job takes as long."""
+    is_old = now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
+    return job.status in UNDER_WAY and (is_old or is_left(_lock_of(services, job.public_id)))

@@ -1,8 +1,8 @@
 """Build a report: export the ratings, run `analysis run` as a process of its own, keep what it wrote."""
 
 import shutil
-import subprocess
 import threading
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from server.export.pieces import csv_pieces, rating_table
 from server.methods.service import methods_of, read_results, write
 from server.models import Job
 from server.reports import repository
-from server.reports.jobs import begun, note, shown
+from server.reports.jobs import begun, in_background, note, shown
 from server.reports.process import run_analysis
 from server.reports.schemas import NewReport, ReportOut
 from server.seals.service import seal_of
@@ -36,6 +36,7 @@ def start(services: Services, name: str, order: NewReport, identity: Identity) -
     with services.database.write() as session:
         study = find_study(session, name, identity, "run")
         job = begun(
+            services,
             session,
             study,
             "report",
@@ -46,7 +47,7 @@ def start(services: Services, name: str, order: NewReport, identity: Identity) -
         record(session, identity, "report asked for", "study", name, **order.model_dump())
         session.flush()
         report = report_out(services, job)
-    threading.Thread(target=_build, args=(services, name, report.id, order), daemon=True).start()
+    in_background(services, report.id, partial(_build, services, name, report.id, order))
     return report
 
 
@@ -62,7 +63,7 @@ def report_out(services: Services, job: Job) -> ReportOut:
     done = job.status == "done" and folder.is_dir()
     return ReportOut.model_validate(
         {
-            **shown(job, "the server was stopped while it was built"),
+            **shown(services, job, "the server was stopped while it was built"),
             "origin": job.parameters.get("origin") or _origin_of_older(job.parameters),
             "series": job.parameters.get("series"),
             "finished_at": job.finished_at,
@@ -96,7 +97,7 @@ def report_file(
 
 
 def _build(services: Services, name: str, public_id: str, order: NewReport) -> None:
-    """The background thread: every end, good or bad, is written to the job."""
+    """The background thread's work."""
     folder = report_folder(services, public_id)
     inputs = folder.with_name(f".{public_id}.input")
     try:
@@ -109,8 +110,6 @@ def _build(services: Services, name: str, public_id: str, order: NewReport) -> N
                 _add_methods(services, name, folder, order, series)
         status = "failed" if message else "done"
         note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
-    except (OSError, subprocess.SubprocessError, NotFound) as error:
-        note(services, public_id, status="failed", message=str(error)[:500], finished_at=now())
     finally:
         shutil.rmtree(inputs, ignore_errors=True)
 

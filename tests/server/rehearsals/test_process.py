@@ -212,7 +212,7 @@ def test_of_two_who_ask_at_once_one_is_refused(
         try:
             with services.database.write() as session:
                 asked = find_study(session, "short", OPERATOR, "run")
-                begun(session, asked, "rehearsal", {}, somebody, "it goes on already")
+                begun(services, session, asked, "rehearsal", {}, somebody, "it goes on already")
             outcomes.append("begun")
         except Conflict as error:
             outcomes.append(str(error))
@@ -220,7 +220,7 @@ def test_of_two_who_ask_at_once_one_is_refused(
     second = threading.Thread(target=ask)
     with services.database.write() as session:
         first = find_study(session, "short", OPERATOR, "run")
-        begun(session, first, "rehearsal", {}, somebody, "it goes on already")
+        begun(services, session, first, "rehearsal", {}, somebody, "it goes on already")
         session.flush()
         second.start()
         second.join(0.5)
