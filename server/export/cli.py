@@ -1,6 +1,5 @@
 """`server export`: take the data of a study out, in the same forms as the dashboard's data page."""
 
-import secrets
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,6 +10,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from experiments.definition import Experiment
 from experiments.errors import InputError
+from experiments.files import whole_file
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
@@ -112,11 +112,5 @@ def _write(out_file: Path, pieces: Iterable[bytes]) -> int:
     if str(out_file) == "-":
         return sum(sys.stdout.buffer.write(piece) for piece in pieces)
     out_file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = out_file.with_name(f".{out_file.name}.{secrets.token_hex(4)}")
-    try:
-        with temporary.open("wb") as stream:
-            size = sum(stream.write(piece) for piece in pieces)
-        temporary.replace(out_file)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return size
+    with whole_file(out_file) as unfinished, unfinished.open("wb") as stream:
+        return sum(stream.write(piece) for piece in pieces)

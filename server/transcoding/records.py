@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from experiments.files import whole_text
 from experiments.manifest import MANIFEST_NAME
 from video_conversion.prepared import VIDEO_ENDINGS, Prepared
 
@@ -30,9 +31,8 @@ def asked_rate(folder: Path) -> float | None:
 
 def ask_rate(folder: Path, fps: float | None) -> None:
     """Ask for clips of so many frames per second, or for each at its own rate; clips are made anew."""
-    temporary = folder / f"{FRAME_RATE}.new"
-    temporary.write_text("" if fps is None else repr(fps), encoding="ascii")
-    temporary.replace(folder / FRAME_RATE)
+    with whole_text(folder / FRAME_RATE) as stream:
+        stream.write("" if fps is None else repr(fps))
 
 
 def records_of(folder: Path) -> dict[str, Prepared]:

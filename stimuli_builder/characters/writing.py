@@ -1,7 +1,6 @@
 """Write a character's folder: pictures first, the declaration last, so a half-written one never loads."""
 
 import hashlib
-import os
 from io import BytesIO
 from pathlib import Path
 
@@ -9,18 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from experiments.files import whole_file
 from stimuli_builder.characters.declaration import DECLARATION_FILE, Declaration, Picture, declaration_toml
 
 
 def write_bytes(file: Path, content: bytes) -> None:
-    """Write beside the final name, then rename: the name never holds half a file."""
+    """Write a file whole, in a folder that is made where it is not there."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    draft = file.with_name(f".{file.name}.part-{os.getpid()}")
-    try:
-        draft.write_bytes(content)
-        draft.replace(file)
-    finally:
-        draft.unlink(missing_ok=True)
+    with whole_file(file) as temporary:
+        temporary.write_bytes(content)
 
 
 def write_picture(folder: Path, file: str, image: NDArray[np.uint8]) -> Picture:

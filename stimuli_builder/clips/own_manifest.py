@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.files import temporary_beside
+from experiments.files import whole_file
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, check_names, one_form
 from experiments.schema.canonical import definition_sha256
@@ -133,12 +133,8 @@ def _fill(target: Path, folder: Path, made: Path, prepared: Sequence[Prepared]) 
 
 def _copy(source: Path, target: Path) -> None:
     """A whole copy or none."""
-    temporary = temporary_beside(target, source.suffix)
-    try:
+    with whole_file(target) as temporary:
         shutil.copyfile(source, temporary)
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _name_of(folder: Path) -> str:
