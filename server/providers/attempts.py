@@ -15,7 +15,8 @@ from server.errors import NotFound
 from server.models import LoginAttempt, Purpose
 from server.providers import repository
 from server.providers.declaration import Provider
-from server.providers.protocol import NotRecognised, Secrets
+from server.providers.protocol import Secrets
+from server.providers.refusals import NotRecognised
 from server.tokens import derived_token, hash_token, new_token
 
 ATTEMPT_MINUTES = 10

@@ -14,7 +14,7 @@ from server.mail import can_send
 from server.numbers import Number
 from server.providers import attempts, logins, service
 from server.providers.declaration import ProviderId
-from server.providers.protocol import NotRecognised
+from server.providers.refusals import NotRecognised
 from server.providers.schemas import (
     BeginLink,
     BeginSignIn,

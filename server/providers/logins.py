@@ -12,7 +12,8 @@ from server.context import Services
 from server.errors import Conflict, NotFound
 from server.models import Account, AccountLogin, LoginAttempt
 from server.providers import repository
-from server.providers.protocol import NotRecognised, Recognised
+from server.providers.protocol import Recognised
+from server.providers.refusals import NotRecognised
 
 NO_PASSWORD = ""
 """Stored where an account has none: no password has this hash."""

@@ -5,13 +5,11 @@ OpenID Connect Back-Channel Logout 1.0 (2.4, 2.6).
 """
 
 import json
-import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import httpx2
 from authlib.common.errors import AuthlibBaseError
 from authlib.integrations.httpx_client import AsyncOAuth2Client
 from authlib.oauth2.claims import JWTClaims
@@ -21,11 +19,11 @@ from joserfc.errors import InvalidKeyIdError, JoseError
 from joserfc.jwk import KeySet
 from joserfc.jws import JWSRegistry
 
-from server.errors import ApiError
-from server.providers.declaration import Provider, is_safe
+from server.providers.answers import MALFORMED, WHOLE_S, Bounded, json_object
+from server.providers.declaration import Provider
+from server.providers.metadata import Metadata, metadata_of
+from server.providers.refusals import away, no_logout, refused
 
-log = logging.getLogger("palpebra")
-TIMEOUT_S = 10.0
 KEPT_S = 3600.0
 """How long a provider's description and keys are kept."""
 KEYS_AGAIN_S = 60.0
@@ -40,27 +38,6 @@ ESSENTIAL = {"essential": True}
 LOGOUT_EVENT = "http://schemas.openid.net/event/backchannel-logout"
 LOGOUT_TOKEN_S = 300
 """How old a logout token may be."""
-
-
-class ProviderAway(ApiError):
-    """The provider does not answer, or not as one."""
-
-    status = 503
-    code = "provider_away"
-
-
-class NotRecognised(ApiError):
-    """What the provider's answer says does not hold."""
-
-    status = 401
-    code = "sign_in_refused"
-
-
-class LogoutRefused(ApiError):
-    """What came is no logout token that holds (Back-Channel Logout 1.0, 2.8)."""
-
-    status = 400
-    code = "logout_refused"
 
 
 @dataclass(frozen=True)
@@ -96,7 +73,7 @@ class ProviderClient:
 
     def __init__(self, provider: Provider, redirect_uri: str) -> None:
         self.provider, self._redirect_uri = provider, redirect_uri
-        self._metadata: dict[str, Any] = {}
+        self._metadata: Metadata | None = None
         self._keys: dict[str, Any] = {}
         self._metadata_at = self._keys_at = float("-inf")
         self._handled: dict[str, float] = {}
@@ -106,7 +83,7 @@ class ProviderClient:
         metadata = await self._described()
         async with self._client(metadata) as client:
             url, _ = client.create_authorization_url(
-                metadata["authorization_endpoint"],
+                metadata.authorization_endpoint,
                 state=secrets.state,
                 nonce=secrets.nonce,
                 code_verifier=secrets.verifier,
@@ -114,12 +91,12 @@ class ProviderClient:
             )
         return str(url)
 
-    def _asked_of_factors(self, metadata: Mapping[str, Any]) -> dict[str, str]:
+    def _asked_of_factors(self, metadata: Metadata) -> dict[str, str]:
         """Parameters by which the ID token says how somebody signed in, where that is trusted (Core 5.5)."""
         asked = {}
         if self.provider.second_factor_acr:
             asked["acr_values"] = " ".join(self.provider.second_factor_acr)
-        if self.provider.second_factor_amr and metadata.get("claims_parameter_supported") is True:
+        if self.provider.second_factor_amr and metadata.claims_parameter_supported:
             asked["claims"] = json.dumps({"id_token": {"amr": None}})
         return asked
 
@@ -132,9 +109,9 @@ class ProviderClient:
             As the answer names it (RFC 9207); must be there where the provider says that it always is.
         """
         metadata = await self._described()
-        announced = metadata.get("authorization_response_iss_parameter_supported") is True
+        announced = metadata.authorization_response_iss_parameter_supported
         if issuer != self.provider.issuer and (issuer is not None or announced):
-            raise _refused("the answer came from another issuer")
+            raise refused("the answer came from another issuer")
         async with self._client(metadata) as client:
             token = await self._token(client, metadata, code, secrets.verifier)
             claims = await self._claims(metadata, token, secrets.nonce)
@@ -158,12 +135,12 @@ class ProviderClient:
             decoded = await self._decoded(metadata, logout_token, _registry(metadata))
             JWTClaims(decoded.claims, decoded.header, options).validate(leeway=LEEWAY_S)
         except (JoseError, ValueError, TypeError) as error:
-            raise _no_logout(f"it does not hold: {type(error).__name__} {error}") from error
+            raise no_logout(f"it does not hold: {type(error).__name__} {error}") from error
         claims, events = decoded.claims, decoded.claims.get("events")
         if not isinstance(events, dict) or LOGOUT_EVENT not in events or "nonce" in claims:
-            raise _no_logout("it says nothing of signing out, or has a nonce")
+            raise no_logout("it says nothing of signing out, or has a nonce")
         if claims["iat"] < time.time() - LOGOUT_TOKEN_S:
-            raise _no_logout("it is too old")
+            raise no_logout("it is too old")
         return SignedOut(self.provider.issuer, str(claims["sub"]), str(claims["jti"]))
 
     def has_handled(self, ended: SignedOut) -> bool:
@@ -182,9 +159,9 @@ class ProviderClient:
         by_amr = not set(self.provider.second_factor_amr).isdisjoint(m for m in methods if isinstance(m, str))
         return by_amr or claims.get("acr") in self.provider.second_factor_acr
 
-    def _client(self, metadata: Mapping[str, Any]) -> Any:
+    def _client(self, metadata: Metadata) -> Any:
         secret = self.provider.client_secret()
-        methods = metadata.get("token_endpoint_auth_methods_supported") or ["client_secret_basic"]
+        methods = metadata.token_endpoint_auth_methods_supported or ("client_secret_basic",)
         by_post = "client_secret_basic" not in methods and "client_secret_post" in methods
         method = "client_secret_post" if by_post else "client_secret_basic"
         return AsyncOAuth2Client(
@@ -194,50 +171,30 @@ class ProviderClient:
             scope=self.provider.scopes,
             redirect_uri=self._redirect_uri,
             code_challenge_method="S256",
-            timeout=TIMEOUT_S,
+            timeout=WHOLE_S,
+            transport=Bounded(),
             follow_redirects=False,
         )
 
-    async def _described(self) -> Mapping[str, Any]:
-        if time.monotonic() - self._metadata_at > KEPT_S:
-            where = f"{self.provider.issuer.rstrip('/')}/.well-known/openid-configuration"
-            metadata = await self._json(where)
-            if metadata.get("issuer") != self.provider.issuer:
-                raise _away(f"it calls itself {str(metadata.get('issuer'))[:200]!r}")
-            for name in ("authorization_endpoint", "token_endpoint", "jwks_uri"):
-                if not is_safe(str(metadata.get(name, ""))):
-                    raise _away(f"its {name} is not an address by https")
-            self._metadata, self._metadata_at = metadata, time.monotonic()
+    async def _described(self) -> Metadata:
+        if self._metadata is None or time.monotonic() - self._metadata_at > KEPT_S:
+            address = f"{self.provider.issuer.rstrip('/')}/.well-known/openid-configuration"
+            self._metadata = metadata_of(self.provider.issuer, await json_object(address))
+            self._metadata_at = time.monotonic()
         return self._metadata
 
-    async def _json(self, address: str) -> dict[str, Any]:
+    async def _token(self, client: Any, metadata: Metadata, code: str, verifier: str) -> Mapping[str, Any]:
         try:
-            async with httpx2.AsyncClient(timeout=TIMEOUT_S, follow_redirects=False) as client:
-                answer = await client.get(address, headers={"accept": "application/json"})
-            answer.raise_for_status()
-            told = answer.json()
-        except (httpx2.HTTPError, ValueError) as error:
-            raise _away(f"{address}: {type(error).__name__}") from error
-        if not isinstance(told, dict):
-            raise _away(f"{address} is not a JSON object")
-        return told
-
-    async def _token(
-        self, client: Any, metadata: Mapping[str, Any], code: str, verifier: str
-    ) -> Mapping[str, Any]:
-        try:
-            token = await client.fetch_token(metadata["token_endpoint"], code=code, code_verifier=verifier)
+            token = await client.fetch_token(metadata.token_endpoint, code=code, code_verifier=verifier)
         except AuthlibBaseError as error:
-            raise _refused(f"the code was not accepted ({str(error.error)[:60]!r})") from error
-        except (httpx2.HTTPError, ValueError) as error:
-            raise _away(f"token endpoint: {type(error).__name__}") from error
+            raise refused(f"the code was not accepted ({str(error.error)[:60]!r})") from error
+        except MALFORMED as error:
+            raise away(f"token endpoint: {type(error).__name__}") from error
         if not isinstance(token.get("id_token"), str):
-            raise _refused("there is no ID token")
+            raise refused("there is no ID token")
         return dict(token)
 
-    async def _claims(
-        self, metadata: Mapping[str, Any], token: Mapping[str, Any], nonce: str
-    ) -> Mapping[str, Any]:
+    async def _claims(self, metadata: Metadata, token: Mapping[str, Any], nonce: str) -> Mapping[str, Any]:
         """What a checked ID token says: signature, issuer, audience, times, nonce (Core 1.0, 3.1.3.7)."""
         own = self.provider.client_id
         options = {
@@ -253,21 +210,21 @@ class ProviderClient:
             claims = CodeIDToken(decoded.claims, decoded.header, options, params)
             claims.validate(leeway=LEEWAY_S)
         except (JoseError, ValueError, TypeError) as error:
-            raise _refused(f"its ID token does not hold: {type(error).__name__} {error}") from error
+            raise refused(f"its ID token does not hold: {type(error).__name__} {error}") from error
         if not isinstance(claims["sub"], str) or not 1 <= len(claims["sub"]) <= 255:
-            raise _refused("its ID token names no subject")
+            raise refused("its ID token names no subject")
         return dict(claims)
 
-    async def _decoded(self, metadata: Mapping[str, Any], text: str, registry: JWSRegistry) -> jwt.Token:
+    async def _decoded(self, metadata: Metadata, text: str, registry: JWSRegistry) -> jwt.Token:
         keys = await self._key_set(metadata, KEPT_S)
         try:
             return jwt.decode(text, keys, registry=registry)
         except InvalidKeyIdError:
             return jwt.decode(text, await self._key_set(metadata, KEYS_AGAIN_S), registry=registry)
 
-    async def _key_set(self, metadata: Mapping[str, Any], age: float) -> KeySet:
+    async def _key_set(self, metadata: Metadata, age: float) -> KeySet:
         if time.monotonic() - self._keys_at > age:
-            self._keys = await self._json(metadata["jwks_uri"])
+            self._keys = await json_object(metadata.jwks_uri)
             self._keys_at = time.monotonic()
         public = [
             key
@@ -277,39 +234,24 @@ class ProviderClient:
         return KeySet.import_key_set({"keys": public})
 
     async def _user_info(
-        self, client: Any, metadata: Mapping[str, Any], claims: Mapping[str, Any]
+        self, client: Any, metadata: Metadata, claims: Mapping[str, Any]
     ) -> Mapping[str, Any]:
         """Claims that the ID token leaves out, asked for only where a rule or a name needs them."""
         needed = {rule.claim.split(".")[0] for rule in self.provider.roles if rule.claim}
-        endpoint = metadata.get("userinfo_endpoint")
-        if (needed | {"name"}) <= claims.keys() or not is_safe(str(endpoint or "")):
+        endpoint = metadata.userinfo_endpoint
+        if (needed | {"name"}) <= claims.keys() or endpoint is None:
             return {}
         try:
             answer = await client.get(endpoint)
             answer.raise_for_status()
             told = answer.json()
-        except (httpx2.HTTPError, AuthlibBaseError, ValueError) as error:
-            raise _away(f"userinfo: {type(error).__name__}") from error
+        except (AuthlibBaseError, *MALFORMED) as error:
+            raise away(f"userinfo: {type(error).__name__}") from error
         if not isinstance(told, dict) or told.get("sub") != claims["sub"]:
-            raise _refused("its user info is about somebody else")
+            raise refused("its user info is about somebody else")
         return told
 
 
-def _registry(metadata: Mapping[str, Any]) -> JWSRegistry:
-    announced = metadata.get("id_token_signing_alg_values_supported") or ["RS256"]
+def _registry(metadata: Metadata) -> JWSRegistry:
+    announced = metadata.id_token_signing_alg_values_supported or ("RS256",)
     return JWSRegistry(algorithms=sorted(ALGORITHMS.intersection(announced)))
-
-
-def _away(why: str) -> ProviderAway:
-    log.warning("a provider of sign-in cannot be used: %s", why)
-    return ProviderAway("The service to sign in with does not answer as it should; please try again later.")
-
-
-def _no_logout(why: str) -> LogoutRefused:
-    log.warning("a logout token of a provider is refused: %s", why)
-    return LogoutRefused("This is no logout token that holds; the server's log says why.")
-
-
-def _refused(why: str) -> NotRecognised:
-    log.warning("a sign-in by a provider is refused: %s", why)
-    return NotRecognised("The sign-in could not be confirmed; please begin it again.")

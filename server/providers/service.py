@@ -20,7 +20,8 @@ from server.providers.admission import (
 )
 from server.providers.attempts import Begun, begin, keep, provider_of
 from server.providers.logins import link
-from server.providers.protocol import NotRecognised, Recognised, SignedOut
+from server.providers.protocol import Recognised, SignedOut
+from server.providers.refusals import NotRecognised
 from server.providers.roles import bring_up_to_date, held_workspaces, roles_by_claims
 from server.tokens import hash_token, new_token
 

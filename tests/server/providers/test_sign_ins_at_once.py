@@ -17,7 +17,8 @@ from server.errors import ApiError
 from server.models import LoginAttempt
 from server.providers import attempts, service
 from server.providers.declaration import Provider, RoleRule
-from server.providers.protocol import NotRecognised, Recognised
+from server.providers.protocol import Recognised
+from server.providers.refusals import NotRecognised
 from server.settings import Settings
 from server.workspaces import service as workspaces
 
