@@ -207,7 +207,23 @@ class LaplaceLikelihood:
         return self.u[:, 0], np.sqrt(hessian.blocks()[0][:, 0, 0]), trials
 
     def evaluate(self, p: Parameters) -> tuple[float, Parameters]:
-        """Laplace log-likelihood, and its gradient in the form of Parameters."""
+        r"""Laplace log-likelihood, and its gradient in the form of Parameters.
+
+        Notes
+        -----
+        l is the ratings' log-likelihood at the modes b = (u, v), Z their columns times the SDs, W minus the
+        second derivatives of l by eta, and H = Z'WZ + I:
+
+        .. math::
+
+            \mathcal L &= l(\eta) - b'b / 2 - \log|H| / 2 \tag{1} \\
+            q_t &= z_t' H^{-1} z_t, \quad
+            c_t = \partial \log|H| / \partial \eta_t = q_t \, dW_t / d\eta_t \tag{2} \\
+            \partial \mathcal L / \partial \beta &= X' \{l'(\eta) - (c - W Z H^{-1} Z' c) / 2\} \tag{3}
+
+        In (3) the modes move with eta, by -H^-1 Z'W; q is `spread`, c `change`, ZH^-1 Z'c `pull`. Thresholds
+        and SDs follow by the same chain.
+        """
         d, sd = self.data, np.exp(p.log_sd)
         scaled, sd_item = d.z * sd[d.term], float(sd[-1])
         t, hessian = self._modes(p, scaled, sd_item)

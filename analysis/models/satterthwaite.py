@@ -57,9 +57,19 @@ class Uncertainty:
         return untold
 
     def f_test(self, beta: Floats, contrasts: Floats) -> tuple[float, int, float, float]:
-        """F, its two df and p of `contrasts` (q, f) @ beta = 0.
+        r"""F, its two df and p of `contrasts` (q, f) @ beta = 0.
 
         One df per eigenvector of the contrasts' covariance, pooled by the mean of F (Fai & Cornelius 1996).
+
+        Notes
+        -----
+        .. math::
+
+            F = \frac{1}{q} \sum_i \frac{(p_i' L \hat\beta)^2}{\lambda_i}, \quad
+            \nu_i = \frac{2 \lambda_i^2}{g_i' A g_i} \tag{1}
+
+        lambda and p are eigenvalues and eigenvectors of L C L', C the covariance of beta; g_i is the
+        gradient of lambda_i by (theta, sigma), and A the covariance of these.
         """
         covariance = contrasts @ self.covariance @ contrasts.T
         values, vectors = np.linalg.eigh(covariance)
@@ -73,7 +83,20 @@ class Uncertainty:
 
 
 def uncertainty(c: CrossProducts, theta: Floats, at: Criterion) -> Uncertainty:
-    """From the Hessian of the deviance in (theta, sigma) at the REML estimate.
+    r"""From the Hessian of the deviance in (theta, sigma) at the REML estimate.
+
+    Notes
+    -----
+    .. math::
+
+        D &= h(\theta) + 2 \nu \log \sigma + r^2(\theta) / \sigma^2 \tag{2} \\
+        \partial^2 D / \partial \sigma^2 &= 4 \nu / \sigma^2, \quad
+        \partial^2 D / \partial \sigma \, \partial \theta = -2 (r^2)' / \sigma^3 \quad
+        \text{where } \sigma^2 = r^2 / \nu \tag{3} \\
+        A &= 2 H^{-1} \tag{4}
+
+    r^2 is the penalised residual sum of squares, h what the random effects' determinants add, H the matrix of
+    (3) with the second derivatives by theta, A the covariance of (theta, sigma) in (1).
 
     A theta at its bound of zero is left out: neither deviance nor covariance changes there to first order.
     """

@@ -209,7 +209,18 @@ def _softmax_step(
 def _thurstone_step(
     model: Model, counts: Counts, parameters: Array, firth: bool
 ) -> tuple[float, Array, Array, Array]:
-    r"""Thurstone's case V, P(left) = Phi(lambda_l - lambda_r + delta): the difference has SD 1."""
+    r"""Thurstone's case V: the difference of two impressions is normal with SD 1.
+
+    .. math::
+
+        P(\text{left}) &= \Phi(\eta), \quad \eta = \lambda_l - \lambda_r + \delta \tag{1} \\
+        \partial l / \partial \eta &= y_l \, \varphi(\eta) / \Phi(\eta)
+            - y_r \, \varphi(\eta) / \Phi(-\eta) \tag{2} \\
+        I &= n \, \varphi(\eta)^2 / \{\Phi(\eta) \Phi(-\eta)\} \tag{3}
+
+    lambda are the abilities, delta the advantage of the left side, y_l and y_r how often each side of a pair
+    was chosen in n comparisons, l the log-likelihood, I its expected information of eta.
+    """
     del firth  # refused before: the penalty is derived for the logistic model
     z = scores(model, counts.left, counts.right)
     difference = z[:, LEFT] - z[:, RIGHT]

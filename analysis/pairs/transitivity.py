@@ -80,7 +80,16 @@ def _shares(
 
 
 def _circles(comparisons: Comparisons) -> tuple[int, int, int]:
-    """Raters with all pairs once, their circular triads, and the greatest number possible."""
+    r"""Raters with all pairs once, their circular triads, and the greatest number possible.
+
+    .. math::
+
+        d &= \binom{n}{3} - \sum_i \binom{w_i}{2} \tag{1} \\
+        d_{\max} &= (n^3 - n) / 24 \text{ for odd } n, \; (n^3 - 4 n) / 24 \text{ for even} \tag{2}
+
+    w_i is how often item i of n won: a triad that is no circle has one item that won both its pairs (Kendall
+    and Babington Smith 1940).
+    """
     size = len(comparisons.items)
     raters = circles = 0
     most_each = (size**3 - size) // 24 if size % 2 else (size**3 - 4 * size) // 24

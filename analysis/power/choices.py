@@ -127,7 +127,17 @@ class PairsDesign:
         return rng.multinomial(self.repeats, shares).astype(np.float64)
 
     def _robust_p(self, model: Model, fitted: Fit, of_raters: Floats) -> list[float]:
-        """Tests with raters as clusters; `of_raters` (n, pairs, outcomes)."""
+        r"""Tests with raters as clusters; `of_raters` (n, pairs, outcomes).
+
+        .. math::
+
+            F = \frac{n - q}{q (n - 1)} \hat\lambda' V^{-1} \hat\lambda
+                \quad\text{on } q, n - q \text{ df}, \qquad
+            t = \frac{c' \hat\lambda}{\sqrt{c' V c}} \quad\text{on } n - 1 \text{ df} \tag{1}
+
+        lambda are the q free abilities, V their covariance with raters as clusters, c the contrast of two
+        items and n the raters: F is that of Hotelling's T^2.
+        """
         n, q, full = len(of_raters), len(self.abilities) - 1, free_abilities(len(self.abilities))
         if n <= q:
             return [float("nan")] * len(self.effects)

@@ -112,7 +112,18 @@ def _draw(plan: Plan, population: Population, count: int, n: int, rng: np.random
 
 
 def _significant(z: Floats, alpha: float, statistic: Statistic) -> float:
-    """How many data sets of contrast scores z (count, n, q) have p below alpha; NaN where no test exists."""
+    r"""How many data sets of contrast scores z (count, n, q) have p below alpha; NaN where no test exists.
+
+    .. math::
+
+        F &= \frac{n - q}{q} \, n \, \bar z' E^{-1} \bar z \quad\text{on } q, n - q \text{ df} \tag{1} \\
+        F &= n (n - 1) \frac{\bar z' \bar z}{\mathrm{tr} E}
+            \quad\text{on } q \hat\epsilon, q (n - 1) \hat\epsilon
+            \text{ df}, \qquad \hat\epsilon = \frac{(\mathrm{tr} E)^2}{q \, \mathrm{tr}(E^2)} \tag{2}
+
+    z bar are the contrasts' means over n people and E their sums of squares and products about them: (1) is
+    the multivariate test, (2) the univariate one with Greenhouse and Geisser's correction.
+    """
     _, n, q = z.shape
     mean = z.mean(axis=1)
     residual = z - mean[:, None, :]

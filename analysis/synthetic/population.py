@@ -70,9 +70,17 @@ def _cell_means(published: Published, space: DesignSpace, targets: Targets) -> F
 
 
 def _error_variance(z: Floats, target: TestTarget | None, n: int, sd: float, share: float) -> Floats:
-    """Covariance (q, q) of an effect's contrasts; `share` of the error is along the effect itself.
+    r"""Covariance (q, q) of an effect's contrasts; `share` of the error is along the effect itself.
 
-    Exact for F with Hotelling's lambda = F q / (n - q) = n/(n - 1) z' V^-1 z.
+    Exact for F with Hotelling's lambda:
+
+    .. math::
+
+        \lambda &= F q / (n - q) = \frac{n}{n - 1} z' V^{-1} z \tag{1} \\
+        V &= \rho \{(1 - a) \, z'z \, I + a \, z z'\}, \quad \rho = \frac{n}{n - 1} / \lambda \tag{2}
+
+    z are the contrasts' means (q,), V their covariance, n people, a the share. (2) solves (1) for every a,
+    since V z = rho z'z z.
     """
     q = len(z)
     usual = sd**2 * np.eye(q)

@@ -259,9 +259,13 @@ def average(y: Array, errors: Array) -> Average | None:
 
     .. math::
 
-        y_i \sim N(\mu, s_i^2 + \tau^2) \tag{1}
+        y_i &\sim N(\mu, s_i^2 + \tau^2), \quad w_i = 1 / (s_i^2 + \tau^2) \tag{1} \\
+        -\log L_R &= \tfrac{1}{2} \{\log \textstyle\sum_i w_i - \sum_i \log w_i
+            + \sum_i w_i (y_i - \hat\mu)^2\} \tag{2} \\
+        \mathrm{se}^2 &= \textstyle\sum_i w_i (y_i - \hat\mu)^2 / \{(k - 1) \sum_i w_i\} \tag{3}
 
-    with y_i a person's estimate and s_i its standard error.
+    with y_i a person's estimate, s_i its standard error, mu the weighted mean and k the people; (3), with
+    t on k - 1 df, is Hartung and Knapp's (2001).
     """
     if len(y) < 2:
         return None

@@ -133,7 +133,21 @@ class MarginalLikelihood:
         return np.array([self.sign * fit.threshold, self.sign * fit.tilt, *logs])
 
     def value(self, theta: Array) -> tuple[float, Array]:
-        """The log-likelihood and its gradient (5,)."""
+        r"""The log-likelihood and its gradient (5,).
+
+        Notes
+        -----
+        .. math::
+
+            \eta &= \{x - \mu - \sigma u - (\theta + \omega v)(z - \bar z)\} / s \tag{1} \\
+            \log L &= \sum_i \log \sum_{uv} w_{uv} \prod_m p_m^{k_{im}} (1 - p_m)^{n_{im} - k_{im}} \tag{2}
+
+        u, v are the nodes and w their weights; mu and theta the threshold and tilt on average, sigma and
+        omega their SDs over people, s the spread; k of n answers of person i at stimulus m were yes. The
+        derivatives of (1) by mu, theta and the logs of s, sigma and omega are -1/s, -(z - zbar)/s, -eta,
+        -sigma u/s and -omega v (z - zbar)/s; `score` is that of (2) by eta, the nodes weighted by what the
+        answers say of them.
+        """
         mu, tilt, (spread, sd, tilt_sd) = theta[MU], theta[TILT], np.exp(theta[LOG_SPREAD:])
         eta = (self.x - mu - sd * self.u - (tilt + tilt_sd * self.v) * self.away) / spread
         p, slope = self._share(eta)

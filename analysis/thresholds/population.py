@@ -77,7 +77,16 @@ class PopulationLikelihood:
         self.modes = np.zeros((len(trials), 2))
 
     def joint(self, values: Array, u: Array) -> Array:
-        """Log of trials' likelihood times both normal densities, at u (people, m, 2): (people, m)."""
+        r"""Log of trials' likelihood times both normal densities, at u (people, m, 2): (people, m).
+
+        .. math::
+
+            p &= \gamma + (1 - \gamma - \lambda) F\{(x - \mu - \tau u_1) / e^{\nu + \omega u_2}\} \tag{1} \\
+            \log g &= \textstyle\sum_m k_m \log p_m + (n_m - k_m) \log(1 - p_m) - u'u / 2 - \log 2 \pi \tag{2}
+
+        gamma and lambda are guesses and lapses; mu and tau mean and SD of people's thresholds, nu and omega
+        those of the logs of their spreads; k of n answers at stimulus x were yes.
+        """
         mu, log_tau, nu, log_omega = values
         location = mu + np.exp(log_tau) * u[..., :1]
         log_spread = np.clip(nu + np.exp(log_omega) * u[..., 1:], -30.0, 30.0)
@@ -89,7 +98,15 @@ class PopulationLikelihood:
         return np.asarray(trials - (u**2).sum(axis=-1) / 2 - np.log(2 * np.pi))
 
     def _differences(self, values: Array, u: Array) -> tuple[Array, Array]:
-        """Gradient (people, 2) and Hessian (people, 2, 2) of `joint` at u (people, 2), by differences."""
+        r"""Gradient (people, 2) and Hessian (people, 2, 2) of `joint` at u (people, 2), by differences.
+
+        .. math::
+
+            g_1 &= (j_{+0} - j_{-0}) / 2h, \quad h_{11} = (j_{+0} + j_{-0} - 2 j_{00}) / h^2 \tag{3} \\
+            h_{12} &= \{(j_{++} + j_{--} - 2 j_{00}) / h^2 - h_{11} - h_{22}\} / 2 \tag{4}
+
+        j is `joint`, its indices the steps of h along the two coefficients.
+        """
         moves = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]], dtype=float)
         at = self.joint(values, u[:, None, :] + moves)
         gradient = np.stack([at[:, 1] - at[:, 2], at[:, 3] - at[:, 4]], axis=1) / (2 * STEP)

@@ -250,6 +250,19 @@ def effects_of(
 
 
 def _univariate(scores: Sequence[Scores], columns: Floats) -> list[UnivariateTest]:
+    r"""The univariate tests, uncorrected and by the two corrections for sphericity.
+
+    Notes
+    -----
+    .. math::
+
+        F &= \frac{SS / (r q)}{SS_e / (q \nu)}
+            \quad\text{on } \epsilon r q \text{ and } \epsilon q \nu \text{ df} \tag{1} \\
+        \tilde\epsilon &= \frac{(\nu + 1) q \hat\epsilon - 2}{q (\nu - q \hat\epsilon)} \tag{2}
+
+    q contrasts within people, r between them, nu the df of people within groups; epsilon is 1, Greenhouse and
+    Geisser's, or (2), Huynh and Feldt's with Lecoutre's (1991) correction for groups, at most 1.
+    """
     ss, ss_error, r, q, nu, gg = columns.T
     with np.errstate(invalid="ignore", divide="ignore"):
         f = np.where(ss_error > 0, (ss / (r * q)) / (ss_error / (q * nu)), np.nan)

@@ -29,6 +29,19 @@ def noncentrality(f_value: Floats, df_effect: Floats, df_error: Floats, tail: Fl
 
 
 def _newton(f: Floats, d1: Floats, d2: Floats, p: Floats) -> Floats:
+    r"""The root of :math:`G(L) = P(F'_{d_1, d_2}(L) \le f) - p`.
+
+    Notes
+    -----
+    A noncentral F is a mixture over a Poisson count with mean L/2, each one more adding two df:
+
+    .. math::
+
+        G'(L) = \tfrac{1}{2} \{P(F'_{d_1 + 2, d_2}(L) \le f d_1 / (d_1 + 2))
+            - P(F'_{d_1, d_2}(L) \le f)\} \tag{1}
+
+    d1, d2 are the df of effect and error, L the noncentrality. A step that leaves the bracket halves it.
+    """
     low, high = np.zeros_like(f), d1 * f + 10.0
     while (short := special.ncfdtr(d1, d2, high, f) > p).any():
         high[short] *= 2.0
@@ -37,7 +50,7 @@ def _newton(f: Floats, d1: Floats, d2: Floats, p: Floats) -> Floats:
         cdf = special.ncfdtr(d1, d2, guess, f)
         above = cdf > p
         low, high = np.where(above, guess, low), np.where(above, high, guess)
-        # d/dL of the noncentral F: half the difference to the distribution with two more df, same x
+        # eq. 1
         slope = 0.5 * (special.ncfdtr(d1 + 2.0, d2, guess, f * d1 / (d1 + 2.0)) - cdf)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = guess - (cdf - p) / slope

@@ -99,6 +99,15 @@ def _cells(result: AnovaResult) -> list[tuple[str, ...]]:
 
 
 def _levene(where: str, y: Floats, groups: NDArray[np.int64]) -> LeveneTest:
+    r"""Levene's test about medians, Brown and Forsythe (1974).
+
+    .. math::
+
+        F = \frac{\sum_g n_g (\bar d_g - \bar d)^2 / (k - 1)}
+                 {\sum_{gi} (d_{gi} - \bar d_g)^2 / (n - k)}, \quad d_{gi} = |y_{gi} - \tilde y_g| \tag{1}
+
+    over k groups g of n_g people, n altogether; y tilde a group's median.
+    """
     k, n = int(groups.max()) + 1, len(y)
     medians = np.array([np.median(y[groups == g]) for g in range(k)])
     d = np.abs(y - medians[groups])

@@ -9,11 +9,16 @@ FLANK = (0.1, 0.5)
 
 
 def turning_frame(smooth: Array, onset: int, lowest: int, end: int, tolerance: float) -> int:
-    """Frame between onset and end at which closing turns to opening.
+    r"""Frame between onset and end at which closing turns to opening.
 
     A lid lingers where it turns: noise of a hundredth of the amplitude decides which frame is lowest, and
     the filter moves it towards the slower flank. So frames within `tolerance` of the lowest (as part of the
-    amplitude) count alike, and of these the one is taken that parts the bottom as the flanks are steep.
+    amplitude) count alike, and of these the one is taken that parts the bottom as the flanks are steep:
+
+    .. math:: t = t_c + (t_o - t_c) \, T_c / (T_c + T_o) \tag{1}
+
+    t_c and t_o are where closing and opening pass the lower level of FLANK, T_c and T_o how long each takes
+    from one level to the other.
 
     Parameters
     ----------

@@ -84,7 +84,18 @@ def closing(share: Array, sharpness: float) -> Array:
 
 
 def course(motion: Motion, times: Array, rng: np.random.Generator) -> Array:
-    """Closure of one event at `times`; opening is fast, then slow."""
+    r"""Closure of one event at `times`; opening is fast, then slow.
+
+    Notes
+    -----
+    .. math::
+
+        s(x) &= y^2 (3 - 2 y), \quad y = x^a \tag{1} \\
+        c(t) &= d \, s\{(t - t_0) / T_d\}, \text{ then } d \, [1 - s\{(t - t_0 - T_d - T_h) / T_u\}] \tag{2}
+
+    t_0 is the onset; T_d, T_h and T_u last closing, hold and opening; d is the depth and a the sharpness
+    (`closing`). Squints and closed eyes tremble, gaze shifts drift.
+    """
     down = closing((times - motion.onset_s) / motion.down_s, rng.uniform(0.9, 1.3))
     back = (times - motion.onset_s - motion.down_s - motion.hold_s) / motion.up_s
     up = closing(back, rng.uniform(0.55, 0.95))
