@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
+from itertools import count
 from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
@@ -175,10 +176,16 @@ def _suggested(stems: Sequence[str], between: str) -> str | None:
     for number, position in enumerate(varying, start=1):
         guessed, head = name_and_prefix(columns[position])
         last = position == len(columns) - 1 and len(varying) > 1
-        if last and (guessed in TAKES or (all(part.isdigit() for part in columns[position]))):
+        counts = all(part.removeprefix(head).isdigit() for part in columns[position])
+        if last and counts and (head == "" or guessed in TAKES):
             guessed = FIRST_FIELD
         if guessed is None or guessed in taken:
-            guessed, head = f"factor{number}", ""
+            guessed, head = _free_number(number, taken), ""
         taken.add(guessed)
         words[position] = f"{head}{{{guessed}}}"
     return between.join(words)
+
+
+def _free_number(number: int, taken: set[str]) -> str:
+    """`factor1` and so on, after those that the names themselves have taken."""
+    return next(name for k in count(number) if (name := f"factor{k}") not in taken)

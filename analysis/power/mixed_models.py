@@ -81,6 +81,12 @@ class MixedDesign:
                     f"{'' if self.crossed else f' in {self.conditions} conditions'}; expected a multiple of "
                     f"{max(cell, 2)}"
                 )
+            if not self.faces and clips == cell:
+                raise InputError(
+                    f"{clips} clips are one a condition, and what is the clip's cannot be told from what is "
+                    f"the condition's; expected {2 * cell} or more, or --crossed where each clip is shown in "
+                    "every condition"
+                )
         if self.faces and min(self.faces) < 2:
             raise InputError("expected at least two faces; leave --faces out for a study of one")
 

@@ -154,17 +154,24 @@ def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> 
     try:
         _write_inputs(services, name, folder, order)
         with _turn(services, folder) as mine:
-            if not mine:
+            # One that was cancelled and replaced before it had a folder has lost its mark with the folder.
+            if not mine or _status(services, public_id) != "queued":
                 return
             note(services, public_id, status="running", message="beginning", started_at=now())
             problem = _in_sandbox(services, public_id, folder)
         if _is_cancelled(folder):
-            note(services, public_id, status="cancelled", message="", finished_at=now())
             return
         ended = {"status": "failed" if problem else "done", "progress": 1.0, "message": problem}
         note(services, public_id, finished_at=now(), **ended)
     finally:
         shutil.rmtree(folder / "sandbox", ignore_errors=True)
+        if _status(services, public_id) is None:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _status(services: Services, public_id: str) -> str | None:
+    with services.database.read() as session:
+        return repository.status_of(session, public_id)
 
 
 def _write_inputs(services: Services, name: str, folder: Path, order: NewRehearsal) -> None:

@@ -124,5 +124,9 @@ def is_under_way(services: Services, job: Job) -> bool:
 
 def is_abandoned(services: Services, job: Job) -> bool:
     """Whether its process has ended; where that was another computer's, no job takes as long."""
-    is_old = now() - job.created_at > timedelta(seconds=2 * LONGEST_S)
-    return job.status in UNDER_WAY and (is_old or is_left(_lock_of(services, job.public_id)))
+    if job.status not in UNDER_WAY:
+        return False
+    lock = _lock_of(services, job.public_id)
+    if lock.exists():
+        return is_left(lock)
+    return now() - (job.started_at or job.created_at) > timedelta(seconds=2 * LONGEST_S)

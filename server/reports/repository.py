@@ -34,8 +34,13 @@ def find_job(session: Session, study: Study, kind: JobKind, public_id: str) -> J
 
 
 def job_called(session: Session, public_id: str) -> Job | None:
-    """The job with this public id, of whatever study."""
-    return session.scalar(select(Job).where(Job.public_id == public_id))
+    """The job with this public id, of whatever study, kept from others until the transaction ends."""
+    return session.scalar(select(Job).where(Job.public_id == public_id).with_for_update())
+
+
+def status_of(session: Session, public_id: str) -> str | None:
+    """How far the job with this public id is; None where there is none any more."""
+    return session.scalar(select(Job.status).where(Job.public_id == public_id))
 
 
 def remove_job(session: Session, study: Study, kind: JobKind, public_id: str) -> None:

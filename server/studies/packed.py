@@ -1,7 +1,9 @@
 """Zips of own clips: unpacked flat, bounded in number, in size and in what their directory takes."""
 
 import io
+import lzma
 import zipfile
+import zlib
 from collections import Counter
 from pathlib import Path, PurePosixPath
 
@@ -9,6 +11,15 @@ from experiments.own_clips import check_names
 from server.errors import Invalid
 from server.studies.uploaded_file import UploadTooLarge, copy, safe_name
 
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+)
+"""What unpacking raises by itself; RuntimeError where a file is encrypted."""
 MAX_FILES = 5000
 MAX_UNPACKED_BYTES = 4 * 1024**3
 MAX_RATIO = 200
@@ -40,7 +51,7 @@ def unpack(packed: Path, folder: Path) -> None:
             for member in members:
                 with archive.open(member) as source:
                     copy(source, folder / safe_name(member.filename), member.file_size)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+    except _DAMAGED as error:
         raise Invalid("The zip file is damaged or encrypted; please pack it again.") from error
 
 

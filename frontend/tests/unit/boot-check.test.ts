@@ -3,6 +3,7 @@ import { runInNewContext } from "node:vm";
 import { describe, expect, it } from "vitest";
 
 const SCRIPT = readFileSync(new URL("../../src/participant/public/boot-check.js", import.meta.url), "utf8");
+const OWN = "https://study.example/assets/participant/index.js";
 
 /** A page in which the script has run, before anything else has; `storage` is what the tab keeps over reloads. */
 class Opened {
@@ -10,6 +11,7 @@ class Opened {
   reports: string[] = [];
   reloads = 0;
   started = false;
+  starts_meanwhile = false;
   private readonly listeners: Record<string, (event: object) => void> = {};
   private readonly later: (() => void)[] = [];
 
@@ -41,8 +43,9 @@ class Opened {
   }
 
   /** What the browser does next: an event, and whatever was put off. */
-  happens(type: string, nodeName?: string): this {
-    this.listeners[type]?.({ target: { nodeName } });
+  happens(type: string, nodeName?: string, src = OWN): this {
+    this.listeners[type]?.({ target: { nodeName, src } });
+    if (this.starts_meanwhile) this.started = true;
     for (const work of this.later.splice(0)) work();
     return this;
   }
@@ -72,6 +75,13 @@ describe("a page that has not begun", () => {
     expect(told).toContain("too old for the study");
     expect(reports.map((body) => JSON.parse(body) as object)).toMatchObject([{ link_token: "abc", reason: "old_browser" }]);
     expect(reloads).toBe(0);
+  });
+  it("is left alone where the script of somebody else was lost, and where it begins after all", () => {
+    const others = new Opened({ storage: {} });
+    expect(others.happens("error", "SCRIPT", "https://extension.example/extra.js")).toMatchObject({ told: "", reloads: 0 });
+    const late = new Opened({ storage: {} });
+    late.starts_meanwhile = true;
+    expect(late.happens("error", "SCRIPT").reloads).toBe(0);
   });
   it("is left alone once it has begun, whatever is lost then", () => {
     const opened = new Opened({ storage: {} });

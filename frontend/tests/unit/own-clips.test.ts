@@ -36,6 +36,11 @@ describe("sizes of clips", () => {
     );
   });
 
+  it("are not said to be those of most where they are half of them", () => {
+    const small = (name: string) => ({ name, width_px: 320, height_px: 240 });
+    expect(sizeRemark([wide("a.mp4"), small("b.mp4"), wide("c.mp4"), small("d.mp4")])).toContain("others are 640 x 360");
+  });
+
   it("are no matter where all are one, or not known", () => {
     expect(sizeRemark([wide("a.mp4"), wide("b.mp4"), { name: "c.mp4", width_px: null, height_px: null }])).toBeNull();
     expect(sizeRemark([])).toBeNull();

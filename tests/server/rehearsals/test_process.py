@@ -16,6 +16,7 @@ from server.context import Services
 from server.errors import Conflict
 from server.models import Account, Job
 from server.rehearsals import service
+from server.rehearsals.schemas import NewRehearsal
 from server.reports.jobs import begun
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
@@ -170,6 +171,14 @@ def test_a_rehearsal_is_cancelled_with_all_that_it_started(
     experimenter.send("POST", PATH, {})
     until(lambda: is_over(experimenter))
     assert latest(experimenter)["status"] == "done"
+
+
+def test_one_that_was_replaced_before_it_had_a_folder_never_begins(
+    services: Services, experimenter: Admin, study: StudyInDatabase, program: Callable[[str], None]
+) -> None:
+    program(BEGINS_A_CHILD)
+    service._run(services, "short", "replaced", NewRehearsal())
+    assert not (folder_of(services) / "replaced").exists()
 
 
 def test_a_rehearsal_waits_for_one_in_another_process_of_the_server(

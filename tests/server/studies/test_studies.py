@@ -196,6 +196,17 @@ def test_cells_must_have_equally_many_clips(experimenter: Admin) -> None:
     )
 
 
+def spoilt(compression: int) -> bytes:
+    """A zip whose only file cannot be unpacked from its first byte on."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", compression) as archive:
+        archive.writestr("a.mp4", bytes(range(256)))
+    begin = 30 + len("a.mp4")  # of the data, behind the file's own header
+    content = bytearray(stream.getvalue())
+    content[begin : begin + 20] = b"\xff" * 20
+    return bytes(content)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "status", "message"),
     [
@@ -205,6 +216,8 @@ def test_cells_must_have_equally_many_clips(experimenter: Admin) -> None:
         ("clips.zip", zipped({"a/one.mp4": b"x", "b/one.mp4": b"y"}), 422, "more than once"),
         ("clips.zip", zipped({"bomb.mp4": bytes(40_000_000)}), 422, "unpacks to far more"),
         ("clips.zip", b"PK not a zip", 422, "damaged"),
+        ("clips.zip", spoilt(zipfile.ZIP_DEFLATED), 422, "damaged"),
+        ("clips.zip", spoilt(zipfile.ZIP_LZMA), 422, "damaged"),
         ("../clip.mp4", b"x", 422, "not allowed"),
     ],
 )  # fmt: skip

@@ -18,5 +18,6 @@ export function sizeRemark(files: readonly Sized[]): string | null {
   const named = odd.length === 1 ? `${first.name} is` : `${first.name} and ${odd.length - 1} more are`;
   const sizes = others.slice(0, 3).flatMap(([one]) => (one === undefined ? [] : sizeOf(one)));
   const turned = odd.some((file) => isUpright(file) !== isUpright(usual)) ? " Is one turned the wrong way?" : "";
-  return `${named} ${sizes.join(" or ")} pixels, most are ${sizeOf(usual)}.${turned} Participants see the size, too: is it meant?`;
+  const rest = most.length > odd.length ? "most" : "others";
+  return `${named} ${sizes.join(" or ")} pixels, ${rest} are ${sizeOf(usual)}.${turned} Participants see the size, too: is it meant?`;
 }

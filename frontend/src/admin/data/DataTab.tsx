@@ -15,7 +15,7 @@ const FILES: [file: string, title: string, words: string][] = [
   ["wide.sav", "Wide table for SPSS", "One row a visit, with labels of variables and of the answers to forms."],
   ["ratings.parquet", "Answers as Parquet", "One row a play, with types and levels: for pandas, Polars, Arrow and DuckDB."],
   ["analysis.R", "Script for R", "Analyses the answers with afex, emmeans and lme4. Save it beside the answers."],
-  ["analysis.py", "Script for Python", "Analyses the answers with pandas and pingouin. Save it beside the answers."],
+  ["analysis.py", "Script for Python", "Analyses the answers with pandas and statsmodels. Save it beside the answers."],
   [
     "psych-ds.zip",
     "Psych-DS dataset",

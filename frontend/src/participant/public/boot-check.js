@@ -26,7 +26,8 @@
   }
   // A script that did not come: loaded again three times, then by hand, as where nothing can be counted.
   function again(event) {
-    if (event.target.nodeName !== "SCRIPT" || !tell(away)) return;
+    // Others' scripts, an extension's for one, are lost without harm.
+    if (event.target.nodeName !== "SCRIPT" || event.target.src.indexOf("/assets/") < 0 || !tell(away)) return;
     lost = true;
     var loads = 3;
     try {
@@ -37,7 +38,7 @@
     }
     if (loads < 3)
       setTimeout(function () {
-        location.reload();
+        if (tell(away)) location.reload();
       }, 1000);
   }
   if (!modules) return failed();
