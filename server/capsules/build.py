@@ -27,6 +27,7 @@ from server.accounts.identity import OPERATOR
 from server.capsules.crate import CRATE_FILE, crate_metadata
 from server.clock import now
 from server.context import Services
+from server.export.extract import Extract
 from server.export.psych_ds import Folder, dataset_folder
 from server.methods.service import Counted, counted, paragraph_of, read_results, write_beside
 from server.models import Study, StudyVersion
@@ -110,7 +111,7 @@ def _without_answers(manifest: Mapping[str, Any]) -> dict[str, Any]:
 def _write_study(
     session: Session, study: Study, version: StudyVersion, folder: Path, made: str, contents: CapsuleContents
 ) -> ReportSource:
-    exported: Folder = dataset_folder(session, study, made, contents.origin)
+    exported: Folder = dataset_folder(session, study, made, Extract(contents.origin))
     for path, pieces in exported.members:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         with (folder / path).open("wb") as stream:

@@ -14,8 +14,8 @@ from experiments.files import whole_file
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
+from server.export.extract import ExportOrigin, Extract
 from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed
-from server.export.origins import ExportOrigin
 from server.export.repository import runs_by_origin
 from server.export.scripts import LANGUAGES, script
 from server.studies.lookup import active_definition, find_study
@@ -44,6 +44,10 @@ def export(
     origin: Annotated[
         ExportOrigin, typer.Option(help="Whose data: of one origin, or all together.")
     ] = "participant",
+    series: Annotated[
+        int | None,
+        typer.Option(min=1, help="Data of one data series; without it of all, told apart by a column."),
+    ] = None,
     bom: Annotated[
         bool, typer.Option("--bom", help="Begin a CSV with a byte order mark, by which Excel knows UTF-8.")
     ] = False,
@@ -73,18 +77,22 @@ def export(
       server export exp3 --format psych-ds --out exp3.zip
 
       server export exp3 --origin simulated --out rehearsal.csv
+
+      server export exp3 --series 2 --out exp3-series-2.csv
     """
     beside = ""
     if (bom or guard) and form not in CSV_FORMATS:
         raise InputError(f"--bom and --guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
     with migrated_services() as services, services.database.snapshot() as session:
         known = find_study(session, study, OPERATOR, "view")
+        extract = Extract(origin, series)
+        extract.definition(session, known)
         if form != "codebook":
             action = "identities downloaded" if form == "identities" else "data downloaded"
             with services.database.write() as noted:
                 record(noted, None, action, "study", study, what=form, origin=origin)
         try:
-            size = _write(out_file, proofed(FORMATS[form](session, known, origin), form, bom, guard))
+            size = _write(out_file, proofed(FORMATS[form](session, known, extract), form, bom, guard))
             if form == "csv" and scripts and str(out_file) != "-":
                 beside = _write_scripts(out_file, active_definition(session, known))
         except (ValueError, SQLAlchemyError) as error:

@@ -17,12 +17,13 @@ from server.accounts.identity import Exporter, Identity, Myself, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Conflict
 from server.export.converted import convert, write_table
+from server.export.extract import EVERYTHING, ExportOrigin, Extract
 from server.export.formats import CONVERSIONS, FORMATS, Conversion, Format, proofed, row_count
 from server.export.identities import check_readable
-from server.export.origins import ExportOrigin
 from server.export.scripts import ScriptLanguage, script
 from server.identities.sealing import UnreadableError
 from server.models import Right
+from server.numbers import Number
 from server.studies.lookup import active_definition, find_study
 from server.text import encoded
 
@@ -43,6 +44,9 @@ ROWS_HEADER = "palpebra-rows"
 Excel = Annotated[
     bool, Query(description="Begin with a byte order mark, and make cells text that a spreadsheet would run.")
 ]
+Series = Annotated[
+    Number | None, Query(description="Data of one data series; without it of all, told apart by a column.")
+]
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class Download:
     services: Services
     identity: Identity
     study: str
-    origin: ExportOrigin
+    extract: Extract
     excel: bool = False
 
     def note(self, form: Format) -> None:
@@ -60,13 +64,14 @@ class Download:
         action = "identities downloaded" if form == "identities" else "data downloaded"
         right: Right = "own" if form == "identities" else "export"
         with self.services.database.write() as session:
-            find_study(session, self.study, self.identity, right)
-            record(session, self.identity, action, "study", self.study, what=form, origin=self.origin)
+            self.extract.definition(session, find_study(session, self.study, self.identity, right))
+            series = {} if self.extract.series is None else {"series": self.extract.series}
+            details = {"what": form, "origin": self.extract.origin} | series
+            record(session, self.identity, action, "study", self.study, **details)
 
     def file_name(self, form: Format, file: str) -> str:
-        """The file's name with the study's, and the origin's where the export is not of participants."""
-        plain = self.origin == "participant" or form == "identities"
-        return f"{self.study}-{file}" if plain else f"{self.study}-{self.origin}-{file}"
+        """The file's name with the study's, the origin where it is not participants, and the series."""
+        return f"{self.study}{'' if form == 'identities' else self.extract.file_part}-{file}"
 
     def stream(self, form: Format, media_type: str, file: str) -> StreamingResponse:
         """The export as it is read from the database."""
@@ -93,23 +98,27 @@ class Download:
         """The number of rows, then the export; a fault ends the connection before the answer is whole."""
         with self.services.database.snapshot() as session:
             study = find_study(session, self.study, self.identity, "view")
-            yield str(row_count(form, session, study, self.origin)).encode()
-            export = FORMATS[form](session, study, self.origin)
+            yield str(row_count(form, session, study, self.extract)).encode()
+            export = FORMATS[form](session, study, self.extract)
             yield from proofed(export, form, bom=self.excel, guard=self.excel)
 
     def write(self, conversion: Conversion, folder: Path) -> int:
         """Write a table from one snapshot, which ends before the conversion; return its rows."""
         with self.services.database.snapshot() as session:
             study = find_study(session, self.study, self.identity, "view")
-            table = conversion.table(session, study, self.origin)
+            table = conversion.table(session, study, self.extract)
             write_table(table, folder)
         return table.count
 
 
 async def _asked(
-    services: ServicesDep, identity: Exporter, study: str, origin: ExportOrigin = "participant"
+    services: ServicesDep,
+    identity: Exporter,
+    study: str,
+    origin: ExportOrigin = "participant",
+    series: Series = None,
 ) -> Download:
-    return Download(services, identity, study, origin)
+    return Download(services, identity, study, Extract(origin, series))
 
 
 async def _asked_as_csv(download: Annotated[Download, Depends(_asked)], excel: Excel = False) -> Download:
@@ -168,14 +177,16 @@ def download_psych_ds(asked: Asked) -> StreamingResponse:
 @router.get("/identities.csv", response_class=StreamingResponse)
 def download_identities(services: ServicesDep, identity: Myself, study: str) -> StreamingResponse:
     """Recruiters' ids beside the pseudonyms, one row a visit; for owners of the study, and audited."""
-    return Download(services, identity, study, "all").stream("identities", CSV_TYPE, "identities.csv")
+    return Download(services, identity, study, EVERYTHING).stream("identities", CSV_TYPE, "identities.csv")
 
 
 @router.get("/codebook.md", response_class=Response)
 def download_codebook(services: ServicesDep, identity: Viewer, study: str) -> Response:
     """What every column means."""
     with services.database.read() as session:
-        text = b"".join(FORMATS["codebook"](session, find_study(session, study, identity, "view"), "all"))
+        text = b"".join(
+            FORMATS["codebook"](session, find_study(session, study, identity, "view"), EVERYTHING)
+        )
     headers = {"content-disposition": f'attachment; filename="{study}-codebook.md"'}
     return Response(text, media_type="text/markdown; charset=utf-8", headers=headers)
 

@@ -11,7 +11,7 @@ from server.clock import now
 from server.export import codebook, identities, psych_ds, repository, runs
 from server.export.converted import Ending, columns_json, converted
 from server.export.excel import guarded, marked
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.export.pieces import csv_pieces, rating_table, whole
 from server.export.ratings_csv import rating_count
 from server.export.tables import ExportTable, answers_table, runs_table, wide_table
@@ -24,47 +24,47 @@ Format = Literal[
     "csv", "wide", "runs", "raw", "codebook", "psych-ds", "identities",
     "spss", "spss-wide", "parquet", "parquet-wide", "columns",
 ]  # fmt: skip
-Pieces = Callable[[Session, Study, ExportOrigin], Iterator[bytes]]
+Pieces = Callable[[Session, Study, Extract], Iterator[bytes]]
 
 
-def ratings_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def ratings_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """One row a play: the columns of the codebook, one column a factor."""
-    yield from csv_pieces(rating_table(session, study, origin))
+    yield from csv_pieces(rating_table(session, study, extract))
 
 
-def runs_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def runs_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """One row a visit, a column a question of the forms."""
-    yield from csv_pieces(runs_table(session, study, origin).with_header())
+    yield from csv_pieces(runs_table(session, study, extract).with_header())
 
 
-def wide_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def wide_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """One row a visit, a column a cell of the design."""
-    yield from csv_pieces(wide_table(session, study, origin).with_header())
+    yield from csv_pieces(wide_table(session, study, extract).with_header())
 
 
-def raw_json(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def raw_json(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """Everything stored, one JSON object a run and line; the last line tells that it is complete."""
-    number = repository.run_count(session, study, origin)
-    for line in whole(runs.raw_lines(session, study, origin), number):
+    number = repository.run_count(session, study, extract)
+    for line in whole(runs.raw_lines(session, study, extract), number):
         yield encoded(line)
     yield (json.dumps({"complete": True, "runs": number}) + "\n").encode()
 
 
-def codebook_markdown(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def codebook_markdown(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """What every column means; the same whatever the origin."""
-    del origin
+    del extract
     tables = codebook.explained_tables(all_definitions(session, study))
     yield encoded(codebook.markdown(active_definition(session, study), tables))
 
 
-def psych_ds_zip(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def psych_ds_zip(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """A Psych-DS dataset as a zip."""
-    yield from psych_ds.dataset(session, study, now().date().isoformat(), origin)
+    yield from psych_ds.dataset(session, study, now().date().isoformat(), extract)
 
 
-def identities_csv(session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+def identities_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """One row a visit whose person is known, of any origin: the recruiter's id beside the pseudonym."""
-    del origin
+    del extract
     rows = identities.identity_rows(session, study)
     yield from csv_pieces(whole(rows, repository.known_person_count(session, study), extra=1))
 
@@ -73,12 +73,12 @@ def identities_csv(session: Session, study: Study, origin: ExportOrigin) -> Iter
 class Conversion:
     """A table that is converted as a whole, and into what."""
 
-    table: Callable[[Session, Study, ExportOrigin], ExportTable]
+    table: Callable[[Session, Study, Extract], ExportTable]
     ending: Ending
 
-    def pieces(self, session: Session, study: Study, origin: ExportOrigin) -> Iterator[bytes]:
+    def pieces(self, session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
         """The converted file."""
-        return converted(self.table(session, study, origin), self.ending)
+        return converted(self.table(session, study, extract), self.ending)
 
 
 CONVERSIONS: dict[Format, Conversion] = {
@@ -111,11 +111,12 @@ def proofed(pieces: Iterable[bytes], form: Format, bom: bool, guard: bool) -> It
     yield from pieces
 
 
-def row_count(form: Format, session: Session, study: Study, origin: ExportOrigin) -> int:
+def row_count(form: Format, session: Session, study: Study, extract: Extract) -> int:
     """Rows that a download holds, header and last line not counted: by it a client checks what it got."""
     if form == "identities":
         return repository.known_person_count(session, study)
     if form in ("wide", "spss-wide", "parquet-wide"):
-        cells_of(active_definition(session, study))  # refuses a kind without ratings before a download begins
+        # Refuses a kind without ratings before a download begins.
+        cells_of(extract.definition(session, study))
     count = rating_count if form in ("csv", "psych-ds", "spss", "parquet") else repository.run_count
-    return count(session, study, origin)
+    return count(session, study, extract)

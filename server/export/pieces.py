@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.export.ratings_csv import factor_names, rating_count, rating_rows, view_of
 from server.models import Study
 from server.text import encoded
@@ -41,9 +41,9 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
         yield encoded(stream.getvalue())
 
 
-def rating_table(session: Session, study: Study, origin: ExportOrigin) -> Iterator[Sequence[Any]]:
+def rating_table(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:
     """Header and rows of the tidy CSV."""
     factors, view = factor_names(session, study), view_of(session, study)
     yield view.csv_header(factors)
-    rows = (view.csv_row(row, factors) for row in rating_rows(session, study, origin))
-    yield from whole(rows, rating_count(session, study, origin))
+    rows = (view.csv_row(row, factors) for row in rating_rows(session, study, extract))
+    yield from whole(rows, rating_count(session, study, extract))

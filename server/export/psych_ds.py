@@ -14,7 +14,7 @@ from experiments.trials import KINDS
 from experiments.trials.scales import scales_of
 from server.export.codebook import markdown, variables_measured
 from server.export.deidentified import MOVED, deidentified
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.export.pieces import csv_pieces
 from server.export.repository import first_start
 from server.export.scripts import LANGUAGES, script
@@ -48,26 +48,26 @@ class Folder:
     renamed: dict[str, str]
 
 
-def dataset(session: Session, study: Study, made: str, origin: ExportOrigin) -> Iterator[bytes]:
+def dataset(session: Session, study: Study, made: str, extract: Extract) -> Iterator[bytes]:
     """The pieces of the zip, in which the dataset is a folder of the study's name."""
-    folder = dataset_folder(session, study, made, origin)
+    folder = dataset_folder(session, study, made, extract)
     return zip_pieces((f"{study.name}/{path}", pieces) for path, pieces in folder.members)
 
 
-def dataset_folder(session: Session, study: Study, made: str, origin: ExportOrigin) -> Folder:
+def dataset_folder(session: Session, study: Study, made: str, extract: Extract) -> Folder:
     """`dataset_description.json`, README, CHANGES, `data/`, codebook, definition and scripts."""
     definition, definitions = active_definition(session, study), all_definitions(session, study)
     factors = {factor.name for one in definitions for factor in one.factors}
     renamed = {name: beside_runs(name) for name in sorted(factors) if beside_runs(name) != name}
-    first = first_start(session, study, origin)
+    first = first_start(session, study, extract)
     answers, *others = [
-        deidentified(table, first) for table in _tables(session, study, origin, bool(scales_of(definition)))
+        deidentified(table, first) for table in _tables(session, study, extract, bool(scales_of(definition)))
     ]
     tables = [_renamed(answers, renamed), *others]
     paths = {
         table.name: f"data/study-{_keyword(study.name)}_description-{table.name}_data.csv" for table in tables
     }
-    texts = _texts(session, study, made, origin, tables)
+    texts = _texts(session, study, made, extract, tables)
     for language in LANGUAGES:
         texts[f"analysis/analysis.{language}"] = script(
             definition, language, f"../{paths[tables[0].name]}", renamed
@@ -79,9 +79,9 @@ def dataset_folder(session: Session, study: Study, made: str, origin: ExportOrig
     return Folder(iter(members), paths[tables[0].name], paths["runs"], renamed)
 
 
-def _tables(session: Session, study: Study, origin: ExportOrigin, wide: bool) -> list[ExportTable]:
+def _tables(session: Session, study: Study, extract: Extract, wide: bool) -> list[ExportTable]:
     makers = (answers_table, runs_table, wide_table) if wide else (answers_table, runs_table)
-    return [make(session, study, origin) for make in makers]
+    return [make(session, study, extract) for make in makers]
 
 
 def _renamed(table: ExportTable, renamed: dict[str, str]) -> ExportTable:
@@ -95,14 +95,14 @@ def _keyword(name: str) -> str:
 
 
 def _texts(
-    session: Session, study: Study, made: str, origin: ExportOrigin, tables: list[ExportTable]
+    session: Session, study: Study, made: str, extract: Extract, tables: list[ExportTable]
 ) -> dict[str, str]:
     version, definition = active_version(session, study), active_definition(session, study)
     columns = [column for table in tables for column in table.columns]
     described = description(study, definition, columns, made)
     return {
         "dataset_description.json": json.dumps(described, indent=2, ensure_ascii=False),
-        "README.md": _readme(study, definition, made, origin, [table.name for table in tables]),
+        "README.md": _readme(study, definition, made, extract, [table.name for table in tables]),
         "CHANGES.md": f"{made} Exported from version {version.number} of the study.\n",
         "documentation/codebook.md": markdown(
             definition, [(_title(t, definition), t.columns) for t in tables]
@@ -152,16 +152,15 @@ def _creator(creator: Creator) -> dict[str, Any]:
     return person
 
 
-def _readme(study: Study, definition: Experiment, made: str, origin: ExportOrigin, tables: list[str]) -> str:
-    whose = "all origins, told apart by `run_origin`" if origin == "all" else f"the origin `{origin}` alone"
+def _readme(study: Study, definition: Experiment, made: str, extract: Extract, tables: list[str]) -> str:
     licence = definition.dataset.licence_page
     terms = f"Licence: {licence}." if licence else "No licence is declared: ask before you use the data."
     wide = " `data/*wide_data.csv` has one row a visit and a column a cell." if "wide" in tables else ""
     return (
-        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}; data of {whose}. One row a play in "
-        f"`data/*{tables[0]}_data.csv`, one row a visit in `data/*runs_data.csv`;{wide} every column is "
-        "explained in `documentation/codebook.md`; the declared experiment is in `materials/`; scripts for R "
-        f"and Python are in `analysis/`.\n\n{terms}\n\n"
+        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}; data of {extract}. One row a "
+        f"play in `data/*{tables[0]}_data.csv`, one row a visit in `data/*runs_data.csv`;{wide} every column "
+        "is explained in `documentation/codebook.md`; the declared experiment is in `materials/`; scripts "
+        f"for R and Python are in `analysis/`.\n\n{terms}\n\n"
         "De-identified: participants have pseudonyms, answers in their own words and what their browsers "
         f"said are left out. {MOVED} Rare combinations of answers may still point to a person: look at them "
         "before you publish.\n\n"

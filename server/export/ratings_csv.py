@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from experiments.columns import View
 from experiments.trials import KINDS
 from server.export import repository
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
 
@@ -24,14 +24,14 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
     return tuple(dict.fromkeys(factor.name for one in definitions for factor in one.factors))
 
 
-def rating_count(session: Session, study: Study, origin: ExportOrigin) -> int:
+def rating_count(session: Session, study: Study, extract: Extract) -> int:
     """Rows that `rating_rows` gives."""
     if any(len(one.trial.rated_scales()) > 1 for one in all_definitions(session, study)):
         # A rating is a row a scale.
-        return repository.rows_in_view(session, study, origin, view_of(session, study))
-    return repository.play_count(session, study, origin, active_definition(session, study).trial.kind)
+        return repository.rows_in_view(session, study, extract, view_of(session, study))
+    return repository.play_count(session, study, extract, active_definition(session, study).trial.kind)
 
 
-def rating_rows(session: Session, study: Study, origin: ExportOrigin) -> Iterator[Sequence[Any]]:
+def rating_rows(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:
     """Rows of the study's view; see `repository.view_rows`."""
-    return repository.view_rows(session, study, origin, view_of(session, study))
+    return repository.view_rows(session, study, extract, view_of(session, study))

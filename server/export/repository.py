@@ -5,12 +5,12 @@ from datetime import datetime
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, CursorResult, Select, TextClause, bindparam, func, select, text
+from sqlalchemy import CursorResult, Select, TextClause, bindparam, func, select, text
 from sqlalchemy.orm import Session
 
 from experiments.columns import View, names_of
 from server.db import SIGNING_KEY
-from server.export.origins import EXPORTED, ExportOrigin
+from server.export.extract import EVERYTHING, Extract
 from server.identities.sealing import KnownAs, Sealed, unseal
 from server.models import FormAnswer, IdentityKey, Link, Rating, RecruiterIdentity, Study, StudyRun
 
@@ -29,32 +29,27 @@ class KnownPerson(NamedTuple):
     known_as: KnownAs
 
 
-def _of_origin(study: Study, origin: ExportOrigin) -> ColumnElement[bool]:
-    origins = EXPORTED if origin == "all" else (origin,)
-    return (StudyRun.study_id == study.id) & StudyRun.origin.in_(origins)
-
-
 def runs_by_origin(session: Session, study: Study) -> dict[str, int]:
     """How many runs there are of each exported origin."""
-    query = select(StudyRun.origin, func.count()).where(_of_origin(study, "all"))
+    query = select(StudyRun.origin, func.count()).where(EVERYTHING.of(study))
     return dict(session.execute(query.group_by(StudyRun.origin)).all())
 
 
-def run_count(session: Session, study: Study, origin: ExportOrigin) -> int:
+def run_count(session: Session, study: Study, extract: Extract) -> int:
     """Runs of this origin."""
-    return session.scalar(select(func.count()).select_from(StudyRun).where(_of_origin(study, origin))) or 0
+    return session.scalar(select(func.count()).select_from(StudyRun).where(extract.of(study))) or 0
 
 
-def first_start(session: Session, study: Study, origin: ExportOrigin) -> datetime | None:
+def first_start(session: Session, study: Study, extract: Extract) -> datetime | None:
     """When the first of these runs started; None where there are none."""
-    return session.scalar(select(func.min(StudyRun.started_at)).where(_of_origin(study, origin)))
+    return session.scalar(select(func.min(StudyRun.started_at)).where(extract.of(study)))
 
 
-def each_run(session: Session, study: Study, origin: ExportOrigin) -> Iterator[StudyRun]:
-    """The runs of this origin, in the order they began; a batch of them is in memory at a time."""
+def each_run(session: Session, study: Study, extract: Extract) -> Iterator[StudyRun]:
+    """The runs of this extract, in the order they began; a batch of them is in memory at a time."""
     latest = 0
     while True:
-        query = select(StudyRun).where(_of_origin(study, origin), StudyRun.id > latest)
+        query = select(StudyRun).where(extract.of(study), StudyRun.id > latest)
         runs = session.scalars(query.order_by(StudyRun.id).limit(RUNS_AT_ONCE)).all()
         if not runs:
             return
@@ -63,9 +58,9 @@ def each_run(session: Session, study: Study, origin: ExportOrigin) -> Iterator[S
         session.expunge_all()
 
 
-def public_ids(session: Session, study: Study, origin: ExportOrigin) -> Sequence[str]:
-    """The public ids of the runs of this origin, in the order they began."""
-    query = select(StudyRun.public_id).where(_of_origin(study, origin))
+def public_ids(session: Session, study: Study, extract: Extract) -> Sequence[str]:
+    """The public ids of the runs of this extract, in the order they began."""
+    query = select(StudyRun.public_id).where(extract.of(study))
     return session.scalars(query.order_by(StudyRun.id)).all()
 
 
@@ -75,21 +70,23 @@ def answers_by_form(session: Session, run: StudyRun) -> dict[str, dict[str, Any]
     return dict(session.execute(query).all())
 
 
-def play_count(session: Session, study: Study, origin: ExportOrigin, kind: str) -> int:
+def play_count(session: Session, study: Study, extract: Extract, kind: str) -> int:
     """Stored plays of trials of this kind."""
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
-    return session.scalar(query.where(_of_origin(study, origin), Rating.kind == kind)) or 0
+    return session.scalar(query.where(extract.of(study), Rating.kind == kind)) or 0
 
 
-def rows_in_view(session: Session, study: Study, origin: ExportOrigin, view: View) -> int:
+def rows_in_view(session: Session, study: Study, extract: Extract, view: View) -> int:
     """Rows that a kind's view has of a study."""
-    among = "" if origin == "all" else " AND run_origin = :origin"
-    rows = text(f"SELECT count(*) FROM {view.name} WHERE study = :study{among}")  # noqa: S608
-    values = {"study": study.name} if origin == "all" else {"study": study.name, "origin": origin}
-    return session.scalar(rows, values) or 0
+    among: dict[str, str | int] = {"study": study.name}
+    among |= {} if extract.origin == "all" else {"run_origin": extract.origin}
+    among |= {} if extract.series is None else {"data_series": extract.series}
+    condition = " AND ".join(f"{column} = :{column}" for column in among)
+    rows = text(f"SELECT count(*) FROM {view.name} WHERE {condition}")  # noqa: S608
+    return session.scalar(rows, among) or 0
 
 
-def view_rows(session: Session, study: Study, origin: ExportOrigin, view: View) -> Iterator[Sequence[Any]]:
+def view_rows(session: Session, study: Study, extract: Extract, view: View) -> Iterator[Sequence[Any]]:
     """Rows of the view (values in the order of its names) by start of the run, then trial and play.
 
     Booleans are 0 and 1. The rows of `RUNS_OF_ROWS_AT_ONCE` runs are in memory at a time, and are sorted
@@ -98,7 +95,7 @@ def view_rows(session: Session, study: Study, origin: ExportOrigin, view: View) 
     """
     connection, latest = session.connection(), 0
     of_runs, order = _rows_of_runs(view), _order(view)
-    while runs := _runs_after(session, study, origin, latest):
+    while runs := _runs_after(session, study, extract, latest):
         latest = runs[-1].id
         number = {run.public_id: index for index, run in enumerate(runs)}
         rows = _plain_rows(connection.execute(of_runs, {"runs": list(number)}))
@@ -131,8 +128,8 @@ def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
     return rows
 
 
-def _runs_after(session: Session, study: Study, origin: ExportOrigin, latest: int) -> Sequence[Any]:
-    query = select(StudyRun.id, StudyRun.public_id).where(_of_origin(study, origin), StudyRun.id > latest)
+def _runs_after(session: Session, study: Study, extract: Extract, latest: int) -> Sequence[Any]:
+    query = select(StudyRun.id, StudyRun.public_id).where(extract.of(study), StudyRun.id > latest)
     return session.execute(query.order_by(StudyRun.id).limit(RUNS_OF_ROWS_AT_ONCE)).all()
 
 

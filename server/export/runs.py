@@ -12,19 +12,19 @@ from experiments.columns.form_columns import FormColumn, run_columns
 from server.clock import iso
 from server.evidence.service import judge_run
 from server.export import repository
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.models import NO_SLOT, Study, StudyRun
 from server.runs import service
 from server.runs.repository import calibrations
 
 
 def run_rows(
-    session: Session, study: Study, origin: ExportOrigin, forms: Sequence[FormColumn]
+    session: Session, study: Study, extract: Extract, forms: Sequence[FormColumn]
 ) -> Iterator[list[Any]]:
     """Rows of the runs CSV in the order the runs began: the columns of `run_columns(forms)`."""
     names = [column.name for column in run_columns(forms)]
     name = study.name
-    for run in repository.each_run(session, study, origin):
+    for run in repository.each_run(session, study, extract):
         values = _values(session, run, forms) | {"study": name}
         yield [values[column] for column in names]
 
@@ -96,7 +96,7 @@ def _json(value: Any) -> str:
     return json.dumps(value, sort_keys=True, ensure_ascii=False)
 
 
-def raw_lines(session: Session, study: Study, origin: ExportOrigin) -> Iterator[str]:
+def raw_lines(session: Session, study: Study, extract: Extract) -> Iterator[str]:
     """One JSON object a run with every play, drawn frame, event, form and calibration."""
-    for public_id in repository.public_ids(session, study, origin):
+    for public_id in repository.public_ids(session, study, extract):
         yield service.timeline(session, study, public_id).model_dump_json() + "\n"

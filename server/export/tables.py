@@ -10,14 +10,14 @@ from sqlalchemy.orm import Session
 from experiments.columns import Column
 from experiments.columns.form_columns import form_columns, run_columns
 from server.export.codebook import rating_columns
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.export.pieces import rating_table, whole
 from server.export.ratings_csv import rating_count, view_of
 from server.export.repository import run_count
 from server.export.runs import run_rows
 from server.export.wide import wide_columns, wide_rows
 from server.models import Study
-from server.studies.lookup import active_definition, all_definitions
+from server.studies.lookup import all_definitions
 
 TableName = Literal["answers", "runs", "wide"]
 Row = Sequence[Any]
@@ -49,30 +49,30 @@ class ExportTable:
         return chain([[column.name for column in self.columns]], self.rows)
 
 
-def answers_table(session: Session, study: Study, origin: ExportOrigin) -> ExportTable:
+def answers_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a play (or a scale and play), a column a factor."""
     columns = rating_columns(all_definitions(session, study))
-    rows = islice(rating_table(session, study, origin), 1, None)
+    rows = islice(rating_table(session, study, extract), 1, None)
     name = view_of(session, study).name
-    return ExportTable(name, columns, rows, rating_count(session, study, origin))
+    return ExportTable(name, columns, rows, rating_count(session, study, extract))
 
 
-def runs_table(session: Session, study: Study, origin: ExportOrigin) -> ExportTable:
+def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a visit, a column a question of the forms."""
-    forms, number = form_columns(all_definitions(session, study)), run_count(session, study, origin)
-    rows = whole(run_rows(session, study, origin, forms), number)
+    forms, number = form_columns(all_definitions(session, study)), run_count(session, study, extract)
+    rows = whole(run_rows(session, study, extract, forms), number)
     return ExportTable("runs", run_columns(forms), rows, number)
 
 
-def wide_table(session: Session, study: Study, origin: ExportOrigin) -> ExportTable:
+def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a visit, a column a cell with the mean rating in it; InputError for trials without a scale."""
-    definitions, number = all_definitions(session, study), run_count(session, study, origin)
-    active, forms = active_definition(session, study), form_columns(definitions)
-    rows = whole(wide_rows(session, study, origin, active, forms), number)
-    return ExportTable("wide", wide_columns(active, forms), rows, number)
+    definitions, number = all_definitions(session, study), run_count(session, study, extract)
+    newest, forms = extract.definition(session, study), form_columns(definitions)
+    rows = whole(wide_rows(session, study, extract, newest, forms), number)
+    return ExportTable("wide", wide_columns(newest, forms), rows, number)
 
 
-TABLES: dict[TableName, Callable[[Session, Study, ExportOrigin], ExportTable]] = {
+TABLES: dict[TableName, Callable[[Session, Study, Extract], ExportTable]] = {
     "answers": answers_table,
     "runs": runs_table,
     "wide": wide_table,

@@ -15,7 +15,7 @@ from experiments.definition import Experiment
 from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials.scales import RatedScale, scales_of
-from server.export.origins import ExportOrigin
+from server.export.extract import Extract
 from server.export.ratings_csv import factor_names, rating_rows, view_of
 from server.export.runs import run_rows
 from server.models import Study
@@ -100,7 +100,7 @@ def wide_columns(experiment: Experiment, forms: Sequence[FormColumn]) -> list[Co
 def wide_rows(
     session: Session,
     study: Study,
-    origin: ExportOrigin,
+    extract: Extract,
     experiment: Experiment,
     forms: Sequence[FormColumn],
 ) -> Iterator[list[Any]]:
@@ -112,9 +112,9 @@ def wide_rows(
         if column.name in names and column.name != "answers"
     ]
     between = [factor.name for factor in experiment.factors if factor.between]
-    by_run = _by_run(session, study, origin, experiment)
+    by_run = _by_run(session, study, extract, experiment)
     at = names.index("run")
-    for row in run_rows(session, study, origin, forms):
+    for row in run_rows(session, study, extract, forms):
         groups, count, means = by_run.get(row[at], ({}, 0, {}))
         yield [
             *(row[index] for index in kept),
@@ -125,7 +125,7 @@ def wide_rows(
 
 
 def _by_run(
-    session: Session, study: Study, origin: ExportOrigin, experiment: Experiment
+    session: Session, study: Study, extract: Extract, experiment: Experiment
 ) -> dict[str, tuple[dict[str, str], int, Means]]:
     """Of each run with answers: its levels between participants, how many answers, and its cells' means."""
     factors, view = factor_names(session, study), view_of(session, study)
@@ -137,7 +137,7 @@ def _by_run(
     )
     last: dict[str, dict[tuple[Any, str], tuple[Levels, float]]] = defaultdict(dict)
     groups: dict[str, dict[str, str]] = {}
-    for stored in rating_rows(session, study, origin):
+    for stored in rating_rows(session, study, extract):
         row = view.csv_row(stored, factors)
         if row[kind] != "main":
             continue

@@ -19,6 +19,7 @@ from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.cli_common import migrated_services
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.export.tables import answers_table, runs_table
@@ -160,7 +161,7 @@ def _columns(session: Session, study: Study) -> list[RehearsedColumn]:
     """Every column of both tables, with the first value that anybody left in it."""
     columns = []
     for make in (answers_table, runs_table):
-        table = make(session, study, "simulated")
+        table = make(session, study, Extract("simulated"))
         rows: Sequence[Sequence[Any]] = list(table.rows)
         for index, column in enumerate(table.columns):
             value = next((row[index] for row in rows if row[index] not in (None, "")), None)
@@ -178,9 +179,9 @@ def _columns(session: Session, study: Study) -> list[RehearsedColumn]:
 
 def _export(session: Session, study: Study, folder: Path) -> None:
     with (folder / "answers.csv").open("wb") as stream:
-        stream.writelines(csv_pieces(rating_table(session, study, "simulated")))
+        stream.writelines(csv_pieces(rating_table(session, study, Extract("simulated"))))
     with (folder / "runs.csv").open("wb") as stream:
-        stream.writelines(runs_csv(session, study, "simulated"))
+        stream.writelines(runs_csv(session, study, Extract("simulated")))
 
 
 def _power(experiment: Experiment, folder: Path, seed: int) -> tuple[Power | None, str]:

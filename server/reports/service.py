@@ -15,6 +15,7 @@ from server.accounts.identity import OPERATOR, Identity
 from server.clock import now
 from server.context import Services
 from server.errors import NotFound
+from server.export.extract import Extract
 from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.methods.service import methods_of, read_results, write
@@ -122,9 +123,9 @@ def _export(services: Services, name: str, inputs: Path, order: NewReport) -> in
         version = version_of_series(session, study, order.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
         with (inputs / "answers.csv").open("wb") as stream:
-            stream.writelines(csv_pieces(rating_table(session, study, order.origin)))
+            stream.writelines(csv_pieces(rating_table(session, study, Extract(order.origin))))
         with (inputs / "runs.csv").open("wb") as stream:
-            stream.writelines(runs_csv(session, study, order.origin))
+            stream.writelines(runs_csv(session, study, Extract(order.origin)))
         if (seal := seal_of(session, study)) and version.number == study.active_version:
             (inputs / SEAL).write_text(seal.text(), encoding="utf-8")
             (inputs / MANIFEST_NAME).write_text(json_text(version.manifest), encoding="utf-8")

@@ -38,7 +38,9 @@ def version_of_series(session: Session, study: Study, series: int | None) -> Stu
         return active_version(session, study)
     version = repository.newest_of_series(session, study, series)
     if version is None:
-        raise NotFound(f"Study '{study.name}' has no data series {series}.")
+        known = repository.versions_by_series(session, study).items()
+        there = ", ".join(name_of(number, versions) for number, versions in sorted(known))
+        raise NotFound(f"Study '{study.name}' has no data series {series}; there is {there}.")
     return version
 
 

@@ -14,6 +14,7 @@ from experiments.load import FOLDER
 from experiments.trials.clip_rating.columns import RATINGS
 from server.app import create_app
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import ratings_csv
 from server.models import Rating, Study, StudyRun
 from server.settings import Settings
@@ -48,7 +49,8 @@ def test_three_participants_rate_every_trial(
         runs = session.query(StudyRun).all()
         assert [run.trials_answered for run in runs] == [trials + study.experiment.practice.trials] * PEOPLE
         rows = session.execute(text("SELECT * FROM ratings ORDER BY run, trial_index, play")).mappings().all()
-        exported = b"".join(ratings_csv(session, session.query(Study).one(), "simulated")).decode("utf-8")
+        simulated = ratings_csv(session, session.query(Study).one(), Extract("simulated"))
+        exported = b"".join(simulated).decode("utf-8")
     assert len(rows) == sum(sent)
     assert tuple(rows[0]) == RATINGS.names
     assert all(row["synthetic"] for row in rows)

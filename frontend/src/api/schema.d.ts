@@ -14734,6 +14734,8 @@ export interface operations {
                 /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
                 excel?: boolean;
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Data of one data series; without it of all, told apart by a column. */
+                series?: number | null;
             };
             header?: never;
             path: {
@@ -14776,6 +14778,8 @@ export interface operations {
                 /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
                 excel?: boolean;
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Data of one data series; without it of all, told apart by a column. */
+                series?: number | null;
             };
             header?: never;
             path: {
@@ -14818,6 +14822,8 @@ export interface operations {
                 /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
                 excel?: boolean;
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Data of one data series; without it of all, told apart by a column. */
+                series?: number | null;
             };
             header?: never;
             path: {
@@ -14897,6 +14903,8 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Data of one data series; without it of all, told apart by a column. */
+                series?: number | null;
             };
             header?: never;
             path: {
@@ -14937,6 +14945,8 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Data of one data series; without it of all, told apart by a column. */
+                series?: number | null;
             };
             header?: never;
             path: {
@@ -15053,6 +15063,8 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
+                /** @description Data of one data series; without it of all, told apart by a column. */
+                series?: number | null;
             };
             header?: never;
             path: {

@@ -16,6 +16,7 @@ from analysis.report.write import write_report
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import open_services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.migrate import upgrade
 from server.settings import Settings
@@ -61,9 +62,9 @@ def main(folder: Path) -> dict[str, Any]:
             assert Person(Api(client), Rater(seed, 1, {})).take_part(link)
     with services.database.read() as session:
         stored = find_study(session, "short", OPERATOR, "view")
-        table = b"".join(FORMATS["csv"](session, stored, "simulated"))
-        runs = b"".join(FORMATS["runs"](session, stored, "simulated")).decode()
-        codebook = b"".join(FORMATS["codebook"](session, stored, "all")).decode()
+        table = b"".join(FORMATS["csv"](session, stored, Extract("simulated")))
+        runs = b"".join(FORMATS["runs"](session, stored, Extract("simulated"))).decode()
+        codebook = b"".join(FORMATS["codebook"](session, stored, Extract("all"))).decode()
     (folder / "ratings.csv").write_bytes(table)
     services.database.close()
     rows = [row for row in DictReader(StringIO(table.decode())) if row["scale"]]

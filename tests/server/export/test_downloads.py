@@ -2,14 +2,21 @@ import csv
 import io
 import json
 import zipfile
+from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
 from experiments.columns import RUN_COLUMNS
+from experiments.load import parse_experiment
+from experiments.manifest import read_manifest
 from experiments.trials.clip_rating.columns import RATINGS
+from server.accounts.identity import OPERATOR
+from server.context import Services
+from server.studies.importing import add_version
+from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
-from tests.helpers.studies import Participant, StudyInDatabase
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
 
 def table(text: str) -> list[list[str]]:
@@ -62,6 +69,39 @@ def test_a_download_holds_one_origin_unless_all_are_asked_for(
     assert everything.headers["palpebra-rows"] == str(6 * each)
     assert found_origins(form, everything.content) == set(ORIGINS)
     assert viewer.get(f"{path}?origin=preview").status_code == 422
+
+
+@pytest.fixture
+def two_series(client: TestClient, services: Services, tmp_path: Path) -> None:
+    """One run on the scale to 7, then two on a scale to 5, which begins a series."""
+    study = add_study(services, tmp_path / "clips", SHORT)
+    Participant(client, study.link_token).agree().rate_all()
+    shorter = SHORT.replace("[trial.scale]", "[trial.scale]\nmaximum = 5")
+    experiment, manifest = parse_experiment(shorter), read_manifest(tmp_path / "clips")
+    with services.database.write() as session:
+        known = find_study(session, "short", OPERATOR, "view")
+        assert add_version(session, known, shorter, experiment, manifest, None).series == 2
+    for _ in range(2):
+        Participant(client, study.link_token).agree().rate_all()
+
+
+@pytest.mark.usefixtures("two_series")
+@pytest.mark.parametrize("form", ["ratings.csv", "runs.csv", "raw.ndjson", "psych-ds.zip", "wide.csv"])
+def test_a_download_holds_the_series_asked_for_and_names_it(viewer: Admin, form: str) -> None:
+    each, path = 12 if form in ("ratings.csv", "psych-ds.zip") else 1, f"/studies/short/data/{form}"
+    assert viewer.get(path).headers["palpebra-rows"] == str(3 * each)
+    for series, number in ((1, 1), (2, 2)):
+        answer = viewer.get(f"{path}?series={series}")
+        assert answer.headers["palpebra-rows"] == str(number * each)
+        assert f"short-series-{series}-{form}" in answer.headers["content-disposition"]
+        if form.endswith(".csv"):
+            rows = list(csv.DictReader(io.StringIO(answer.text)))
+            assert [row["data_series"] for row in rows] == [str(series)] * number * each
+    refused = viewer.get(f"{path}?series=3")
+    assert (refused.status_code, refused.json()["error"]["message"]) == (
+        404,
+        "Study 'short' has no data series 3; there is series 1 (version 1), series 2 (version 2).",
+    )
 
 
 def found_origins(form: str, content: bytes) -> set[str]:

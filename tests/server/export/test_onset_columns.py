@@ -6,6 +6,7 @@ import io
 import pytest
 
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import ratings_csv
 from server.models import Study
 from tests.helpers.studies import Participant
@@ -58,7 +59,7 @@ def exported(services: Services) -> list[dict[str, str]]:
     """Rows of ratings.csv."""
     with services.database.read() as session:
         study = session.query(Study).one()
-        text = b"".join(ratings_csv(session, study, "all")).decode("utf-8")
+        text = b"".join(ratings_csv(session, study, Extract("all"))).decode("utf-8")
     return list(csv.DictReader(io.StringIO(text, newline="")))
 
 

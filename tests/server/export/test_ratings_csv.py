@@ -5,6 +5,7 @@ from typing import Any
 
 from experiments.trials.clip_rating.columns import RATINGS
 from server.context import Services
+from server.export.extract import EVERYTHING
 from server.export.formats import ratings_csv
 from server.export.ratings_csv import rating_rows
 from server.models import Study
@@ -27,8 +28,8 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
         participant.rate(trial, comment=comment)
     with services.database.read() as session:
         study = session.query(Study).one()
-        stream = io.StringIO(b"".join(ratings_csv(session, study, "all")).decode("utf-8"), newline="")
-        rows = [dict(zip(RATINGS.names, row, strict=True)) for row in rating_rows(session, study, "all")]
+        stream = io.StringIO(b"".join(ratings_csv(session, study, EVERYTHING)).decode("utf-8"), newline="")
+        rows = [dict(zip(RATINGS.names, row, strict=True)) for row in rating_rows(session, study, EVERYTHING)]
     read = list(csv.DictReader(stream))
     assert len(read) == 5
     factors = RATINGS.factors_in_header(read[0])
@@ -50,5 +51,5 @@ def test_export_and_load_is_the_identity(participant: Participant, services: Ser
 
 def test_an_empty_study_exports_its_header(services: Services, study: Any) -> None:
     with services.database.read() as session:
-        exported = b"".join(ratings_csv(session, session.query(Study).one(), "all")).decode("utf-8")
+        exported = b"".join(ratings_csv(session, session.query(Study).one(), EVERYTHING)).decode("utf-8")
     assert exported.strip() == ",".join(RATINGS.csv_header(["character", "speed"]))

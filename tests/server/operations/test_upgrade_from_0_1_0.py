@@ -16,6 +16,7 @@ from sqlalchemy.exc import DBAPIError
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services, open_services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.settings import Settings
@@ -52,7 +53,7 @@ def migrated(empty_database_url: str, tmp_path: Path) -> Iterator[Services]:
 
 def exported(services: Services, study: str) -> bytes:
     with services.database.read() as session:
-        return b"".join(FORMATS["csv"](session, find_study(session, study, OPERATOR, "view"), "all"))
+        return b"".join(FORMATS["csv"](session, find_study(session, study, OPERATOR, "view"), Extract("all")))
 
 
 def older_columns_of(content: bytes, header: list[str]) -> bytes:

@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.models import RunTally, Study
 from server.simulation.person import Person, Rater
@@ -177,8 +178,8 @@ def test_simulated_people_compare_to_the_end_and_the_csv_has_their_answers(
     assert all(["left", "right", "tie"].index(r["winner"]) + 1 == r["expected_response"] for r in checks)
     with services.database.read() as session:
         study = session.query(Study).filter_by(name=pairs.name).one()
-        lines = b"".join(FORMATS["csv"](session, study, "all")).decode().splitlines()
-        codebook = b"".join(FORMATS["codebook"](session, study, "all")).decode()
+        lines = b"".join(FORMATS["csv"](session, study, Extract("all"))).decode().splitlines()
+        codebook = b"".join(FORMATS["codebook"](session, study, Extract("all"))).decode()
     assert len(lines) == 1 + len(rows)
     assert {"left_cell", "right_cell", "winner", "verdict", "participant"} <= set(lines[0].split(","))
     assert "| winner | text |" in codebook

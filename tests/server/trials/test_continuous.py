@@ -16,6 +16,7 @@ from analysis.plans.prepare import study_contents
 from analysis.read.study_answers import load_csv
 from experiments.trials.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
+from server.export.extract import ExportOrigin, Extract
 from server.export.formats import FORMATS
 from server.models import Study
 from server.simulation.person import Person, Rater
@@ -44,10 +45,10 @@ def send(participant: Participant, trial: Any, given: dict[str, Any]) -> Any:
     return participant.request("PUT", f"/ratings/{uuid.uuid4()}", body)
 
 
-def exported(services: Services, origin: str) -> bytes:
+def exported(services: Services, origin: ExportOrigin) -> bytes:
     with services.database.read() as session:
         stored = session.query(Study).one()
-        return b"".join(FORMATS["csv"](session, stored, origin))
+        return b"".join(FORMATS["csv"](session, stored, Extract(origin)))
 
 
 def test_a_trace_is_checked_stored_and_exported(

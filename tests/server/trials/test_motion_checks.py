@@ -14,6 +14,7 @@ from experiments.errors import InputError
 from experiments.manifest import Manifest
 from server.app import create_app
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.migrate import current_revision, downgrade, newest_revision
 from server.models import Study, View
@@ -63,7 +64,7 @@ def right_answers(services: Services, name: str) -> dict[str, int]:
 def rows(services: Services, name: str) -> list[dict[str, str]]:
     with services.database.read() as session:
         study = session.query(Study).filter_by(name=name).one()
-        text = b"".join(FORMATS["csv"](session, study, "all")).decode("utf-8-sig")
+        text = b"".join(FORMATS["csv"](session, study, Extract("all"))).decode("utf-8-sig")
     return list(csv.DictReader(text.splitlines()))
 
 

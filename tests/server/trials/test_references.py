@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.models import Study, StudyRun
 from server.simulation.person import Person, Rater
@@ -58,7 +59,7 @@ def rate(participant: Participant, trial: Any, clips: dict[str, Any] | None, dra
 def exported(services: Services, study: StudyInDatabase) -> str:
     with services.database.read() as session:
         named = session.query(Study).filter_by(name=study.name).one()
-        return b"".join(FORMATS["csv"](session, named, "all")).decode()
+        return b"".join(FORMATS["csv"](session, named, Extract("all"))).decode()
 
 
 def test_both_clips_are_stored_judged_and_exported(

@@ -12,6 +12,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import FORMATS, row_count
 from server.models import Rating, Study
 from server.simulation.person import Person, Rater
@@ -83,9 +84,9 @@ def test_each_scale_is_a_row_and_what_does_not_apply_is_no_number(
         query = "SELECT trial_index, scale, response, not_applicable, scale_rt FROM ratings ORDER BY 1, 2"
         rows = [(row[1], row[2] and float(row[2]), bool(row[3])) for row in session.execute(text(query))]
         study = session.query(Study).one()
-        content = b"".join(FORMATS["csv"](session, study, "participant")).decode()
-        codebook = b"".join(FORMATS["codebook"](session, study, "participant")).decode()
-        assert row_count("csv", session, study, "participant") == 4
+        content = b"".join(FORMATS["csv"](session, study, Extract("participant"))).decode()
+        codebook = b"".join(FORMATS["codebook"](session, study, Extract("participant"))).decode()
+        assert row_count("csv", session, study, Extract("participant")) == 4
     assert sorted(rows, key=str) == sorted(
         [("eerie", 62.5, False), ("natural", 4.0, False), ("eerie", None, True), ("natural", 4.0, False)],
         key=str,

@@ -12,6 +12,7 @@ from analysis.cli import app
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.models import Study
 from server.simulation.observer import Truth, truth_of
@@ -35,7 +36,7 @@ def test_simulated_people_have_the_thresholds_that_they_were_given(
     take_part(client, study, f"threshold={TRUE_MS},spread=60", seeds=(0,), effects_seed=7)
     with services.database.read() as session:
         found = session.query(Study).filter_by(name=study.name).one()
-        text = b"".join(FORMATS["csv"](session, found, "all")).decode()
+        text = b"".join(FORMATS["csv"](session, found, Extract("all"))).decode()
     rows = [row for row in csv.DictReader(text.splitlines()) if row["counts"] == "1"]
     last = {(row["run"], row["series"]): row for row in rows}
     assert len(last) == 2

@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
+from server.export.extract import Extract
 from server.export.formats import FORMATS
 from server.models import SeriesAnswer, SeriesOffer, Study, StudyRun, View
 from server.trials.series import quest
@@ -306,8 +307,8 @@ def test_simulated_observers_answer_to_the_end_and_the_csv_has_their_series(
         assert all((row["response"] == row["interval"]) == bool(row["correct"]) for row in rows)
     with services.database.read() as session:
         found = session.query(Study).filter_by(name=study.name).one()
-        lines = b"".join(FORMATS["csv"](session, found, "all")).decode().splitlines()
-        codebook = b"".join(FORMATS["codebook"](session, found, "all")).decode()
+        lines = b"".join(FORMATS["csv"](session, found, Extract("all"))).decode().splitlines()
+        codebook = b"".join(FORMATS["codebook"](session, found, Extract("all"))).decode()
     header = lines[0].split(",")
     assert {"series", "duration", "value", "response", "correct", "ahead", "threshold"} <= set(header)
     assert "| ahead | integer |" in codebook

@@ -1,4 +1,4 @@
-import { Anchor, Button, Card, Code, Group, SegmentedControl, SimpleGrid, Stack, Switch, Text, Title } from "@mantine/core";
+import { Anchor, Button, Card, Code, Group, SegmentedControl, Select, SimpleGrid, Stack, Switch, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
@@ -39,6 +39,7 @@ const WHOSE: { value: ExportOrigin; label: string }[] = [...ORIGINS, { value: "a
 export function DataTab() {
   const { study = "" } = useParams({ strict: false });
   const [origin, setOrigin] = useState<ExportOrigin>("participant");
+  const [series, setSeries] = useState<string | null>(null);
   const detail = useQuery(studyQuery(study)).data;
   const [excel, setExcel] = useState(false);
   const rated = detail?.definition.trial.kind === "clip_rating";
@@ -47,17 +48,31 @@ export function DataTab() {
   const version = detail?.summary.version ?? 1;
   const chosen = (file: string) => {
     const options = new URLSearchParams();
-    if (origin !== "participant" && !file.startsWith("analysis.")) options.set("origin", origin);
+    const holdsData = !file.startsWith("analysis.") && file !== "identities.csv" && file !== "codebook.md";
+    if (origin !== "participant" && holdsData) options.set("origin", origin);
+    if (series !== null && holdsData) options.set("series", series);
     if (excel && file.endsWith(".csv") && file !== "identities.csv") options.set("excel", "true");
     return options.size > 0 ? `?${options.toString()}` : "";
   };
-  const option = origin === "participant" ? "" : ` --origin ${origin}`;
+  const option = `${origin === "participant" ? "" : ` --origin ${origin}`}${series === null ? "" : ` --series ${series}`}`;
   return (
     <Stack>
       <Group>
         <SegmentedControl aria-label="Data of" value={origin} onChange={setOrigin} data={WHOSE} />
+        {detail !== undefined && detail.series.length > 1 && (
+          <Select
+            aria-label="Data series"
+            w={280}
+            clearable
+            placeholder="every data series"
+            value={series}
+            onChange={setSeries}
+            data={detail.series.map((one) => ({ value: String(one.number), label: one.name }))}
+          />
+        )}
         <Text size="sm">
           {origin === "all" ? "Data of all origins are told apart by the column run_origin. " : ""}
+          {series === null && (detail?.series.length ?? 1) > 1 ? "The data series are told apart by the column data_series. " : ""}
           Excluded runs are in the files, marked in their column; previews and erased people are not.
         </Text>
       </Group>

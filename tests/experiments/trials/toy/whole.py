@@ -33,6 +33,7 @@ from experiments.schema.upgrades import FORMAT  # noqa: E402
 from server.accounts.identity import OPERATOR  # noqa: E402
 from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402
+from server.export.extract import Extract  # noqa: E402
 from server.export.formats import FORMATS  # noqa: E402
 from server.migrate import upgrade  # noqa: E402
 from server.results.kinds import summary_of  # noqa: E402
@@ -63,9 +64,9 @@ def main(folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = {"plan": list(TOY.plan(study.experiment))}
     with services.database.read() as session:
         stored = find_study(session, "short", OPERATOR, "view")
-        table = b"".join(FORMATS["csv"](session, stored, "simulated"))
-        found["codebook"] = b"".join(FORMATS["codebook"](session, stored, "all")).decode()
-        found["psych_ds"] = sum(map(len, FORMATS["psych-ds"](session, stored, "simulated")))
+        table = b"".join(FORMATS["csv"](session, stored, Extract("simulated")))
+        found["codebook"] = b"".join(FORMATS["codebook"](session, stored, Extract("all"))).decode()
+        found["psych_ds"] = sum(map(len, FORMATS["psych-ds"](session, stored, Extract("simulated"))))
         version, definition = active_version(session, stored), active_definition(session, stored)
         found["read_again"] = load_stored(version.definition, FORMAT) == definition
         pool = Pool(stored.id, "simulated", version.series, "")

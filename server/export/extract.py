@@ -1,0 +1,54 @@
+"""What of a study's data an export holds: one origin, or all of them; one data series, or every one."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import Session
+
+from experiments.definition import Experiment
+from server.models import Study, StudyRun, StudyVersion
+from server.studies.lookup import definition_of
+from server.studies.series import version_of_series
+
+ExportOrigin = Literal["participant", "pilot", "simulated", "all"]
+"""Previews are in no export: they are stored for a day only."""
+EXPORTED = get_args(ExportOrigin)[:-1]
+
+
+@dataclass(frozen=True)
+class Extract:
+    """The part of a study's data that goes out; without a series of each, told apart by a column."""
+
+    origin: ExportOrigin = "participant"
+    series: int | None = None
+
+    def of(self, study: Study) -> ColumnElement[bool]:
+        """The condition that a run of the study is in it."""
+        origins = EXPORTED if self.origin == "all" else (self.origin,)
+        runs = (StudyRun.study_id == study.id) & StudyRun.origin.in_(origins)
+        if self.series is None:
+            return runs
+        versions = select(StudyVersion.id).where(
+            StudyVersion.study_id == study.id, StudyVersion.series == self.series
+        )
+        return runs & StudyRun.version_id.in_(versions)
+
+    def definition(self, session: Session, study: Study) -> Experiment:
+        """The newest declaration of the series, or that in use; NotFound where there is no such series."""
+        return definition_of(version_of_series(session, study, self.series))
+
+    def __str__(self) -> str:
+        """In words, as READMEs have it."""
+        one, every = f"the origin `{self.origin}` alone", "all origins, told apart by `run_origin`"
+        series = "" if self.series is None else f", data series {self.series} alone"
+        return (every if self.origin == "all" else one) + series
+
+    @property
+    def file_part(self) -> str:
+        """What file names say of it: nothing for participants of every series."""
+        origin = "" if self.origin == "participant" else f"-{self.origin}"
+        return origin + ("" if self.series is None else f"-series-{self.series}")
+
+
+EVERYTHING = Extract("all")
