@@ -2,11 +2,13 @@
 
 from typing import NamedTuple
 
-from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.paired_comparison.declaration import PairedComparison
-from experiments.trials.threshold.declaration import Threshold, YesNo
+from experiments.trials.paired_comparison.pairs import every_pair, item_of
+from experiments.trials.paired_comparison.plan import assign
+from experiments.trials.threshold.declaration import Threshold
+from experiments.trials.threshold.grid import stimuli
 
 MEDIUM_F = 0.25
 """Cohen's f that is called medium."""
@@ -51,36 +53,55 @@ def _of_means(experiment: Experiment) -> PlanCommand:
 
 
 def _of_pairs(experiment: Experiment) -> PlanCommand:
-    items = len(design.cells(experiment))
+    pairs = every_pair(experiment)
+    named = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
+    items = len({item for both in named for item in both})
     if not 2 <= items <= MAX_ITEMS:
         raise InputError(f"power of pairs is reckoned for 2 to {MAX_ITEMS} items, and there are {items}")
+    of_items = items * (items - 1) // 2
+    if len({frozenset(both) for both in named}) < of_items:
+        raise InputError("power of pairs is reckoned where every two items are compared; here some are not")
+    shown = sum(trial.kind == "main" for trial in assign(experiment, seed=0, slot=0))
+    if shown < of_items:
+        raise InputError(
+            f"power of pairs is reckoned where a participant compares every two items; here it is {shown} of "
+            f"{of_items} pairs"
+        )
     abilities = ",".join(f"{STEP * item:.1f}" for item in range(items))
+    arguments = ["plan", "pairs", "--abilities", abilities]
+    if (repeats := shown // of_items) > 1:
+        arguments += ["--repeats", str(repeats)]
+    often = "once" if repeats == 1 else f"{repeats} times"
     return PlanCommand(
-        ["plan", "pairs", "--abilities", abilities],
-        f"neighbouring items differ by {STEP} in log odds, each participant compares every pair once",
+        arguments,
+        f"neighbouring items differ by {STEP} in log odds, each participant compares every two items "
+        f"{often}, all by the same abilities",
     )
 
 
 def _of_thresholds(experiment: Experiment, trial: Threshold) -> PlanCommand:
-    factor = next(one for one in experiment.factors if one.name == trial.stimulus.factor)
-    levels = sorted(_numbers([level.name for level in factor.levels], trial.stimulus.values))
-    if len(levels) < 3:
-        raise InputError(f"power of thresholds takes three stimuli or more, and there are {len(levels)}")
-    step = (levels[-1] - levels[0]) / (len(levels) - 1)
-    middle = levels[len(levels) // 2]
-    guess = trial.task.guess if isinstance(trial.task, YesNo) else 0.5
-    arguments = ["plan", "thresholds", "--levels", ",".join(f"{level:g}" for level in levels)]
+    conditions = [
+        one for one in experiment.factors if one.name not in trial.stimulus.factors and not one.random
+    ]
+    if all(len(one.levels) < 2 for one in conditions):
+        raise InputError(
+            "the stimulus is the only factor, so there are no conditions whose thresholds could differ"
+        )
+    if any(one.between and len(one.levels) > 1 for one in conditions):
+        raise InputError("power of thresholds is reckoned for conditions that each participant sees all of")
+    numbers = sorted(stimuli(experiment))
+    if len(numbers) < 3:
+        raise InputError(f"power of thresholds takes three stimuli or more, and there are {len(numbers)}")
+    step = (numbers[-1] - numbers[0]) / (len(numbers) - 1)
+    middle = numbers[len(numbers) // 2]
+    times = max(1, round((trial.stop.trials or 0) / len(numbers)))
+    arguments = ["plan", "thresholds", "--levels", ",".join(f"{number:g}" for number in numbers)]
     arguments += ["--threshold", f"{middle:g}", "--difference", f"{step / 2:g}", "--spread", f"{step:g}"]
-    arguments += ["--sd-people", f"{step / 2:g}", "--sd-difference", f"{step / 4:g}", "--guess", f"{guess:g}"]
+    arguments += ["--sd-people", f"{step / 2:g}", "--sd-difference", f"{step / 4:g}"]
+    arguments += ["--guess", f"{trial.task.guess:g}", "--trials", str(times)]
     return PlanCommand(
         arguments,
         f"thresholds near {middle:g} that differ by {step / 2:g} between two conditions, a function as wide "
-        f"as the step of {step:g} between stimuli, ten trials of each",
+        f"as the step of {step:g} between stimuli, a series of {trial.stop.trials} trials in each condition, "
+        f"as if each stimulus came {times} times: a series that looks for the threshold tells more",
     )
-
-
-def _numbers(names: list[str], values: dict[str, float]) -> list[float]:
-    try:
-        return [values[name] if name in values else float(name) for name in names]
-    except ValueError as error:
-        raise InputError("the stimuli have no numbers, so there is no power to reckon") from error

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from experiments.load import load_experiment, parse_experiment
+from experiments.errors import InputError
+from experiments.load import load_experiment, locate, parse_experiment
 from server.context import Services
 from server.models import Link, Rating, StudyRun
 from server.rehearsals.power import plan_command
@@ -13,6 +14,12 @@ from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant
 
 PATH = "/studies/short/rehearsals"
+FOUR_PAIRS = """{ among = "declared", cells = [
+    { cell = "photorealistic/model", other = "photorealistic/textbook" },
+    { cell = "photorealistic/model", other = "cartoon/model" },
+    { cell = "photorealistic/model", other = "cartoon/textbook" },
+    { cell = "cartoon/model", other = "cartoon/textbook" },
+] }"""
 LIMIT_S = 300
 
 
@@ -68,11 +75,36 @@ def test_a_rehearsal_shows_everything_and_leaves_the_data_alone(
     ("name", "command"),
     [
         ("exp3", "plan anova --within lower_lid:4 --effect lower_lid=0.25"),
-        ("pairs-demo", "plan pairs --abilities 0.0,0.3,0.6,0.9"),
+        ("pairs-demo", "plan pairs --abilities 0.0,0.3,0.6,0.9 --repeats 2"),
     ],
 )
 def test_the_power_that_a_declaration_asks_for(name: str, command: str) -> None:
     assert " ".join(plan_command(load_experiment(name)).arguments) == command
+
+
+def test_thresholds_are_planned_with_the_trials_of_a_series() -> None:
+    arguments = plan_command(load_experiment("threshold-demo")).arguments
+    assert arguments[arguments.index("--levels") + 1].split(",")[0] == "100"
+    assert arguments[-4:] == ["--guess", "0.02", "--trials", "3"]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "problem"),
+    [
+        ("plane-demo", ("", ""), "no conditions whose thresholds could differ"),
+        ("pairs-demo", ("expected_seconds = 8.0", "pairs_per_person = 4"), "here it is 4 of 6 pairs"),
+        (
+            "pairs-demo",
+            ('{ among = "all", exemplars = "matched" }', FOUR_PAIRS),
+            "every two items are compared",
+        ),
+    ],
+)
+def test_a_power_that_no_plan_reckons_is_not_shown(name: str, change: tuple[str, str], problem: str) -> None:
+    text = locate(name).read_text(encoding="utf-8")
+    experiment = parse_experiment(text.replace(*change))
+    with pytest.raises(InputError, match=problem):
+        plan_command(experiment)
 
 
 def test_factors_between_participants_are_planned_as_such() -> None:
