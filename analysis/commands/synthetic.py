@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from analysis.commands.output import JsonOption, save_json, saying, show_tables
 from experiments.errors import InputError
@@ -177,6 +175,10 @@ def _say_synthetic(made: "Synthetic", invented: int, several: bool) -> None:
 @contextmanager
 def bar(what: str, total: int) -> Iterator[Any]:
     """A progress bar with the time left on a terminal, silence elsewhere."""
+    # rich takes longer to import than all else that the help of any command needs
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:

@@ -30,9 +30,9 @@ def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
         version=version("palpebra"),
         script=script,
         data=data,
-        factors=[_factor(names[name], levels) for name, levels in _factors(analysis)],
+        factors=factors_in_r(analysis, names),
         within=bool(analysis.anova.factors),
-        formula=_formula(analysis, names),
+        formula=formula_in_r(analysis, names),
         type=analysis.anova.sum_of_squares,
         effects=_effects(analysis, names),
         means=_means(analysis, names),
@@ -72,7 +72,13 @@ def _factor(name: str, levels: Sequence[str]) -> dict[str, str]:
     return {"name": name, "texts": texts, "codes": ", ".join(f'"l{i}"' for i in range(1, len(levels) + 1))}
 
 
-def _formula(analysis: Analysis, names: dict[str, str]) -> str:
+def factors_in_r(analysis: Analysis, names: dict[str, str]) -> list[dict[str, str]]:
+    """Every factor's name in R, its levels as text and the codes that stand for them there."""
+    return [_factor(names[name], levels) for name, levels in _factors(analysis)]
+
+
+def formula_in_r(analysis: Analysis, names: dict[str, str]) -> str:
+    """The formula of the ANOVA as afex takes it."""
     between = [":".join(names[part] for part in term) for term in analysis.anova.between.terms[1:]]
     within = "*".join(names[name] for name in analysis.anova.factors)
     error = f"Error(participant/({within}))" if within else "Error(participant)"

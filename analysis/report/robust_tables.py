@@ -1,10 +1,13 @@
 """What the robust companions say, beside the ANOVA they accompany."""
 
+from functools import partial
+
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
 from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, interval, p_value
+from analysis.report.r_robust import robust_files
 from analysis.report.tables import effect_label
 from analysis.robust.companions import Companions
 from analysis.robust.permutation import PermutationTest
@@ -22,7 +25,8 @@ TEXT = (
 
 def robust_section(analysis: Analysis, companions: Companions) -> Section:
     """The section of the report."""
-    return Section("Robust companions", TEXT, robust_tables(analysis, companions))
+    files = partial(robust_files, analysis, companions)
+    return Section("Robust companions", TEXT, robust_tables(analysis, companions), (), files)
 
 
 def robust_tables(analysis: Analysis, companions: Companions) -> tuple[Table, ...]:

@@ -59,7 +59,7 @@ def part_of(
         title,
         lambda: draw_all(analysis),
         more,
-        lambda key: r_files(analysis, key),
+        lambda key: scripts_of(analysis, key),
         brief=brief(analysis),
     )
 
@@ -73,6 +73,16 @@ def tables_of(analysis: Analysis) -> tuple[Table, ...]:
     from analysis.report.robust_tables import robust_tables
 
     return (*tables, *robust_tables(analysis, analysis.robust))
+
+
+def scripts_of(analysis: Analysis, key: str) -> dict[str, bytes]:
+    """R scripts that compute the tables anew, and what they read."""
+    files = r_files(analysis, key)
+    if analysis.robust is None:
+        return files
+    from analysis.report.r_robust import robust_files
+
+    return {**files, **robust_files(analysis, analysis.robust, key)}
 
 
 def methods_of(analysis: Analysis) -> str:

@@ -27,6 +27,12 @@ CASES = {
 }
 
 
+ROBUST = {
+    "few": ("within/few_participants_2.csv", f"{OF_CELLS} --robust"),
+    "type 2": ("between/between_only.csv", "--participant id --rating y --between g,h --type 2 --robust"),
+}
+
+
 def report(folder: Path, file: str, options: str) -> Path:
     call = ["anova", str(GOLDEN / file), "--out", str(folder), *options.split()]
     told = CliRunner().invoke(app, call)
@@ -46,6 +52,40 @@ def of_r(tmp_path_factory) -> dict[str, str]:
     data[1] = ",".join([*cells, str(float(mean) + 0.01)])
     path.write_text("\n".join(data))
     return dict(zip(CASES, run_together(scripts), strict=True))
+
+
+@pytest.fixture(scope="module")
+def of_robust(tmp_path_factory) -> dict[str, str]:
+    """What R says of the robust companions of every case; of `changed` one cell mean is another."""
+    needed("afex", "car")
+    folder = tmp_path_factory.mktemp("robust")
+    scripts = [report(folder / name, *case) for name, case in ROBUST.items()]
+    scripts.append(report(folder / "changed", *ROBUST["few"]))
+    path = scripts[-1].with_name("cell-means.csv")
+    data = path.read_text().splitlines()
+    *cells, mean = data[1].split(",")
+    data[1] = ",".join([*cells, str(float(mean) + 3)])
+    path.write_text("\n".join(data))
+    said = run_together([script.with_name("robust-verify.R") for script in scripts])
+    return dict(zip([*ROBUST, "changed"], said, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("case", "tables"),
+    [
+        ("few", "trimmed  A, trimmed  B, ranks    F, ranks    epsilon, permuted F, permuted p "),
+        ("type 2", "trimmed  g, trimmed  h, ranks    p, permuted F, permuted p (drawn)"),
+    ],
+)
+def test_r_agrees_with_the_robust_companions(of_robust, case, tables) -> None:
+    assert "Every number agrees with R." in of_robust[case], of_robust[case]
+    for table in tables.split(", "):
+        assert f"\n{table}" in f"\n{of_robust[case]}"
+
+
+def test_r_finds_changed_robust_companions(of_robust) -> None:
+    differing = [line for line in of_robust["changed"].splitlines() if line.endswith("DIFFER")]
+    assert {line.split()[0] for line in differing} == {"trimmed", "ranks", "permuted"}
 
 
 @pytest.mark.parametrize("case", [name for name in CASES if name != "changed"])
