@@ -3,6 +3,7 @@ import { expect, it, vi } from "vitest";
 import type { RatingIn, ShownClipRating } from "../../src/api/schema";
 import type { Session } from "../../src/participant/session";
 import { simulatedRating } from "../../src/participant/trials/clip_rating/simulate";
+import { actWhileShown } from "../../src/participant/trials/shared/act-while-shown";
 import { aTrial } from "./a-trial";
 
 // It asks for a window when it is loaded.
@@ -36,4 +37,21 @@ it("a simulated rating tells the declared gap after a reference, and none withou
   expect(after?.answer).toEqual({ kind: "clip_rating", answers, reference_gap_ms: 2_000 });
   const [alone] = await sent(null);
   expect(alone?.answer).toEqual({ kind: "clip_rating", answers });
+});
+
+it("a simulated person waits for a trial's page that is shown late, and stops when it is gone", () => {
+  vi.useFakeTimers();
+  const page = { isConnected: true };
+  const shown: { page: typeof page | null } = { page: null };
+  const act = vi.fn();
+  actWhileShown({ querySelector: () => shown.page } as unknown as HTMLElement, act);
+  vi.advanceTimersByTime(2_000);
+  expect(act).not.toHaveBeenCalled();
+  shown.page = page;
+  vi.advanceTimersByTime(1_000);
+  expect(act).toHaveBeenCalledTimes(4);
+  page.isConnected = false;
+  vi.advanceTimersByTime(1_000);
+  expect([act.mock.calls.length, vi.getTimerCount()]).toEqual([4, 0]);
+  vi.useRealTimers();
 });
