@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.opinion.projection import Projection, alternating_projection
-from analysis.read.text_table import name_lines, numbers, read_text_table, refuse_shared_roles, texts_required
+from analysis.read.text_table import (
+    name_lines,
+    numbers,
+    read_text_table,
+    refuse_shared_roles,
+    texts_required,
+    unusual_numbers,
+)
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -85,6 +92,7 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
     for name in roles[:2]:
         texts_required(table, name)
     values = numbers(table, rating)
+    unusual_numbers(table, rating, values, "correct them or leave them empty")
     keep = np.isfinite(values)
     if not keep.all():
         lines = name_lines(table, ~keep)

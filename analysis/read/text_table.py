@@ -22,6 +22,10 @@ MISSING_MARKS = frozenset({"", "NA", "NaN", "nan", "N/A", "n/a", "."})
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _DECIMAL_POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+")
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_POINTED_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
+_HUNDREDS = re.compile(r"[+-]?[1-9][0-9]{2}")
+MISSING_CODES = (-9999.0, -999.0, -99.0, -88.0, -77.0, -9.0, 99.0, 999.0, 9999.0)
+"""Numbers by which people mark that there is none."""
 NAMED_ROWS = 5
 
 
@@ -72,7 +76,22 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
     table.decisions.extend(cells.decisions)
     for name in names:
         table.columns[name] = _stripped(table.columns[name])
+    _leave_out_empty_rows(table, names)
     return table
+
+
+def _leave_out_empty_rows(table: TextTable, names: Sequence[str]) -> None:
+    """Leave out rows like `,,,`, which spreadsheets write below a table."""
+    empty = np.logical_and.reduce([(table.columns[name] == "").to_numpy() for name in names])
+    if empty.all():
+        raise InputError(f"{table.source} has a header but no rows")
+    if empty.any():
+        table.decisions.append(
+            f"rows without a value in any column read left out ({name_lines(table, empty)})"
+        )
+        left = table.columns[~empty].reset_index(drop=True)
+        table.columns = left.apply(lambda column: column.cat.remove_unused_categories())
+        table.lines = table.lines[~empty]
 
 
 def _names_to_read(
@@ -80,12 +99,22 @@ def _names_to_read(
 ) -> list[str]:
     for name in needed:
         if name not in header:
-            hint = wide_hint(header) or did_you_mean(name, header)
+            hint = wide_hint(header) or _lines_above(header) or did_you_mean(name, header)
             raise InputError(f"{source} has no column '{name}'{hint}")
     for name in header:
         if name and header.count(name) > 1 and name in (*needed, *optional):
             raise InputError(f"{source} has two columns called '{name}'; rename one")
     return list(dict.fromkeys([*needed, *(name for name in optional if name in header)]))
+
+
+def _lines_above(header: Sequence[str]) -> str:
+    """What to do about a first line that is no header: a title, a comment, an unknown separator."""
+    if len([name for name in header if name]) > 1:
+        return ""
+    return (
+        f": its first line is {max(header, key=len)!r}; it should name the columns, between commas, "
+        "semicolons or tabs: delete lines above it, and replace other separators"
+    )
 
 
 def _sorts(reader: Reader, header: Sequence[str]) -> Cells | None:
@@ -151,13 +180,18 @@ def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
 
 
 def _refuse_two_readings(table: TextTable, name: str, categories: list[str], commas: list[str]) -> None:
-    """Refuse a column in which a comma may part thousands as well as decimals, with both readings."""
+    """Refuse a column whose commas or points may part thousands as well as decimals, with both readings."""
     thousands = [text for text in commas if _THOUSANDS.fullmatch(text)]
     points = [text for text in categories if _DECIMAL_POINT.fullmatch(text)]
-    if not thousands or (len(thousands) < len(commas) and not points):
+    hundreds = [text for text in categories if _HUNDREDS.fullmatch(text)]
+    if points and not commas and hundreds and all(map(_POINTED_THOUSANDS.fullmatch, points)):
+        # 1.003 beside 950, as spreadsheets write it where the comma is the decimal mark
+        text, beside = points[0], hundreds[0]
+    elif thousands and (len(thousands) == len(commas) or points):
+        text, beside = thousands[0], next((t for t in points or categories if t and t not in commas), "")
+    else:
         return
-    text, beside = thousands[0], next((t for t in points or categories if t and t not in commas), "")
-    decimal, whole = text.replace(",", "."), text.replace(",", "")
+    decimal, whole = text.replace(",", "."), re.sub("[.,]", "", text)
     row = int(np.argmax((table.columns[name] == text).to_numpy()))
     raise InputError(
         f"{table.source}: '{text}' of '{name}' in line {table.line(row)} can be read as {decimal} or as "
@@ -166,13 +200,27 @@ def _refuse_two_readings(table: TextTable, name: str, categories: list[str], com
     )
 
 
-def unusual_numbers(table: TextTable, name: str, values: NDArray[np.float64]) -> None:
+def unusual_numbers(
+    table: TextTable,
+    name: str,
+    values: NDArray[np.float64],
+    remedy: str = "correct them, leave them empty, or refuse them with --scale",
+) -> None:
     """Say it where a few whole-number ratings lie far outside all others: typing errors, codes for missing.
 
     Far: beyond the others by more than their whole range, where the others span at most 11 points and the
-    few are no more than one in twenty.
+    few are no more than one in twenty. Codes for missing (-99, 999) that lie so far, or below zero where
+    nothing else does, are named however many they are.
     """
-    given = values[~np.isnan(values)]
+    coded = _missing_codes(values)
+    if coded.any():
+        named = ", ".join(f"{value:g}" for value in sorted(set(values[coded])))
+        table.decisions.append(
+            f"'{name}' holds {named} ({name_lines(table, coded)}), by which missing ratings are often "
+            f"marked; they count: {remedy}"
+        )
+    given = values[~np.isnan(values) & ~coded]
+    values = np.where(coded, np.nan, values)
     if len(given) < 20 or (given != np.round(given)).any():
         return
     low, high = np.quantile(given, [0.05, 0.95], method="nearest")
@@ -183,8 +231,19 @@ def unusual_numbers(table: TextTable, name: str, values: NDArray[np.float64]) ->
         inside = given[(given <= high + width + 1) & (given >= low - width - 1)]
         table.decisions.append(
             f"'{name}' holds {named} ({name_lines(table, far)}), far from the others ({inside.min():g} to "
-            f"{inside.max():g}); they count: correct them, leave them empty, or refuse them with --scale"
+            f"{inside.max():g}); they count: {remedy}"
         )
+
+
+def _missing_codes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which values are codes for missing that lie where no other value does."""
+    coded = np.isin(values, MISSING_CODES)
+    others = values[~coded & ~np.isnan(values)]
+    if not coded.any() or len(others) < 2:
+        return np.zeros(len(values), dtype=bool)
+    low, high = others.min(), others.max()
+    beyond = (values > high + (high - low) + 1) | (values < low - (high - low) - 1)
+    return np.asarray(coded & (beyond | ((values < 0) & (low >= 0))))
 
 
 def _number(table: TextTable, name: str, text: str) -> float:

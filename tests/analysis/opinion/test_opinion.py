@@ -86,3 +86,13 @@ def test_bad_tables_are_one_line(tmp_path: Path) -> None:
     path.write_text("clip,id,score\nx,a,good\n")
     with pytest.raises(InputError, match="'score' should be a number, got 'good' in line 2"):
         read_votes(path, "clip", "id", "score")
+
+
+def test_codes_for_missing_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "votes.csv"
+    rows = [f"p{i},c{j},{-99 if i == j else i * j % 5 + 1}" for i in range(9) for j in range(6)]
+    path.write_text("\n".join(["id,clip,score", *rows]))
+    call = ["opinion", str(path), "--item", "clip", "--participant", "id", "--rating", "score"]
+    told = " ".join(CliRunner().invoke(app, call).output.split())
+    assert "'score' holds -99" in told
+    assert "they count: correct them or leave them empty" in told

@@ -71,3 +71,50 @@ def test_the_participant_is_no_item(tmp_path, item, message) -> None:
     path.write_text("\n".join(["id,person,a,y", *rows]))
     with pytest.raises(InputError, match=message):
         read_model_input(path, "id", "y", ["a"], item)
+
+
+def test_a_point_that_may_part_thousands_is_refused_with_both_readings(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"'1\.003' of 'y' in line 2 can be read as 1\.003 or as 1003"):
+        read(file_of(tmp_path, ["1.003", "950"]))
+
+
+@pytest.mark.parametrize(
+    "ratings", [["1.003", "2.5", "950"], ["0.125", "950"], ["4.125", "3.875"], ["1.003", "7"]]
+)
+def test_a_column_that_shows_its_decimal_point_is_read(tmp_path, ratings) -> None:
+    assert read(file_of(tmp_path, ratings)).rows["y"].tolist() == [float(text) for text in ratings]
+
+
+@pytest.mark.parametrize(
+    ("code", "others"), [("-99", range(1, 8)), ("999", range(101)), ("-9", [0.5, 1, 1.5, 2])]
+)
+def test_codes_for_missing_are_named_however_many_they_are(tmp_path, code, others) -> None:
+    ratings = [str(value) for value in others] * 6
+    assert not read(file_of(tmp_path, ratings)).decisions
+    (said,) = read(file_of(tmp_path, [*ratings, *[code] * 12])).decisions
+    assert f"'y' holds {code} (lines " in said
+    assert "leave them empty, or refuse them with --scale" in said
+
+
+@pytest.mark.parametrize("ratings", [["90", "95", "99"] * 9, ["-9", "-8", "3"] * 9])
+def test_a_code_among_the_others_is_a_number(tmp_path, ratings) -> None:
+    assert not read(file_of(tmp_path, ratings)).decisions
+
+
+def test_empty_rows_below_a_table_are_left_out(tmp_path) -> None:
+    path = file_of(tmp_path, ["1", "2", "3", "4"])
+    path.write_text(f"{path.read_text()}\n,,\n,,\n")
+    table = read(path)
+    assert table.rows["y"].tolist() == [1, 2, 3, 4]
+    assert list(table.decisions) == ["rows without a value in any column read left out (lines 6, 7)"]
+    path.write_text("id,a,y\n,,\n")
+    with pytest.raises(InputError, match="has a header but no rows"):
+        read(path)
+
+
+@pytest.mark.parametrize("first", ["# made by our laboratory", "sep=|", "id|a|y"])
+def test_a_first_line_that_is_no_header_is_shown_with_what_to_do(tmp_path, first) -> None:
+    path = file_of(tmp_path, ["1", "2"])
+    path.write_text(f"{first}\n{path.read_text()}")
+    with pytest.raises(InputError, match=r"its first line is .*; it should name the columns"):
+        read(path)
