@@ -6,9 +6,9 @@ from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.paired_comparison.declaration import PairedComparison
 from experiments.trials.paired_comparison.pairs import every_pair, item_of
-from experiments.trials.paired_comparison.plan import assign
+from experiments.trials.paired_comparison.plan import assign, chooses
 from experiments.trials.threshold.declaration import Threshold
-from experiments.trials.threshold.grid import stimuli
+from experiments.trials.threshold.grid import series_of, stimuli
 
 MEDIUM_F = 0.25
 """Cohen's f that is called medium."""
@@ -53,6 +53,10 @@ def _of_means(experiment: Experiment) -> PlanCommand:
 
 
 def _of_pairs(experiment: Experiment) -> PlanCommand:
+    if any(factor.between for factor in experiment.factors):
+        raise InputError("groups of participants compare different items, so no one power holds for all")
+    if chooses(experiment):
+        raise InputError("pairs are chosen by the answers so far, so no power is reckoned before the data")
     pairs = every_pair(experiment)
     named = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
     items = len({item for both in named for item in both})
@@ -89,6 +93,10 @@ def _of_thresholds(experiment: Experiment, trial: Threshold) -> PlanCommand:
         )
     if any(one.between and len(one.levels) > 1 for one in conditions):
         raise InputError("power of thresholds is reckoned for conditions that each participant sees all of")
+    if len(series_of(experiment)) < 2:
+        raise InputError(
+            "there is one series, so there are no two thresholds to compare and no power to reckon"
+        )
     numbers = sorted(stimuli(experiment))
     if len(numbers) < 3:
         raise InputError(f"power of thresholds takes three stimuli or more, and there are {len(numbers)}")

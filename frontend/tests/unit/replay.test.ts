@@ -1,8 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { arrange, topOf } from "../../src/admin/replay/arranging";
-import { answerWords } from "../../src/admin/replay/facts";
+import { answerWords, traceOf } from "../../src/admin/replay/facts";
 import { folding } from "../../src/admin/replay/folding";
 import { changeBefore, changesOf, type Clip, nextChange, type Play, playedBack, shownAt, type View } from "../../src/admin/replay/shown";
+import { marksOf } from "../../src/admin/replay/ViewFacts";
 import type { Schemas } from "../../src/admin/api";
 
 const CLIP: Clip = {
@@ -157,5 +158,58 @@ describe("an answer in words", () => {
     expect(said({ kind: "continuous_rating", values: [1, 2], step_frames: 3, moves: 2, chosen: null })).toBe(
       "2 samples of the slider, step frames 3, moves 2",
     );
+    expect(said({ kind: "threshold", chosen: "yes", known: 4 })).toBe("chosen yes, stimulus chosen by 4 answers before");
+    expect(said({ kind: "threshold", chosen: "second", known: 1 })).toBe("chosen second, stimulus chosen by 1 answer before");
+    expect(said({ kind: "check", check: 2, other_way: false })).toBe("check 2");
+    expect(said({ kind: "check", check: null, other_way: true })).toBe("other way");
+  });
+  it("of a trial that could not be shown is none", () => {
+    const said = (answer: Play["answer"]): string => answerWords(aPlay({ answer }));
+    expect(said({ kind: "threshold", chosen: null, known: 0 })).toBe("no answer");
+    expect(said({ kind: "check", check: null, other_way: false })).toBe("no answer");
+    expect(said({ kind: "paired_comparison", winner: null, arrangement: "stacked" })).toBe("no answer");
+    expect(said({ kind: "continuous_rating", values: null, step_frames: null, moves: 0, chosen: null, response: null })).toBe("no answer");
+  });
+});
+
+describe("the marks on a time line", () => {
+  const event = (type: string, at_client: string) => ({ type, at_client }) as Schemas["ReplayedEvent"];
+  const events = [event("focus_lost", "2026-11-21T10:00:02.000Z"), event("focus_lost", "2026-11-21T09:59:59.000Z")];
+  it("are events since the start key and the answer, in the order of time", () => {
+    const play = aPlay({ rt_from_first_frame: 1_000 });
+    const marks = marksOf(play, playedBack(play, [CLIP]), events);
+    expect(marks.map(({ at_ms, label }) => [at_ms, label])).toEqual([
+      [1_020, "answer"],
+      [2_000, "focus lost"],
+    ]);
+  });
+  it("of a play without views are none: there is nothing to count from", () => {
+    const play = aPlay({ views: [] });
+    expect(marksOf(play, playedBack(play, []), events)).toEqual([]);
+  });
+});
+
+describe("the slider over a time line", () => {
+  const trial = { kind: "continuous_rating", minimum: -1, maximum: 1 } as Schemas["Replay"]["trial"];
+  const answer = { kind: "continuous_rating", values: [-1, 0, null, 1], step_frames: 1 };
+  it("stands where the sampled frame stood, or the next one that was drawn", () => {
+    const play = aPlay({ answer });
+    expect(traceOf(play, playedBack(play, [CLIP]), trial)).toEqual([
+      [20, 0],
+      [53, 0.5],
+      [453, 1],
+    ]);
+  });
+  it("ends with the frames that were drawn", () => {
+    const play = aPlay({ answer: { ...answer, values: [0, 0, 0, 0], step_frames: 3 } });
+    expect(traceOf(play, playedBack(play, [CLIP]), trial)).toEqual([
+      [20, 0.5],
+      [453, 0.5],
+    ]);
+  });
+  it("of other kinds, and without an answer, is nothing", () => {
+    const rated = aPlay({ answer: { kind: "clip_rating", response: 3 } });
+    expect(traceOf(rated, playedBack(rated, [CLIP]), { kind: "clip_rating" } as Schemas["Replay"]["trial"])).toEqual([]);
+    expect(traceOf(aPlay(), playedBack(aPlay(), [CLIP]), trial)).toEqual([]);
   });
 });

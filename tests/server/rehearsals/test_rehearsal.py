@@ -20,6 +20,8 @@ FOUR_PAIRS = """{ among = "declared", cells = [
     { cell = "photorealistic/model", other = "cartoon/textbook" },
     { cell = "cartoon/model", other = "cartoon/textbook" },
 ] }"""
+ASYMMETRIC = """    { name = "asymmetric", levels = { asymmetry = "asymmetric" } },
+"""
 LIMIT_S = 300
 
 
@@ -98,6 +100,13 @@ def test_thresholds_are_planned_with_the_trials_of_a_series() -> None:
             ('{ among = "all", exemplars = "matched" }', FOUR_PAIRS),
             "every two items are compared",
         ),
+        ("pairs-demo", ('label = "Character"', 'label = "Character"\nbetween = true'), "different items"),
+        (
+            "pairs-demo",
+            ("expected_seconds = 8.0", 'pairs_per_person = 6\ndealing = { by = "active" }'),
+            "chosen by the answers",
+        ),
+        ("threshold-demo", (ASYMMETRIC, ""), "there is one series"),
     ],
 )
 def test_a_power_that_no_plan_reckons_is_not_shown(name: str, change: tuple[str, str], problem: str) -> None:

@@ -6,7 +6,8 @@ import type { Lane, Play, PlayedBack } from "./shown";
 /** What was answered, whatever the kind of trial: each key of the answer that says something. */
 export function answerWords({ answer }: Play): string {
   if (answer === null) return "no answer";
-  const { answers, values, ...rest } = answer;
+  // How a trial came about, which is not what was answered: it is said after an answer, and makes none.
+  const { answers, values, known, arrangement, step_frames, moves, ...rest } = answer;
   const parts: string[] = [];
   if (isRecord(answers)) {
     for (const [scale, one] of Object.entries(answers)) {
@@ -17,9 +18,14 @@ export function answerWords({ answer }: Play): string {
   if (Array.isArray(values)) parts.push(`${values.length} samples of the slider`);
   for (const [key, value] of Object.entries(rest)) {
     const isSaid = key === "kind" || value === null || (key === "response" && parts.length > 0) || value === false;
-    if (!isSaid) parts.push(`${words(key)} ${typeof value === "string" ? words(value) : plain(value)}`);
+    if (!isSaid) parts.push(value === true ? words(key) : `${words(key)} ${typeof value === "string" ? words(value) : plain(value)}`);
   }
-  return parts.join(", ") || "no answer";
+  if (parts.length === 0) return "no answer";
+  for (const [key, value] of Object.entries({ step_frames, moves, arrangement })) {
+    if (value !== undefined && value !== null) parts.push(`${words(key)} ${typeof value === "string" ? words(value) : plain(value)}`);
+  }
+  if (typeof known === "number") parts.push(`stimulus chosen by ${known === 1 ? "1 answer" : `${known} answers`} before`);
+  return parts.join(", ");
 }
 
 const isRecord = (value: unknown): value is Record<string, unknown> => typeof value === "object" && value !== null && !Array.isArray(value);
