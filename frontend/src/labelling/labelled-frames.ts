@@ -1,6 +1,6 @@
 /** Labelled frames of one video: which to label, and whether labels fit the video. */
 
-import { farthestPictures, FRAMES_TO_LABEL } from "./choose-frames";
+import { briefChanges, farthestPictures, FRAMES_TO_LABEL } from "./choose-frames";
 import type { Grey } from "./grey";
 import { checkShape, type LabelFile, LabelProblem } from "./label-file";
 import type { Shape } from "./points";
@@ -22,7 +22,7 @@ export function acceptedOf(frames: Frames): [number, Shape][] {
   return [...frames].filter(([, { accepted }]) => accepted).map(([number, { shape }]) => [number, shape]);
 }
 
-/** About 20 frames: those labelled, and ones as unlike them as there are. */
+/** About 20 frames: those labelled, brief changes such as blinks, and ones as unlike these as there are. */
 export function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
   const taken = labelled.map((number) =>
     candidates.reduce(
@@ -30,7 +30,10 @@ export function chooseFrames({ candidates, pictures }: Looked, labelled: readonl
       0,
     ),
   );
-  const indices = farthestPictures(pictures, FRAMES_TO_LABEL, taken).filter((index) => !taken.includes(index));
+  const brief = briefChanges(pictures).slice(0, Math.max(0, FRAMES_TO_LABEL - taken.length));
+  // The first picture is an open eye as a rule: without it and labels, only blinks would be known.
+  const begun = brief.length > 0 && taken.length === 0 ? [0, ...brief] : [...taken, ...brief];
+  const indices = farthestPictures(pictures, FRAMES_TO_LABEL, begun).filter((index) => !taken.includes(index));
   const added = indices.map((index) => candidates[index] ?? 0);
   return [...new Set([...labelled, ...added])].sort((a, b) => a - b);
 }

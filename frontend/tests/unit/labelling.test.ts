@@ -1,8 +1,9 @@
 import { describe, expect, it } from "vitest";
-import { candidateFrames, farthestPictures } from "../../src/labelling/choose-frames";
+import { briefChanges, candidateFrames, farthestPictures } from "../../src/labelling/choose-frames";
 import type { Grey } from "../../src/labelling/grey";
 import { begun, changed, redone, undone } from "../../src/labelling/history";
 import { checkShape, labelsText, parseLabels } from "../../src/labelling/label-file";
+import { chooseFrames } from "../../src/labelling/labelled-frames";
 import { at, nearestPoint, type Point, type Shape, templateShape, withEyeStretched, withPoint } from "../../src/labelling/points";
 import { proposeShape } from "../../src/labelling/propose";
 import {
@@ -39,9 +40,33 @@ const flat = (value: number): Grey => ({ width: 4, height: 4, values: new Uint8C
 describe("frames to label", () => {
   it("are spread over the video, at most so many", () => {
     expect(candidateFrames(5)).toEqual([0, 1, 2, 3, 4]);
-    expect(candidateFrames(1_001, 3)).toEqual([0, 500, 1_000]);
+    expect(candidateFrames(239).slice(-2)).toEqual([236, 238]);
+    expect(candidateFrames(360)).toHaveLength(121);
+    expect(candidateFrames(100_000)).toHaveLength(1_200);
+    expect(candidateFrames(100_000).at(-1)).toBe(99_999);
     expect(candidateFrames(1)).toEqual([0]);
     expect(candidateFrames(0)).toEqual([]);
+  });
+  it("of a minute leave no three frames out, which a closed lid stays", () => {
+    const numbers = candidateFrames(1_800);
+    expect(Math.max(...numbers.slice(1).map((number, index) => number - (numbers[index] ?? 0)))).toBe(3);
+  });
+  it("hold the blinks of a minute, though the light changes more than they do", () => {
+    // A lid of 4 x 4 px closes at four moments while the whole picture slowly brightens by far more.
+    const [closed, length] = [[90, 300, 301, 450, 570], 601];
+    const pictures = Array.from({ length }, (_, index): Grey => {
+      const values = new Uint8ClampedArray(16 * 16).fill(40 + Math.round((index * 150) / length));
+      for (let y = 4; y < 8; y += 1) values.fill(closed.includes(index) ? 60 : 20, y * 16 + 4, y * 16 + 8);
+      return { width: 16, height: 16, values };
+    });
+    const candidates = candidateFrames(3 * (length - 1) + 1);
+    expect(candidates).toHaveLength(length);
+    const chosen = chooseFrames({ candidates, pictures }, []);
+    expect(chosen).toEqual(expect.arrayContaining([0, 270, 900, 1_350, 1_710]));
+    expect(chosen.length).toBeLessThanOrEqual(20);
+    const relabelled = chooseFrames({ candidates, pictures }, [4]);
+    expect(relabelled).toEqual(expect.arrayContaining([4, 270, 900, 1_350, 1_710]));
+    expect(briefChanges(pictures.slice(0, 120))).toEqual([]);
   });
   it("are as unlike as there are, and never the same picture twice", () => {
     const pictures = [10, 11, 200, 201, 100, 10].map(flat);
