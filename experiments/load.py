@@ -48,14 +48,14 @@ class DefinitionError(InputError):
         super().__init__(f"{source}: {problems[0]}{more}")
 
 
-def load_experiment(name_or_path: str) -> Experiment:
-    """Load a shipped experiment by name, or the TOML file at a path."""
+def load_experiment(name_or_path: str, *, has_data: bool = False) -> Experiment:
+    """Load a shipped experiment by name, or the TOML file at a path; `has_data` as for `parse_experiment`."""
     path = locate(name_or_path)
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text ({error.reason}); save it as UTF-8") from error
-    return parse_experiment(text, path.name)
+    return parse_experiment(text, path.name, has_data=has_data)
 
 
 def locate(name_or_path: str) -> Path:
@@ -71,8 +71,14 @@ def locate(name_or_path: str) -> Path:
     raise InputError(f"no experiment '{name_or_path}'{did_you_mean(stem, (*SHIPPED, *DEMOS))}")
 
 
-def parse_experiment(text: str, source: str = "definition") -> Experiment:
-    """Parse and validate TOML text; DefinitionError lists every problem with its line."""
+def parse_experiment(text: str, source: str = "definition", *, has_data: bool = False) -> Experiment:
+    """Parse and validate TOML text; DefinitionError lists every problem with its line.
+
+    Parameters
+    ----------
+    has_data : bool
+        Of data that were collected by it: what an earlier version took, such as a number in quotes, still is.
+    """
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -89,7 +95,7 @@ def parse_experiment(text: str, source: str = "definition") -> Experiment:
         raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error
     try:
         # TOML tells texts, numbers and truth values apart: none is taken for another.
-        return Experiment.model_validate(_with_tuples(data), strict=True)
+        return Experiment.model_validate(_with_tuples(data), strict=not has_data)
     except ValidationError as error:
         # A misspelt key is also a missing one: name the misspelling first.
         causes = (detail for detail in error.errors() if not is_follower(detail))

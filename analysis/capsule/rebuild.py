@@ -28,7 +28,7 @@ def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress =
     """
     table, report = work / ANSWERS, work / "report"
     report_input(folder / source.answers, table, source.renamed)
-    experiment = load_experiment(str(folder / source.definition))
+    experiment = load_experiment(str(folder / source.definition), has_data=True)
     progress("reading answers")
     runs = read_runs(folder / source.runs)
     answers = load_csv(table, experiment, plan_of(experiment.trial.kind).reading)

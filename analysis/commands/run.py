@@ -129,7 +129,7 @@ def run(
         raise InputError("--database and --csv exclude each other; give one")
     if verify_with_r and not report:
         raise InputError("--verify-with-r needs the report; leave --no-report out")
-    declared = load_experiment(experiment)
+    declared = load_experiment(experiment, has_data=True)
     reading = plan_of(declared.trial.kind).reading
     folder = out or Path("out") / "analysis" / declared.name
     if report:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import tomli_w
 
-from experiments.load import DefinitionError, parse_experiment
+from experiments.load import DefinitionError, locate, parse_experiment
 from experiments.wrong_values import wrong_value
 from tests.conftest import REPOSITORY
 
@@ -126,3 +126,12 @@ def test_long_values_are_cut_off_and_the_nearest_word_is_named() -> None:
     choice = {"expected": "'full' or 'natural'"}
     near = {"type": "literal_error", "loc": ("a",), "input": "natrual", "msg": "", "ctx": choice}
     assert wrong_value(near) == "expected one of 'full' or 'natural', got 'natrual'; did you mean 'natural'?"
+
+
+def test_what_earlier_versions_took_is_still_read_where_there_are_data_by_it() -> None:
+    text = locate("sliders-demo").read_text(encoding="utf-8")
+    quoted = re.sub(r"\nparticipants = (\d+)", r'\nparticipants = "\1"', text, count=1)
+    assert quoted != text
+    with pytest.raises(DefinitionError, match="participants: expected a whole number"):
+        parse_experiment(quoted)
+    assert parse_experiment(quoted, has_data=True) == parse_experiment(text)
