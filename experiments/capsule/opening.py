@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from experiments.bounded_zip import BoundedZip, ZipListError
 from experiments.capsule.declaration import CAPSULE_FILE, Capsule, CapsuleFile
 from experiments.capsule.packing import AT_ONCE, paths_in
 from experiments.errors import InputError
@@ -65,14 +66,14 @@ def open_capsule(capsule_path: Path, into: Path) -> tuple[Capsule, Path]:
         return _unpacked(capsule_path, into), into
     except CapsuleError:
         raise
-    except (*_DAMAGED, RuntimeError) as error:
+    except (*_DAMAGED, RuntimeError, ZipListError) as error:
         raise CapsuleError(
             f"{capsule_path.name}: expected the zip of a capsule ({error}); download it anew"
         ) from error
 
 
 def _unpacked(capsule_path: Path, into: Path) -> Capsule:
-    with zipfile.ZipFile(capsule_path) as archive:
+    with BoundedZip(capsule_path) as stream, zipfile.ZipFile(stream) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
         names = [member.filename for member in members]
         if repeated := [name for name, number in Counter(names).items() if number > 1]:

@@ -4,6 +4,7 @@ import logging
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 from server.transcoding.records import uploads_in, waiting_in
@@ -50,6 +51,16 @@ class Preparing:
             thread.join(END_S)
 
     def _run(self) -> None:
+        try:
+            self._prepare()
+        except Exception:
+            LOG.exception("preparing clips")
+        finally:
+            with self._lock:
+                if self._thread is threading.current_thread():
+                    self._thread = None
+
+    def _prepare(self) -> None:
         idle, before = 0, -1
         while self._goes_on() and idle < MAX_IDLE_STARTS:
             try:
@@ -62,8 +73,6 @@ class Preparing:
             if waiting:
                 # Another server process is at it, or the worker ended at a file that it will refuse in time.
                 self._closed.wait(LOOK_AGAIN_S * 2 ** min(idle, 4))
-        with self._lock:
-            self._thread = None
 
     def _goes_on(self) -> bool:
         with self._lock:
@@ -74,7 +83,11 @@ class Preparing:
             return goes_on
 
     def _waiting(self) -> int:
-        return sum(len(waiting_in(folder)) for folder in uploads_in(self.root))
+        waiting = 0
+        for folder in uploads_in(self.root):
+            with suppress(FileNotFoundError):  # removed meanwhile
+                waiting += len(waiting_in(folder))
+        return waiting
 
     def _work(self) -> None:
         command = [sys.executable, "-m", "server.transcoding", str(self.root)]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.capsule.opening import CapsuleError, open_capsule
 from server.context import Services
 from server.studies import packed
 from tests.helpers.admins import Admin
@@ -58,16 +59,22 @@ def test_a_zip_that_lies_about_its_sizes_is_stopped_on_the_way(
 
 
 def test_a_zip_that_names_very_many_files_takes_no_memory(tmp_path: Path, database_url: str) -> None:
-    # An entry of 47 bytes becomes an object of hundreds: 44 MiB of them took 315 MB and ten seconds.
-    entry = b"PK\x01\x02" + struct.pack("<6H3I5H2I", 20, 20, 0, 0, 0, 33, 0, 0, 0, 1, *[0] * 6) + b"a"
-    directory = entry * 200_000
-    end = b"PK\x05\x06" + struct.pack("<4H2IH", 0, 0, 0xFFFF, 0xFFFF, len(directory), 0, 0)
-    zipped = tmp_path / "many.zip"
-    zipped.write_bytes(directory + end)
+    zipped = with_very_many_names(tmp_path / "many.zip")
     tracemalloc.start()
     try:
-        with pytest.raises(packed.UploadTooLarge, match="list of files"):
+        with pytest.raises(packed.UploadTooLarge, match="list of files has 8 MiB"):
             packed.unpack(zipped, tmp_path)
+        with pytest.raises(CapsuleError, match="list of files has 8 MiB"):
+            open_capsule(zipped, tmp_path)
         assert tracemalloc.get_traced_memory()[1] < 2 << 20
     finally:
         tracemalloc.stop()
+
+
+def with_very_many_names(path: Path) -> Path:
+    """A zip's end alone: an entry of 47 bytes becomes an object of hundreds, 44 MiB of them took 315 MB."""
+    entry = b"PK\x01\x02" + struct.pack("<6H3I5H2I", 20, 20, 0, 0, 0, 33, 0, 0, 0, 1, *[0] * 6) + b"a"
+    directory = entry * 200_000
+    end = b"PK\x05\x06" + struct.pack("<4H2IH", 0, 0, 0xFFFF, 0xFFFF, len(directory), 0, 0)
+    path.write_bytes(directory + end)
+    return path

@@ -193,6 +193,29 @@ def test_a_file_at_which_the_worker_ended_twice_is_refused_and_the_others_are_pr
     assert "stopped the decoder" in (records["slow_2.mp4"].problem or "")
 
 
+@pytest.mark.parametrize("error", [FileNotFoundError("removed meanwhile"), RuntimeError("unforeseen")])
+def test_an_error_on_the_way_stops_no_later_upload(
+    tmp_path: Path, videos: list[tuple[str, bytes]], monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    folder = tmp_path / "uploads" / "a"
+    folder.mkdir(parents=True)
+    (folder / "slow_2.mp4").write_bytes(dict(videos)["slow_2.mp4"])
+    preparing = Preparing(folder.parent)
+
+    def refuses(_: Path) -> list[Path]:
+        raise error
+
+    with monkeypatch.context() as broken:
+        broken.setattr("server.transcoding.preparing.waiting_in", refuses)
+        broken.setattr(preparing, "_work", lambda: None)
+        preparing.begin()
+        wait_for_end(preparing)
+    assert records_of(folder) == {}
+    preparing.begin()
+    wait_for_end(preparing)
+    assert list(records_of(folder)) == ["slow_2.mp4"]
+
+
 def test_what_a_server_left_is_done_by_the_next(tmp_path: Path, videos: list[tuple[str, bytes]]) -> None:
     folder = tmp_path / "uploads" / "a"
     folder.mkdir(parents=True)

@@ -22,6 +22,7 @@ import {
   type Work,
 } from "../../labelling/work";
 import { downloadText } from "../ui/download";
+import { mayReplace } from "../ui/useUnsaved";
 import { message, usePicture } from "./usePicture";
 import { useStart } from "./useStart";
 
@@ -63,7 +64,9 @@ function factsOf({ problem, eyes, history, saved, chosen, current, selected }: W
 type Change = (change: (before: Work) => Work) => void;
 
 function openings(work: Work, change: Change, setBusy: (doing: string | null) => void, tell: (problem: string | null) => void) {
+  const unsaved = work.history.now !== work.saved;
   const open = async (file: File): Promise<void> => {
+    if (!mayReplace(unsaved)) return;
     tell(null);
     setBusy("Opening the video");
     try {
@@ -77,6 +80,7 @@ function openings(work: Work, change: Change, setBusy: (doing: string | null) =>
     }
   };
   const openLabels = async (file: File): Promise<void> => {
+    if (!mayReplace(unsaved)) return;
     tell(null);
     try {
       const next = withLabels(work, file.name, parseLabels(file.name, await file.text()));
