@@ -1,5 +1,6 @@
 """Output that is whole or absent: written under a temporary name beside the target, then renamed."""
 
+import errno
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -62,6 +63,12 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
     finally:
         remove_quietly(temporary)
+
+
+def says_full(error: Exception) -> bool:
+    """Whether an error, or that which `whole_file` made it of, says that the disk is full."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    return isinstance(cause, OSError) and cause.errno == errno.ENOSPC
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """Bake a face: render what is missing, coarse to fine, and write an atlas whenever a generation is whole."""
 
-import errno
 import hashlib
 import platform
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import InputError
+from experiments.files import says_full
 from stimuli_builder.characters.facekit.assembly import Assembly
 from stimuli_builder.characters.facekit.environment import BPY_VERSION, ensure_blender
 from stimuli_builder.characters.facekit.identity import Identity
@@ -128,8 +128,8 @@ class FaceBake:
             if missing:
                 self._render(missing, report)
             self.write()
-        except OSError as error:
-            if error.errno == errno.ENOSPC:
+        except (OSError, InputError) as error:
+            if says_full(error):
                 raise InputError(
                     f"the disk is full: free some of it and bake again; what is rendered stays in {self.work}"
                 ) from error

@@ -1,6 +1,5 @@
 """`stimuli bake samples`: pictures with labels, drawn by number, rendered and written one after another."""
 
-import errno
 import json
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from experiments.errors import InputError
+from experiments.files import says_full
 from stimuli_builder.characters.facekit.assembly import STUDIO_EV
 from stimuli_builder.characters.facekit.bake import NOTICE
 from stimuli_builder.characters.facekit.development import develop, to_8_bit
@@ -67,8 +67,8 @@ def make_samples(order: SamplesOrder, kit: FaceKit, report: Callable[[int, int, 
             for number in _make_face(order, kit, numbers):
                 made += 1
                 report(made, order.count, f"{number:06d}")
-    except OSError as error:
-        if error.errno == errno.ENOSPC:
+    except (OSError, InputError) as error:
+        if says_full(error):
             raise InputError(
                 f"the disk is full: free some of it and run again; what is made stays in {order.out}"
             ) from error
