@@ -53,7 +53,6 @@ LONGEST_FILES = tuple(
 # A server draws orders, seeds and tokens by chance, a browser shares its machine with strangers: a defect
 # fails each try.
 RERUNS, RERUNS_BROWSER, RERUNS_TIMED = 1, 2, 3
-PROCESSES_MAX = 4
 
 
 class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
@@ -65,12 +64,6 @@ class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
     def _split_scope(self, nodeid: str) -> str:
         path = str(super()._split_scope(nodeid))
         return "timed" if path in TIMED_FILES else path
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """One process more than there are cores: tests of a browser wait for more time than they compute."""
-    return min(PROCESSES_MAX, (os.cpu_count() or 1) + 1)
 
 
 @pytest.hookimpl(optionalhook=True)

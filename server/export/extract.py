@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from sqlalchemy import ColumnElement, select
+from sqlalchemy import ColumnElement
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
-from server.models import Study, StudyRun, StudyVersion
+from server.models import Study, StudyRun
 from server.studies.lookup import definition_of
+from server.studies.repository import ids_of_series
 from server.studies.series import version_of_series
 
 ExportOrigin = Literal["participant", "pilot", "simulated", "all"]
@@ -29,10 +30,7 @@ class Extract:
         runs = (StudyRun.study_id == study.id) & StudyRun.origin.in_(origins)
         if self.series is None:
             return runs
-        versions = select(StudyVersion.id).where(
-            StudyVersion.study_id == study.id, StudyVersion.series == self.series
-        )
-        return runs & StudyRun.version_id.in_(versions)
+        return runs & StudyRun.version_id.in_(ids_of_series(study, self.series))
 
     def definition(self, session: Session, study: Study) -> Experiment:
         """The newest declaration of the series, or that in use; NotFound where there is no such series."""

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, case, func, insert, select
+from sqlalchemy import ColumnElement, Select, case, func, insert, select
 from sqlalchemy.orm import Session, joinedload
 
 from experiments.checks import CHECK_CELL
@@ -57,6 +57,11 @@ def newest_of_series(session: Session, study: Study, series: int) -> StudyVersio
     """The newest version of a data series."""
     query = select(StudyVersion).where(StudyVersion.study_id == study.id, StudyVersion.series == series)
     return session.scalar(query.order_by(StudyVersion.number.desc()).limit(1))
+
+
+def ids_of_series(study: Study, series: int) -> Select[int]:
+    """The ids of a series' versions, as part of another query."""
+    return select(StudyVersion.id).where(StudyVersion.study_id == study.id, StudyVersion.series == series)
 
 
 def versions_with_runs(session: Session, study: Study) -> list[tuple[StudyVersion, int]]:

@@ -34,7 +34,7 @@ export function MonitorTab() {
     return (
       interrupted ?? (
         <Center py="xl">
-          <Loader aria-label="Waiting for the server" />
+          <Loader role="status" aria-label="Waiting for the server" />
         </Center>
       )
     );

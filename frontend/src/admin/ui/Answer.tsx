@@ -26,7 +26,7 @@ export function Answer<T>({ of, children }: { of: UseQueryResult<T>; children: (
 export function Waiting() {
   return (
     <Center py="xl">
-      <Loader aria-label="Loading" />
+      <Loader role="status" aria-label="Loading" />
     </Center>
   );
 }

@@ -21,7 +21,7 @@ export function PagedAnswer<Page>({ of, shown, total, more, children }: Props<Pa
       {of.error !== null && <ErrorAlert error={of.error} retry={() => void of.refetch()} />}
       {of.isPending && (
         <Center py="xl">
-          <Loader aria-label="Loading" />
+          <Loader role="status" aria-label="Loading" />
         </Center>
       )}
       {of.data !== undefined && children}
