@@ -31,9 +31,10 @@ def page(session: Session, study: Study, show: Show, search: str, before: str | 
     runs = repository.page_of_runs(session, study, show, search, last, limit + 1)
     shown = runs[:limit]
     counts = repository.answered(session, [run.id for run in shown])
+    are_all = last is None and len(runs) <= limit
     return RunPage(
         runs=[summary(run, *counts.get(run.id, (0, 0))) for run in shown],
-        total=repository.number_of_runs(session, study, show, search),
+        total=len(shown) if are_all else repository.number_of_runs(session, study, show, search),
         next=shown[-1].public_id if len(runs) > limit else None,
     )
 

@@ -7,6 +7,7 @@ from sqlalchemy import select, text
 from server.context import Services
 from server.models import StudyRun
 from tests.helpers.admins import Admin
+from tests.helpers.statements import statements
 from tests.helpers.studies import Participant
 
 RUNS = "/studies/short/runs"
@@ -78,3 +79,32 @@ def test_runs_are_searched_and_chosen_by_the_server(
     assert listed(viewer, show="not_complete")["total"] == 3
     assert listed(viewer, search="a_a")["total"] == 0  # _ stands for itself
     assert viewer.get(RUNS, params={"before": "nothing"}).status_code == 404
+
+
+def test_runs_are_looked_through_once_where_they_fit_on_a_page(
+    services: Services, viewer: Admin, participant: Participant
+) -> None:
+    participant.agree()
+    copy_runs(services, 6)
+    served = viewer.client.app.state.services
+    for asked, total, counts in (
+        ({"search": "copy"}, 6, 0),
+        ({"search": "copy", "limit": 6}, 6, 0),
+        ({"search": "copy", "limit": 5}, 6, 1),
+        ({"search": "nobody"}, 0, 0),
+    ):
+        with statements(served) as sent:
+            assert listed(viewer, **asked)["total"] == total
+        counted = [one for one in sent if "count(*)" in one and "FROM study_runs" in one]
+        assert len(counted) == counts, asked
+    assert listed(viewer, search="copy", before="copy2")["total"] == 6
+
+
+def test_letters_beyond_ascii_are_folded_too(
+    services: Services, viewer: Admin, participant: Participant
+) -> None:
+    participant.agree()
+    with services.database.write() as session:
+        session.query(StudyRun).update({"participant": "\u00c4da %"})
+    for search, total in (("\u00e4D", 1), ("DA ", 1), ("da %", 1), ("a_", 0), ("\u00e4x", 0)):
+        assert listed(viewer, search=search)["total"] == total, search

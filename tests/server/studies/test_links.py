@@ -1,31 +1,12 @@
 """Links on the dashboard: many at once, a page at a time."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import event
-
-from server.context import Services
 from tests.helpers.admins import Admin
+from tests.helpers.statements import statements
 from tests.helpers.studies import Participant, StudyInDatabase
 
 LINKS = "/studies/short/links"
-
-
-@contextmanager
-def statements(services: Services) -> Iterator[list[str]]:
-    """The statements the database is sent meanwhile; rows of one statement count once."""
-    sent: list[str] = []
-
-    def note(_connection: Any, _cursor: Any, statement: str, *_rest: Any) -> None:
-        sent.append(statement)
-
-    event.listen(services.database.engine, "before_cursor_execute", note)
-    try:
-        yield sent
-    finally:
-        event.remove(services.database.engine, "before_cursor_execute", note)
 
 
 def made(experimenter: Admin, **body: Any) -> list[dict[str, Any]]:
