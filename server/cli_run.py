@@ -62,7 +62,7 @@ def run(
     # No access log: it would write every participant's internet address.
     with _shared_counts(workers):
         uvicorn.run(
-            "server.app:create_app",
+            "server.app:create_lasting_app",
             factory=True,
             http=BoundedHttp,
             host=host,

@@ -47,6 +47,7 @@ CALLED_FROM_OUTSIDE = {
     "__call__": "a protocol",
     "Sent": "a protocol that annotations name in quotes",
     "data_url": "a template of the report",
+    "create_lasting_app": "uvicorn",
     "editor_schema": "frontend/scripts/api_types.mjs",
 }
 

@@ -195,3 +195,16 @@ def revision(session: Session, study: Study, of: Pool) -> Revision:
     return Revision(
         (study.id, study.active_version, *decisions), (runs, answered, tuple(newest) if newest else None)
     )
+
+
+def large_origins(session: Session, answers: int) -> list[tuple[str, str]]:
+    """Names of open studies with an origin of which there are at least so many answers, previews left out."""
+    query = (
+        select(Study.name, StudyRun.origin)
+        .join(StudyRun, StudyRun.study_id == Study.id)
+        .where(Study.status.in_(("pilot", "live")), StudyRun.origin != "preview")
+        .group_by(Study.id, StudyRun.origin)
+        .having(func.sum(StudyRun.trials_answered) >= answers)
+        .order_by(Study.id, StudyRun.origin)
+    )
+    return [(name, origin) for name, origin in session.execute(query)]

@@ -12,6 +12,8 @@ from server.models import AnswerEvidence, AssignedTrial, Rating, RunTally, Study
 from server.tallies.tally import COLUMNS, Tally, tally_of
 
 RUNS_AT_ONCE = 100
+READ_AT_ONCE = 500
+"""Of a million answers 14 MB are read: memory that is used again is faster than as much new one."""
 _SHOWN_PLAYS = (
     select(
         Rating.study_run_id,
@@ -85,7 +87,8 @@ def counts_of(session: Session, runs: ColumnElement[bool]) -> Iterable[RunCounts
     query = select(
         StudyRun.id, StudyRun.version_id, StudyRun.excluded, RunTally.counts, RunTally.answers
     ).join(RunTally, RunTally.study_run_id == StudyRun.id)
-    return (RunCounts(*row) for row in session.execute(query.where(runs)))
+    rows = session.execute(query.where(runs).execution_options(yield_per=READ_AT_ONCE))
+    return (RunCounts._make(row) for row in rows)
 
 
 def clips_of(session: Session, version: int) -> list[CellClip]:

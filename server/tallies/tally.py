@@ -8,7 +8,8 @@ without a package for numbers.
 import json
 import sys
 from array import array
-from base64 import b64decode, b64encode
+from base64 import b64encode
+from binascii import a2b_base64
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -206,10 +207,15 @@ def packed_text(codes: "array[int]") -> str:
     return b64encode(_little(codes).tobytes()).decode()
 
 
-def packed_codes(texts: Iterable[str]) -> "array[int]":
-    """The packed answers of any number of texts."""
+def packed_bytes(text: str) -> bytes:
+    """The packed answers of a text, as bytes that may be put behind others."""
+    return a2b_base64(text)
+
+
+def packed_codes(packed: bytes | bytearray) -> "array[int]":
+    """The packed answers of `packed_bytes`."""
     codes = array("Q")
-    codes.frombytes(b"".join(map(b64decode, texts)))
+    codes.frombytes(packed)
     return _little(codes)
 
 
@@ -228,6 +234,6 @@ def tally_of(heat: str, not_good: int, counts: str, answers: str, *clip_time: An
         heat=heat,
         not_good=not_good,
         **json.loads(counts),
-        answers={scale: packed_codes([text]) for scale, text in packed.items()},
+        answers={scale: packed_codes(packed_bytes(text)) for scale, text in packed.items()},
         clip_time=ClipTime(*clip_time),
     )

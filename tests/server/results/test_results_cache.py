@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from server.results import cache, service
+from server.context import Services
+from server.results import ahead, cache, service
 from server.results.cache import ResultsCache, Revision
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
@@ -62,6 +63,26 @@ def test_every_change_is_counted(experimenter: Admin, participant: Participant, 
     experimenter.send("POST", f"{run}/erase", {"confirm": participant.run_id})
     assert shown() == (0, 0)
     assert len(counts) == 5
+
+
+def test_results_of_many_answers_are_counted_before_anybody_asks(
+    services: Services,
+    viewer: Admin,
+    participant: Participant,
+    counts: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    participant.agree().rate_all()
+    kept = viewer.client.app.state.services.results  # type: ignore[attr-defined]
+    ahead.count_ahead(services.database, kept, lambda: False)
+    assert counts == []  # so few are counted while a page loads
+    monkeypatch.setattr(ahead, "MANY_ANSWERS", 1)
+    ahead.count_ahead(services.database, kept, lambda: True)
+    assert counts == []  # the server stops
+    ahead.count_ahead(services.database, kept, lambda: False)
+    assert counts == ["participant"]
+    assert viewer.get(RESULTS).json()["participants"] == 1
+    assert counts == ["participant"]
 
 
 class Slow:
