@@ -77,7 +77,11 @@ class FactorialDesign:
     @property
     def test(self) -> str:
         """The test, in a few words."""
-        said = "F tests, multivariate" if self.statistic == "multivariate" else "F tests, Greenhouse-Geisser"
+        if not self.within:
+            said = "F tests"
+        else:
+            multivariate = self.statistic == "multivariate"
+            said = "F tests, multivariate" if multivariate else "F tests, Greenhouse-Geisser"
         return f"{said}, with the covariate" if self.covariate else said
 
     @property
@@ -86,10 +90,12 @@ class FactorialDesign:
         parts = [f"{name} ({size} levels, within)" for name, size in self.within.items()]
         parts += [f"{name} ({size} groups)" for name, size in self.between.items()]
         sizes = ", ".join(f"{effect} f = {size:g}" for effect, size in self.sizes.items())
-        return (
-            f"The design has {', '.join(parts)}; cell means of participants correlate by "
-            f"{self.correlation:g}; assumed effects (Cohen's f): {sizes}"
-        ) + (
+        means = (
+            f"cell means of participants correlate by {self.correlation:g}"
+            if self.within
+            else "each participant gives one mean, so no correlation is assumed"
+        )
+        return (f"The design has {', '.join(parts)}; {means}; assumed effects (Cohen's f): {sizes}") + (
             f"; a covariate correlates by {self.covariate:g} with participants' mean ratings"
             if self.covariate
             else ""

@@ -45,10 +45,10 @@ def _of_means(experiment: Experiment) -> PlanCommand:
         arguments += [option, ",".join(named)] if named else []
     for factor in factors:
         arguments += ["--effect", f"{factor.name}={MEDIUM_F}"]
+    alone = all(factor.between for factor in factors)
+    means = "each participant gives one mean" if alone else "two means of a participant correlate by 0.5"
     return PlanCommand(
-        arguments,
-        f"each factor by itself has a medium effect (Cohen's f = {MEDIUM_F}), two means of a participant "
-        "correlate by 0.5",
+        arguments, f"each factor by itself has a medium effect (Cohen's f = {MEDIUM_F}), {means}"
     )
 
 

@@ -35,7 +35,7 @@ if (root !== null) {
       <MantineProvider theme={theme} cssVariablesResolver={readable} defaultColorScheme="auto" getStyleNonce={styleNonce}>
         <QueryClientProvider client={queries}>
           <Suspense fallback={null}>
-            <Notifications position="top-right" />
+            <Notifications position="bottom-right" limit={1} notificationMaxHeight={200} />
           </Suspense>
           <RouterProvider router={router} />
         </QueryClientProvider>

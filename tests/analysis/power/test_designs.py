@@ -53,6 +53,16 @@ def test_a_covariate_has_the_power_of_the_noncentral_f() -> None:
     assert "a covariate correlates by 0.7" in design.population
 
 
+def test_groups_alone_are_told_no_correlation() -> None:
+    design = FactorialDesign({}, {"group": 2}, {"group": 0.3}, 0.5)
+    assert "correlate" not in design.population
+    assert "each participant gives one mean" in design.population
+    assert design.test == "F tests"
+    same = FactorialDesign({}, {"group": 2}, {"group": 0.3}, 0.1)
+    first, second = (simulate_design(one, "x", [20], 50, seed=1).power for one in (design, same))
+    assert (first == second).all()
+
+
 def test_ties_come_as_often_as_asked_and_cost_power() -> None:
     """Of two items only decided comparisons tell: power by the normal approximation of their log odds."""
     design = PairsDesign((0.0, 0.5), 4, tie=0.3)

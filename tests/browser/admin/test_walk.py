@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyotp
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.visit import axe_violations
@@ -44,6 +44,18 @@ PAGES = {
     "labelling": ("/labelling", "Points round the eyes"),
     "review": ("/blink-review", "The blinks that"),
 }
+
+WATCH_FOR_A_NOTICE = """() => {
+    const box = (selector) => document.querySelector(selector).getBoundingClientRect().toJSON();
+    const filler = document.createElement("div");
+    filler.style.height = "2000px";
+    document.querySelector(".mantine-Modal-body").append(filler);
+    window.seen = new Promise((done) => new MutationObserver(() => {
+        if (document.querySelector(".mantine-Notification-root"))
+            done([".mantine-Notification-root", ".mantine-Modal-content", ".tabs-line"].map(box));
+    }).observe(document.body, { subtree: true, childList: true }));
+}"""
+"""The places of notice, dialog and tabs in the moment that a notice comes: it goes by itself."""
 
 
 def shoot(dashboard: Dashboard, name: str) -> None:
@@ -108,6 +120,32 @@ def test_a_page_asked_for_before_signing_in_opens_afterwards(dashboard: Dashboar
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_role("heading", name="New links")).to_be_visible()
     context.close()
+
+
+def test_a_notice_covers_neither_tabs_nor_a_dialog_on_a_phone(dashboard: Dashboard) -> None:
+    """The longest dialog there can be, and a refusal that comes while it is open."""
+    page = dashboard.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    held: list[Route] = []
+    page.route(
+        "**/capsules",
+        lambda route: held.append(route) if route.request.method == "POST" else route.continue_(),
+    )
+    try:
+        dashboard.open("/studies/short/data").get_by_role("button", name="Make a capsule").click()
+        page.get_by_role("button", name="Close", exact=True).click()
+        page.get_by_role("dialog").get_by_role("button", name="Cancel").wait_for()
+        page.evaluate(WATCH_FOR_A_NOTICE)
+        held[0].fulfill(
+            status=409, json={"error": {"code": "conflict", "message": "A capsule is being made. " * 20}}
+        )
+        notice, dialog, tabs = page.evaluate("window.seen")
+        assert tabs["bottom"] <= notice["top"]
+        assert dialog["bottom"] <= notice["top"]
+        assert dialog["height"] > 400
+    finally:
+        page.unroute("**/capsules")
+        page.set_viewport_size({"width": 1280, "height": 800})
 
 
 @pytest.mark.parametrize("token", ["", "nonsense"])

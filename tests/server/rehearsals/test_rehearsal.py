@@ -119,5 +119,11 @@ def test_a_power_that_no_plan_reckons_is_not_shown(name: str, change: tuple[str,
 def test_factors_between_participants_are_planned_as_such() -> None:
     between = SHORT.replace('name = "character"', 'name = "character"\nbetween = true', 1)
     between = between.replace('split_by = "character"\norder = "alternating"', "")
-    arguments = plan_command(parse_experiment(between)).arguments
-    assert arguments[2:6] == ["--within", "speed:2", "--between", "character:2"]
+    planned = plan_command(parse_experiment(between))
+    assert planned.arguments[2:6] == ["--within", "speed:2", "--between", "character:2"]
+    assert planned.assumed.endswith("two means of a participant correlate by 0.5")
+    apart = plan_command(
+        parse_experiment(between.replace('name = "speed"', 'name = "speed"\nbetween = true'))
+    )
+    assert apart.arguments[2:4] == ["--between", "character:2,speed:2"]
+    assert apart.assumed.endswith("each participant gives one mean")
