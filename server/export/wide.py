@@ -3,7 +3,8 @@
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import groupby, product
+from operator import itemgetter
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -16,6 +17,7 @@ from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials.scales import RatedScale, scales_of
 from server.export.extract import Extract
+from server.export.pieces import ExportBrokenOff
 from server.export.ratings_csv import factor_names, rating_rows, view_of
 from server.export.runs import run_rows
 from server.models import Study
@@ -112,43 +114,57 @@ def wide_rows(
         if column.name in names and column.name != "answers"
     ]
     between = [factor.name for factor in experiment.factors if factor.between]
-    by_run = _by_run(session, study, extract, experiment)
     at = names.index("run")
+    # Both are in the order the runs began, so that the answers of one run are in memory at a time.
+    answered = _by_run(session, study, extract, experiment)
+    coming = next(answered, None)
     for row in run_rows(session, study, extract, forms):
-        groups, count, means = by_run.get(row[at], ({}, 0, {}))
+        mine = _NOTHING
+        if coming is not None and coming.run == row[at]:
+            mine, coming = coming, next(answered, None)
         yield [
             *(row[index] for index in kept),
-            *(groups.get(name, "") for name in between),
-            count,
-            *(means.get((cell.scale, cell.levels), "") for cell in cells),
+            *(mine.groups.get(name, "") for name in between),
+            mine.count,
+            *(mine.means.get((cell.scale, cell.levels), "") for cell in cells),
         ]
+    if coming is not None:
+        raise ExportBrokenOff(f"the export broke off: answers of the run {coming.run} are left; try it again")
 
 
-def _by_run(
-    session: Session, study: Study, extract: Extract, experiment: Experiment
-) -> dict[str, tuple[dict[str, str], int, Means]]:
-    """Of each run with answers: its levels between participants, how many answers, and its cells' means."""
+@dataclass(frozen=True)
+class _RunMeans:
+    """Of a run with answers: its levels between participants, how many answers, and its cells' means."""
+
+    run: str
+    groups: dict[str, str]
+    count: int
+    means: Means
+
+
+_NOTHING = _RunMeans("", {}, 0, {})
+
+
+def _by_run(session: Session, study: Study, extract: Extract, experiment: Experiment) -> Iterator[_RunMeans]:
+    """The runs with rows of main trials, in the order they began."""
     factors, view = factor_names(session, study), view_of(session, study)
     header = view.csv_header(factors)
     within = [header.index(factor.name) for factor in experiment.factors if not factor.between]
-    between = [factor.name for factor in experiment.factors if factor.between]
+    between = {factor.name: header.index(factor.name) for factor in experiment.factors if factor.between}
     run, kind, trial, scale, response = (
         header.index(name) for name in ("run", "kind", "trial_index", "scale", "response")
     )
-    last: dict[str, dict[tuple[Any, str], tuple[Levels, float]]] = defaultdict(dict)
-    groups: dict[str, dict[str, str]] = {}
-    for stored in rating_rows(session, study, extract):
-        row = view.csv_row(stored, factors)
-        if row[kind] != "main":
-            continue
-        answers = last[row[run]]
-        # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier one
-        # of its trial; a later one without an answer leaves the earlier standing.
-        if row[response] is not None:
-            levels = tuple(str(row[index]) for index in within)
-            answers[row[trial], row[scale]] = (levels, float(row[response]))
-        groups[row[run]] = {name: str(row[header.index(name)]) for name in between}
-    return {name: (groups[name], len(answers), _means(answers)) for name, answers in last.items()}
+    rows = (view.csv_row(stored, factors) for stored in rating_rows(session, study, extract))
+    for name, mine in groupby((row for row in rows if row[kind] == "main"), key=itemgetter(run)):
+        last: dict[tuple[Any, str], tuple[Levels, float]] = {}
+        for row in mine:
+            # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier
+            # one of its trial; a later one without an answer leaves the earlier standing.
+            if row[response] is not None:
+                levels = tuple(str(row[index]) for index in within)
+                last[row[trial], row[scale]] = (levels, float(row[response]))
+        groups = {factor: str(row[index]) for factor, index in between.items()}
+        yield _RunMeans(name, groups, len(last), _means(last))
 
 
 def _means(answers: dict[tuple[Any, str], tuple[Levels, float]]) -> Means:

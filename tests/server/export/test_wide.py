@@ -1,5 +1,6 @@
 import csv
 import io
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -8,9 +9,13 @@ from fastapi.testclient import TestClient
 from experiments.columns.form_columns import form_columns
 from experiments.load import parse_experiment
 from server.context import Services
+from server.export import wide
 from server.export.excel import guarded_cell
+from server.export.extract import EVERYTHING
+from server.export.ratings_csv import rating_rows
 from server.export.scripts import LANGUAGES, script
 from server.export.wide import cells_of
+from server.models import Study
 from tests.conftest import REPOSITORY
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
@@ -48,6 +53,46 @@ def test_a_visit_without_answers_has_empty_cells(viewer: Admin, participant: Par
     [row] = rows_of(viewer, "wide.csv")
     assert row["answers"] == "0"
     assert row["rating_a_slow"] == row["form_about_age"] == ""
+
+
+def test_each_visit_has_its_own_means_and_one_is_in_memory_at_a_time(
+    client: TestClient,
+    services: Services,
+    study: StudyInDatabase,
+    viewer: Admin,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for rates in (True, False, True, True):
+        person = Participant(client, study.link_token)
+        person.start()
+        person.agree()
+        if rates:
+            person.rate_all()
+    taken: list[Any] = []
+
+    def noted(*asked: Any) -> Iterator[Any]:
+        for row in rating_rows(*asked):
+            taken.append(row)
+            yield row
+
+    monkeypatch.setattr(wide, "rating_rows", noted)
+    with services.database.read() as session:
+        [known] = session.query(Study).all()
+        rows = wide.wide_rows(session, known, EVERYTHING, study.experiment, [])
+        at_once = [len(taken) for _ in rows]
+    ratings = rows_of(viewer, "ratings.csv")
+    assert len(taken) == len(ratings)
+    assert at_once[0] < len(taken)
+    visits = rows_of(viewer, "wide.csv")
+    assert [row["answers"] for row in visits] == ["8", "0", "8", "8"]
+    for row in visits:
+        cell = (row["run"], "main", "a", "slow")
+        given = [
+            float(one["response"])
+            for one in ratings
+            if (one["run"], one["kind"], one["character"], one["speed"]) == cell
+        ]
+        assert row["rating_a_slow"] == (str(sum(given) / len(given)) if given else "")
 
 
 def test_trials_without_a_scale_are_refused_before_the_download(
