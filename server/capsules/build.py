@@ -35,7 +35,8 @@ from server.reports.process import run_analysis
 from server.seals.page import page as seal_page
 from server.seals.service import seal_of
 from server.storage.clips import ClipStore
-from server.studies.lookup import active_version, definition_of, find_study
+from server.studies.lookup import definition_of, find_study
+from server.studies.series import version_of_series
 
 CapsuleOrigin = Literal["participant", "pilot", "simulated"]
 Progress = Callable[[float, str], None]
@@ -53,11 +54,15 @@ class CapsuleContents:
         Whether the clips are in it; their hashes are in the manifest always.
     sensitivity : bool
         Whether the report has the parts that take long.
+    series : int or None
+        The data series whose data, definition, clips and report it holds. Without it: the data of every
+        series, and all else of the active version.
     """
 
     origin: CapsuleOrigin = "participant"
     clips: bool = True
     sensitivity: bool = True
+    series: int | None = None
 
 
 def build_capsule(
@@ -73,6 +78,8 @@ def build_capsule(
     ------
     InputError
         There is nothing to analyse, or a clip is missing from the store.
+    NotFound
+        There is no such data series.
     """
     made = now().date().isoformat()
     with tempfile.TemporaryDirectory(prefix=".capsule-", dir=target.parent) as temporary:
@@ -82,7 +89,7 @@ def build_capsule(
         progress(0.05, "exporting")
         with services.database.snapshot() as session:
             study = find_study(session, name, OPERATOR, "view")
-            version = active_version(session, study)
+            version = version_of_series(session, study, contents.series)
             source = _write_study(session, study, version, folder, made, contents)
             experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
             known = counted(session, study, source.origin, source.series)
@@ -111,7 +118,7 @@ def _without_answers(manifest: Mapping[str, Any]) -> dict[str, Any]:
 def _write_study(
     session: Session, study: Study, version: StudyVersion, folder: Path, made: str, contents: CapsuleContents
 ) -> ReportSource:
-    exported: Folder = dataset_folder(session, study, made, Extract(contents.origin))
+    exported: Folder = dataset_folder(session, study, made, Extract(contents.origin, contents.series))
     for path, pieces in exported.members:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         with (folder / path).open("wb") as stream:

@@ -11,7 +11,8 @@ from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.capsules.build import CapsuleContents, CapsuleOrigin, build_capsule
 from server.cli_common import migrated_services, out
-from server.studies.lookup import active_definition, find_study
+from server.export.extract import Extract
+from server.studies.lookup import find_study
 
 
 def register(parent: typer.Typer) -> None:
@@ -23,6 +24,14 @@ def capsule(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
     out_file: Annotated[Path, typer.Option("--out", help="Zip to write.")],
     origin: Annotated[CapsuleOrigin, typer.Option(help="Whose data.")] = "participant",
+    series: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="One data series alone: its data, definition, clips and report. Without it the data of "
+            "every series, and all else of the active version.",
+        ),
+    ] = None,
     clips: Annotated[
         bool, typer.Option(help="Put the clips in; without them the manifest has their hashes.")
     ] = True,
@@ -40,18 +49,21 @@ def capsule(
 
       server capsule exp3 --origin simulated --no-clips --out rehearsal.zip
 
+      server capsule exp3 --series 2 --out exp3-series-2.zip
+
       analysis verify exp3-capsule.zip
     """
     if not out_file.parent.is_dir():
         raise InputError(f"{out_file}: the folder {out_file.parent} does not exist; make it first")
     with migrated_services() as services, Console(stderr=True).status("capsule") as status:
         with services.database.write() as session:
-            about = active_definition(session, find_study(session, study, OPERATOR, "view")).dataset
+            known = find_study(session, study, OPERATOR, "view")
+            about = Extract(origin, series).definition(session, known).dataset
             record(session, None, "data downloaded", "study", study, what="capsule", origin=origin)
         made = build_capsule(
             services,
             study,
-            CapsuleContents(origin, clips, sensitivity),
+            CapsuleContents(origin, clips, sensitivity, series),
             out_file,
             lambda _, step: status.update(f"capsule: {step}"),
         )

@@ -5,12 +5,19 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from server.numbers import Number
+
 
 class NewCapsule(BaseModel):
     """What a capsule is to hold."""
 
     model_config = ConfigDict(extra="forbid")
     origin: Literal["participant", "pilot", "simulated"] = "participant"
+    series: Number | None = Field(
+        default=None,
+        description="Its data, definition, clips and report alone. Where none is given it holds the data of "
+        "every series, and all else of the active version.",
+    )
     clips: bool = Field(default=True, description="Put the clips in; their hashes are in it always.")
     sensitivity: bool = Field(default=True, description="With the models of the report that take long.")
 
@@ -23,6 +30,7 @@ class CapsuleOut(BaseModel):
     progress: float
     message: str
     origin: str
+    series: int | None
     clips: bool
     created_at: datetime
     bytes: int | None = Field(description="Length of the zip; null until it is there.")

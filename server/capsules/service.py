@@ -18,14 +18,19 @@ from server.models import Job
 from server.reports import repository
 from server.reports.jobs import begun, in_background, is_under_way, note, shown
 from server.studies.lookup import find_study
+from server.studies.series import version_of_series
 
 _one_at_a_time = threading.Lock()
 
 
 def start(services: Services, name: str, order: NewCapsule, identity: Identity) -> CapsuleOut:
-    """Begin a capsule in the background; Conflict where one of this study is under way."""
+    """Begin a capsule in the background; Conflict where one of this study is under way.
+
+    NotFound where there is no such data series.
+    """
     with services.database.write() as session:
         study = find_study(session, name, identity, "export")
+        version_of_series(session, study, order.series)
         job = begun(
             services,
             session,
@@ -101,6 +106,7 @@ def _capsule_out(services: Services, job: Job) -> CapsuleOut:
         {
             **shown(services, job, "the server was stopped while it was made"),
             "origin": job.parameters.get("origin", "participant"),
+            "series": job.parameters.get("series"),
             "clips": job.parameters.get("clips", True),
             "bytes": path.stat().st_size if is_there else None,
             "sha256": result.get("sha256"),
@@ -117,7 +123,7 @@ def _build(services: Services, name: str, public_id: str, order: NewCapsule) -> 
         made = build_capsule(
             services,
             name,
-            CapsuleContents(order.origin, order.clips, order.sensitivity),
+            CapsuleContents(order.origin, order.clips, order.sensitivity, order.series),
             target,
             lambda share, step: note(services, public_id, progress=share, message=step),
         )

@@ -18,7 +18,7 @@ from server.export.extract import ExportOrigin, Extract
 from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed
 from server.export.repository import runs_by_origin
 from server.export.scripts import LANGUAGES, script
-from server.studies.lookup import active_definition, find_study
+from server.studies.lookup import find_study
 from server.text import encoded
 
 
@@ -94,7 +94,7 @@ def export(
         try:
             size = _write(out_file, proofed(FORMATS[form](session, known, extract), form, bom, guard))
             if form == "csv" and scripts and str(out_file) != "-":
-                beside = _write_scripts(out_file, active_definition(session, known))
+                beside = _write_scripts(out_file, extract.definition(session, known))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"

@@ -22,7 +22,8 @@ from server.export.tables import ExportTable, answers_table, runs_table, wide_ta
 from server.export.wide import beside_runs
 from server.export.zip_stream import zip_pieces
 from server.models import Study
-from server.studies.lookup import active_definition, active_version, all_definitions
+from server.studies.lookup import all_definitions, definition_of
+from server.studies.series import version_of_series
 from server.text import encoded
 
 Member = tuple[str, Iterable[bytes]]
@@ -56,7 +57,7 @@ def dataset(session: Session, study: Study, made: str, extract: Extract) -> Iter
 
 def dataset_folder(session: Session, study: Study, made: str, extract: Extract) -> Folder:
     """`dataset_description.json`, README, CHANGES, `data/`, codebook, definition and scripts."""
-    definition, definitions = active_definition(session, study), all_definitions(session, study)
+    definition, definitions = extract.definition(session, study), all_definitions(session, study)
     factors = {factor.name for one in definitions for factor in one.factors}
     renamed = {name: beside_runs(name) for name in sorted(factors) if beside_runs(name) != name}
     first = first_start(session, study, extract)
@@ -97,7 +98,8 @@ def _keyword(name: str) -> str:
 def _texts(
     session: Session, study: Study, made: str, extract: Extract, tables: list[ExportTable]
 ) -> dict[str, str]:
-    version, definition = active_version(session, study), active_definition(session, study)
+    version = version_of_series(session, study, extract.series)
+    definition = definition_of(version)
     columns = [column for table in tables for column in table.columns]
     described = description(study, definition, columns, made)
     return {

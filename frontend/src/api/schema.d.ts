@@ -2925,6 +2925,8 @@ export interface components {
             message: string;
             /** Origin */
             origin: string;
+            /** Series */
+            series: number | null;
             /** Clips */
             clips: boolean;
             /**
@@ -5490,6 +5492,11 @@ export interface components {
              * @enum {string}
              */
             origin?: "participant" | "pilot" | "simulated";
+            /**
+             * Series
+             * @description Its data, definition, clips and report alone. Where none is given it holds the data of every series, and all else of the active version.
+             */
+            series?: number | null;
             /**
              * Clips
              * @description Put the clips in; their hashes are in it always.

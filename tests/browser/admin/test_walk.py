@@ -122,6 +122,38 @@ def test_a_page_asked_for_before_signing_in_opens_afterwards(dashboard: Dashboar
     context.close()
 
 
+def test_files_and_capsule_are_of_the_series_chosen(dashboard: Dashboard) -> None:
+    """The server's answer, with a second series in it."""
+    page, asked = dashboard.page, []
+
+    def with_another_series(route: Route) -> None:
+        known = route.fetch().json()
+        second = known["series"][0] | {"number": 2, "name": "series 2 (version 2)"}
+        route.fulfill(json=known | {"series": [*known["series"], second]})
+
+    def no_capsule(route: Route) -> None:
+        if route.request.method == "GET":
+            route.continue_()
+        else:
+            asked.append(route.request.post_data_json)
+            route.fulfill(status=409, json={"error": {"code": "conflict", "message": "Not now."}})
+
+    page.route("**/api/admin/studies/short", with_another_series)
+    page.route("**/capsules", no_capsule)
+    try:
+        dashboard.open("/studies/short/data").get_by_label("Data series").first.click()
+        page.get_by_role("option", name="series 2 (version 2)").click()
+        file = page.get_by_role("link", name="Download ratings.csv")
+        expect(file).to_have_attribute("href", re.compile(r"ratings\.csv\?series=2$"))
+        expect(page.get_by_text("server capsule short --series 2 --out")).to_be_visible()
+        page.get_by_role("button", name="Make a capsule").click()
+        page.get_by_text("Not now.").wait_for()
+        assert [order["series"] for order in asked] == [2]
+    finally:
+        page.unroute("**/api/admin/studies/short")
+        page.unroute("**/capsules")
+
+
 def test_a_notice_covers_neither_tabs_nor_a_dialog_on_a_phone(dashboard: Dashboard) -> None:
     """The longest dialog there can be, and a refusal that comes while it is open."""
     page = dashboard.page

@@ -18,15 +18,18 @@ from analysis.cli import app as analysis
 from experiments.capsule.declaration import CAPSULE_FILE, MANIFEST, SOFTWARE_FILE
 from experiments.capsule.opening import CapsuleError, open_capsule
 from experiments.errors import InputError
-from experiments.load import FOLDER
+from experiments.load import FOLDER, parse_experiment
+from experiments.manifest import Manifest
 from experiments.seal import deviations, read_clips_sha256, read_seal
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.capsules.build import CapsuleContents, _without_answers, build_capsule
 from server.context import Services, open_services
+from server.errors import NotFound
 from server.models import Job
 from server.seals.service import seal_plan
 from server.settings import Settings
+from server.studies.importing import add_version
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import Participant, add_study
@@ -342,6 +345,32 @@ def test_a_study_without_answers_has_no_capsule(opened: Services, tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_capsule_of_an_earlier_series_holds_its_definition(opened: Services, tmp_path: Path) -> None:
+    """A later version with another scale and no answers yet is in use; its report could not be made."""
+    shutil.copytree(opened.settings.data_folder, tmp_path / "data")
+    address = f"sqlite:///{tmp_path / 'data' / 'test.sqlite'}"
+    services = open_services(
+        opened.settings.model_copy(update={"data_folder": tmp_path / "data", "database_url": address})
+    )
+    try:
+        with services.database.write() as session:
+            study = find_study(session, "exp3", OPERATOR, "view")
+            (first,) = study.versions
+            text = first.definition_toml.replace("maximum = 7", "maximum = 5")
+            manifest = Manifest.model_validate(first.manifest)
+            assert add_version(session, study, text, parse_experiment(text), manifest, None).series == 2
+        target = tmp_path / "first.zip"
+        build_capsule(services, "exp3", CapsuleContents(clips=False, sensitivity=False, series=1), target)
+        with zipfile.ZipFile(target) as archive:
+            assert b"maximum = 5" not in archive.read("materials/exp3.toml")
+            assert json.loads(archive.read(CAPSULE_FILE))["report"]["series"] == 1
+        assert verify(target)[0] == 0
+        with pytest.raises(NotFound, match="no data series 3; there is series 1"):
+            build_capsule(services, "exp3", CapsuleContents(series=3), target)
+    finally:
+        services.database.close()
+
+
 @pytest.fixture(scope="module")
 def owner(opened: Services) -> Iterator[Admin]:
     app = create_app(opened.settings)
@@ -376,3 +405,10 @@ def test_one_capsule_of_a_study_at_a_time(opened: Services, owner: Admin) -> Non
     with opened.database.write() as session:
         session.delete(session.merge(job))
     assert (refused.status_code, "being made already" in refused.text) == (409, True)
+
+
+def test_a_capsule_of_no_series_is_refused_before_it_is_begun(owner: Admin) -> None:
+    listed = owner.get("/studies/exp3/capsules").json()
+    refused = owner.send("POST", "/studies/exp3/capsules", {"series": 9})
+    assert (refused.status_code, "there is series 1 (version 1)" in refused.text) == (404, True)
+    assert owner.get("/studies/exp3/capsules").json() == listed

@@ -97,6 +97,10 @@ def test_a_download_holds_the_series_asked_for_and_names_it(viewer: Admin, form:
         if form.endswith(".csv"):
             rows = list(csv.DictReader(io.StringIO(answer.text)))
             assert [row["data_series"] for row in rows] == [str(series)] * number * each
+        if form == "psych-ds.zip":
+            with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+                declared = archive.read("short/materials/short.toml").decode()
+            assert ("maximum = 5" in declared) is (series == 2)
     refused = viewer.get(f"{path}?series=3")
     assert (refused.status_code, refused.json()["error"]["message"]) == (
         404,

@@ -13,7 +13,7 @@ import { useChange } from "../ui/useChange";
 
 const isUnderWay = ({ status }: Schemas["CapsuleOut"]) => status === "queued" || status === "running";
 
-export function CapsuleCard({ study, origin }: { study: string; origin: DataOrigin }) {
+export function CapsuleCard({ study, origin, series }: { study: string; origin: DataOrigin; series: number | null }) {
   const path = { params: { path: { study } } };
   const [clips, setClips] = useState(true);
   const [sensitivity, setSensitivity] = useState(true);
@@ -23,9 +23,10 @@ export function CapsuleCard({ study, origin }: { study: string; origin: DataOrig
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/capsules", path)),
     refetchInterval: ({ state }) => (state.data?.some(isUnderWay) ? 1_000 : false),
   });
-  const make = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/capsules", { ...path, body: { origin, clips, sensitivity } })), {
-    touches: [["capsules", study]],
-  });
+  const make = useChange(
+    () => unwrap(api.POST("/api/admin/studies/{study}/capsules", { ...path, body: { origin, series, clips, sensitivity } })),
+    { touches: [["capsules", study]] },
+  );
   const busy = capsules.data?.some(isUnderWay) ?? false;
   return (
     <Card withBorder>
@@ -34,7 +35,8 @@ export function CapsuleCard({ study, origin }: { study: string; origin: DataOrig
       </Title>
       <Text size="sm" mt={4} mb="md" maw={720}>
         Everything that can be handed on, in one zip: de-identified data, clips, definition, sealed plan, report and software versions, as
-        Psych-DS and RO-Crate. Whoever has it makes the report again with <Code>analysis verify</Code>.
+        Psych-DS and RO-Crate. Whoever has it makes the report again with <Code>analysis verify</Code>. Its report is of one data series:
+        the one chosen above, or that of the active version beside the data of every series.
       </Text>
       {mayMake && (
         <Group mb="sm">
@@ -73,6 +75,7 @@ function One({ study, capsule, mayOpen }: { study: string; capsule: Schemas["Cap
       <Badge color={status === "failed" ? "red.9" : status === "done" ? "teal.9" : "gray.7"}>{status}</Badge>
       <Text size="sm">
         {when(capsule.created_at)}, {capsule.origin}
+        {capsule.series != null && `, series ${capsule.series}`}
         {!capsule.clips && ", without clips"}
       </Text>
       {isUnderWay(capsule) && (

@@ -1,9 +1,10 @@
-import { Anchor, Button, Card, Code, Group, SegmentedControl, Select, SimpleGrid, Stack, Switch, Text, Title } from "@mantine/core";
+import { Anchor, Button, Card, Code, Group, SegmentedControl, SimpleGrid, Stack, Switch, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
 import { studyQuery, useMay } from "../queries";
 import { type DataOrigin, ORIGINS } from "../results/origins";
+import { SeriesChooser } from "../ui/SeriesChooser";
 import { CapsuleCard } from "./CapsuleCard";
 import { SealCard } from "./SealCard";
 
@@ -39,7 +40,7 @@ const WHOSE: { value: ExportOrigin; label: string }[] = [...ORIGINS, { value: "a
 export function DataTab() {
   const { study = "" } = useParams({ strict: false });
   const [origin, setOrigin] = useState<ExportOrigin>("participant");
-  const [series, setSeries] = useState<string | null>(null);
+  const [series, setSeries] = useState<number | null>(null);
   const detail = useQuery(studyQuery(study)).data;
   const [excel, setExcel] = useState(false);
   const rated = detail?.definition.trial.kind === "clip_rating";
@@ -50,26 +51,17 @@ export function DataTab() {
     const options = new URLSearchParams();
     const holdsData = !file.startsWith("analysis.") && file !== "identities.csv" && file !== "codebook.md";
     if (origin !== "participant" && holdsData) options.set("origin", origin);
-    if (series !== null && holdsData) options.set("series", series);
+    if (series !== null && holdsData) options.set("series", String(series));
     if (excel && file.endsWith(".csv") && file !== "identities.csv") options.set("excel", "true");
     return options.size > 0 ? `?${options.toString()}` : "";
   };
   const option = `${origin === "participant" ? "" : ` --origin ${origin}`}${series === null ? "" : ` --series ${series}`}`;
+  const ofCapsule = origin === "all" ? option.replace(" --origin all", "") : option;
   return (
     <Stack>
       <Group>
         <SegmentedControl aria-label="Data of" value={origin} onChange={setOrigin} data={WHOSE} />
-        {detail !== undefined && detail.series.length > 1 && (
-          <Select
-            aria-label="Data series"
-            w={280}
-            clearable
-            placeholder="every data series"
-            value={series}
-            onChange={setSeries}
-            data={detail.series.map((one) => ({ value: String(one.number), label: one.name }))}
-          />
-        )}
+        <SeriesChooser every={detail?.series} chosen={series} choose={setSeries} without="every data series" />
         <Text size="sm">
           {origin === "all" ? "Data of all origins are told apart by the column run_origin. " : ""}
           {series === null && (detail?.series.length ?? 1) > 1 ? "The data series are told apart by the column data_series. " : ""}
@@ -83,7 +75,7 @@ export function DataTab() {
         description="CSV files begin with a mark by which Excel knows their letters, and no cell of them can run as a formula. Leave it off for R, Python and analysis run."
       />
       <SealCard study={study} />
-      <CapsuleCard study={study} origin={origin === "all" ? "participant" : origin} />
+      <CapsuleCard study={study} origin={origin === "all" ? "participant" : origin} series={series} />
       <SimpleGrid cols={{ base: 1, sm: 2, lg: 3 }}>
         {files.map(([file, title, words]) => (
           <Card withBorder key={file}>
@@ -117,7 +109,7 @@ export function DataTab() {
         block
         tabIndex={0}
         aria-label="Commands"
-      >{`server export ${study}${option} --out ${study}.csv\nserver export ${study}${option} --format psych-ds --out ${study}.zip\nanalysis run ${study}.toml --csv ${study}.csv${option}`}</Code>
+      >{`server export ${study}${option} --out ${study}.csv\nserver export ${study}${option} --format psych-ds --out ${study}.zip\nserver capsule ${study}${ofCapsule} --out ${study}-capsule.zip\nanalysis run ${study}.toml --csv ${study}.csv${option}`}</Code>
     </Stack>
   );
 }

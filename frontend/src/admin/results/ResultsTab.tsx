@@ -6,6 +6,7 @@ import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { onDemand } from "../ui/onDemand";
+import { SeriesChooser } from "../ui/SeriesChooser";
 import { type DataOrigin, ORIGINS, originOf } from "./origins";
 import { MethodsCard } from "./MethodsCard";
 import { NoAnswers } from "./NoAnswers";
@@ -29,20 +30,15 @@ export function ResultsTab() {
     <Stack>
       <Group justify="space-between">
         <SegmentedControl aria-label="Data of" value={origin} onChange={(word) => setOrigin(originOf(word))} data={ORIGINS} />
-        {detail !== undefined && detail.series.length > 1 && (
-          <Select
-            aria-label="Data series"
-            w={280}
-            clearable
-            placeholder="series of the active version"
-            value={series === null ? null : String(series)}
-            onChange={(word) => {
-              setSeries(word === null ? null : Number(word));
-              setScale(null);
-            }}
-            data={detail.series.map((one) => ({ value: String(one.number), label: one.name }))}
-          />
-        )}
+        <SeriesChooser
+          every={detail?.series}
+          chosen={series}
+          choose={(number) => {
+            setSeries(number);
+            setScale(null);
+          }}
+          without="series of the active version"
+        />
         {results.data?.kind === "clip_rating" && (
           <ScaleChooser scales={results.data.scales} chosen={results.data.scale.name} choose={setScale} />
         )}
