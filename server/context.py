@@ -13,6 +13,7 @@ from server.db import REQUEST_BUSY_S, Database, open_database
 from server.evidence.clip_bytes import ClipBytes
 from server.evidence.intake import Intake
 from server.group_commit import GroupCommit
+from server.monitor.open_streams import OpenStreams
 from server.providers.clients import Providers
 from server.rate_limit import RateLimit
 from server.results.cache import ResultsCache
@@ -47,6 +48,7 @@ class Services:
     resume_codes: RateLimit
     preparing: Preparing
     providers: Providers
+    streams: OpenStreams
 
     def time_of(self, request: Request) -> datetime:
         """When a participant's request came in: now, but where simulated people say when they act."""
@@ -80,6 +82,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         resume_codes=RateLimit(RESUME_CODES_PER_MINUTE),
         preparing=Preparing(settings.upload_folder),
         providers=Providers(settings),
+        streams=OpenStreams(),
     )
 
 

@@ -79,13 +79,21 @@ def asset(settings: SettingsDep, site: str, name: str) -> Response:
         folder / site / "assets" / name,
         folder / site / name,
     ):
-        path = candidate.resolve()
-        if path.is_file() and path.is_relative_to(folder):
+        if (path := _file_within(folder, candidate)) is not None:
             kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
             return Response(
                 _read(path, path.stat().st_mtime_ns), media_type=kind, headers={"cache-control": IMMUTABLE}
             )
-    raise NotFound(f"There is no file {name}.")
+    raise NotFound(f"There is no file {name[:200]}.")
+
+
+def _file_within(folder: Path, asked: Path) -> Path | None:
+    """The file asked for where it is one of this folder's; its name may be one that no file can have."""
+    try:
+        path = asked.resolve()
+        return path if path.is_file() and path.is_relative_to(folder) else None
+    except (OSError, ValueError):
+        return None
 
 
 def _page(services: Services, site: str) -> Response:

@@ -94,8 +94,17 @@ def check_origin(request: Request, services: Services) -> None:
             return
         raise NotAllowed("This change was asked for by another site and is refused.")
     own = {services.settings.public_url, f"{request.url.scheme}://{request.headers.get('host', '')}"}
-    if f"{urlsplit(origin).scheme}://{urlsplit(origin).netloc}" not in own:
+    if _address_of(origin) not in own:
         raise NotAllowed(f"This change was asked for by another site ({origin[:100]}) and is refused.")
+
+
+def _address_of(origin: str) -> str:
+    """Scheme and host of an origin; empty where it is no address."""
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return ""
+    return f"{parts.scheme}://{parts.netloc}"
 
 
 def identify(request: Request, services: Services) -> Identity:

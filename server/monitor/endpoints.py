@@ -68,22 +68,27 @@ def stream_monitor(
     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
     when the session ends or the server does; the browser then connects again by itself.
     """
+    services.streams.check(identity.account_id)
     first = _snapshot(services, study, identity, origin)
+
+    async def changing() -> AsyncIterator[MonitorSnapshot]:
+        yield first
+        until = time.monotonic() + 60 * services.settings.monitor_stream_minutes
+        while await _waited(services) and not await request.is_disconnected() and time.monotonic() < until:
+            try:
+                anew = await run_in_threadpool(identify, request, services)
+                yield await run_in_threadpool(_snapshot, services, study, anew, origin)
+            except (NotSignedIn, NotFound, NotAllowed, SecondFactorNeeded):  # or the study was deleted
+                return
 
     async def events() -> AsyncIterator[str]:
         before: MonitorSnapshot | None = None
-        current = first
         yield f"retry: {RETRY_MS}\n\n"
-        until = time.monotonic() + 60 * services.settings.monitor_stream_minutes
-        while time.monotonic() < until:
-            yield f"event: monitor\ndata: {changes(before, current)}\n\n"
-            before = current
-            if not await _waited(services) or await request.is_disconnected():
+        with services.streams.one(identity.account_id) as has_room:
+            if not has_room:
                 return
-            try:
-                anew = await run_in_threadpool(identify, request, services)
-                current = await run_in_threadpool(_snapshot, services, study, anew, origin)
-            except (NotSignedIn, NotFound, NotAllowed, SecondFactorNeeded):  # or the study was deleted
-                return
+            async for current in changing():
+                yield f"event: monitor\ndata: {changes(before, current)}\n\n"
+                before = current
 
     return StreamingResponse(events(), media_type="text/event-stream", headers={"x-accel-buffering": "no"})
