@@ -13,7 +13,7 @@ from server.db import REQUEST_BUSY_S, Database, open_database
 from server.evidence.clip_bytes import ClipBytes
 from server.evidence.intake import Intake
 from server.group_commit import GroupCommit
-from server.monitor.open_streams import OpenStreams
+from server.open_streams import OpenStreams
 from server.providers.clients import Providers
 from server.rate_limit import RateLimit
 from server.results.cache import ResultsCache

@@ -8,7 +8,7 @@ from sqlalchemy import select
 
 from server.context import Services
 from server.models import Clip
-from server.monitor.open_streams import OpenStreams
+from server.open_streams import OpenStreams
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import StudyInDatabase
 
