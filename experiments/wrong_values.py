@@ -56,7 +56,7 @@ def wrong_value(detail: Mapping[str, Any]) -> str:
     kind, given, context = detail["type"], detail.get("input"), detail.get("ctx") or {}
     if kind == "missing":
         return "this key is required and missing"
-    expected = TYPES.get(kind) or (LIMITS[kind](context) if kind in LIMITS else None)
+    expected = expectation(detail)
     if expected is None:
         message = str(detail["msg"]).removeprefix("Value error, ")
         said = isinstance(given, dict | list | tuple) or ", got " in message
@@ -65,6 +65,18 @@ def wrong_value(detail: Mapping[str, Any]) -> str:
         allowed = [word.strip("' ") for word in str(context["expected"]).replace(" or ", ", ").split(",")]
         return f"expected {expected}, got {shown(given)}" + _nearest(given, allowed)
     return f"expected {expected}, got {shown(given)}{_way_out(kind, detail)}"
+
+
+def expectation(detail: Mapping[str, Any]) -> str | None:
+    """What was expected where pydantic names a type or a limit; None where a validator has words of its own.
+
+    Examples
+    --------
+    >>> expectation({"type": "greater_than_equal", "ctx": {"ge": 1}})
+    '1 or more'
+    """
+    kind = detail["type"]
+    return LIMITS[kind](detail["ctx"]) if kind in LIMITS else TYPES.get(kind)
 
 
 def is_follower(detail: Mapping[str, Any]) -> bool:
@@ -124,7 +136,9 @@ def _one_of(expected: str) -> str:
     return f"one of {expected}" if " or " in expected else expected
 
 
-def _number(limit: float) -> str:
+def _number(limit: float | str) -> str:
+    if isinstance(limit, str):  # a point in time
+        return limit
     return f"{limit:,}" if limit != int(limit) else f"{int(limit):,}"
 
 

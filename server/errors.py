@@ -15,6 +15,7 @@ from starlette.exceptions import HTTPException
 from experiments.errors import InputError
 from server.db import is_away, is_busy
 from server.logs import described
+from server.refused_values import refused_value
 
 log = logging.getLogger("palpebra")
 
@@ -124,12 +125,8 @@ async def _bad_input(_request: Request, error: Exception) -> JSONResponse:
 async def _not_valid(_request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, RequestValidationError):
         raise error
-    problems = [
-        {"where": ".".join(str(part) for part in detail["loc"]), "problem": detail["msg"]}
-        for detail in error.errors()
-    ]
-    first = problems[0]
-    return error_response(422, "invalid", f"{first['where']}: {first['problem']}", {"problems": problems})
+    problems = [refused_value(detail) for detail in error.errors()]
+    return error_response(422, "invalid", problems[0], {"problems": problems})
 
 
 async def _http(_request: Request, error: Exception) -> JSONResponse:
