@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from stimuli_builder.tracking.accuracy import HeldOut
 from stimuli_builder.tracking.fit import Fit
 from stimuli_builder.tracking.model import CoupledModel, believing
-from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, eye_axis
+from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, eye_axis, eye_spans
 
 Values = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def doubt(
     unusual = float(np.sqrt(np.mean((fit.c / np.maximum(model.sd, 1e-9)) ** 2)))
     if unusual > UNUSUAL_SD:
         return f"a shape unlike the labelled ones ({unusual:.1f} sd)"
-    if before is not None and jump(points, before) > JUMP_SHARE:
+    if before is not None and jump_px(points, before) > JUMP_SHARE * width:
         return "the eyes jump from one frame to the next"
     rms = float(np.sqrt((errors**2).mean()))
     if rms > DOUBTFUL_SHARE * width:
@@ -91,14 +91,14 @@ def doubt(
 
 def widths(points: Points) -> float:
     """Mean width of the eyes, canthus to canthus, in pixels."""
-    eyes = points.reshape(-1, EYE_POINTS, 2)
-    return float(np.mean([eye_axis(eye)[2] for eye in eyes]))
+    spans = eye_spans(points)
+    return float(np.hypot(spans[:, 0], spans[:, 1]).mean())
 
 
-def jump(points: Points, before: Points) -> float:
-    """Greatest move of a canthus since the frame before, as part of the eye's width."""
-    canthi = [EYE_POINTS * eye + corner for eye in range(len(points) // EYE_POINTS) for corner in CANTHI]
-    return float(np.hypot(*(points[canthi] - before[canthi]).T).max() / max(widths(points), 1e-6))
+def jump_px(points: Points, before: Points) -> float:
+    """Greatest move of a canthus since the frame before, in pixels."""
+    moves = (points - before).reshape(-1, EYE_POINTS, 2)[:, CANTHI]
+    return float(np.hypot(moves[..., 0], moves[..., 1]).max())
 
 
 def lid_difference(points: Points, other: Points) -> float:

@@ -91,7 +91,8 @@ def _spread_closures(fitter: Fitter) -> list[Values]:
     """Parameters of labelled frames from the most closed to the most open, evenly spread."""
     model = fitter.model
     shapes = model.mesh.vertices + np.tensordot(model.examples, model.shape_modes, axes=1)
-    openings = [inter_eyelid_distances(shape, model.markers).mean() for shape in shapes]
+    lids = shapes[:, : EYE_POINTS * model.eyes]
+    openings = [inter_eyelid_distances(points, model.markers).mean() for points in lids]
     order = np.argsort(openings)
     chosen = np.unique(np.linspace(0, len(order) - 1, min(CLOSURES, len(order))).astype(int))
     return [model.examples[order[index]] for index in chosen]
