@@ -13,8 +13,8 @@ from server.evidence.intake import Intake
 from server.evidence.views import Arrival, ArrivingView, take_views
 from server.models import StudyRun, View, ViewClip
 from server.tokens import hash_token
+from server.trials.delivery import TrialNotInRun
 from server.trials.refusals import ConsentMissing, RunUnknown
-from server.trials.service import TrialNotInRun
 from server.versions import LoadedVersion, Versions
 from server.views import repository
 from server.views.frame_log import packed, unpacked

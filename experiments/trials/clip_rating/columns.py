@@ -3,7 +3,7 @@
 A payload with one number is that of a [trial.scale]; one with `answers` has an object a scale.
 """
 
-from experiments.columns import base
+from experiments.columns import base, playback
 from experiments.columns.column import Column
 from experiments.columns.tables import rows_of
 from experiments.columns.view import Dialect, View
@@ -92,17 +92,17 @@ RATINGS = View(
         *base.CLIP,
         *ANSWER,
         *base.TIMES,
-        *base.PLAYBACK,
-        *base.SCREEN,
+        *playback.PLAYBACK,
+        *playback.SCREEN,
         *base.EXCLUSION,
         *base.SAVED,
         *base.ORIGIN,
-        *base.CLOCK,
+        *playback.CLOCK,
         *SCALE,
-        *base.VIEWS,
+        *playback.VIEWS,
         *base.EVIDENCE,
         *base.CHECK,
-        *base.PRESENTATION,
+        *playback.PRESENTATION,
         *REFERENCE,
     ),
     rows=_rows,

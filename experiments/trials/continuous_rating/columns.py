@@ -3,7 +3,7 @@
 Alias beside those of the base columns: k clips.
 """
 
-from experiments.columns import base
+from experiments.columns import base, playback
 from experiments.columns.column import Column
 from experiments.columns.tables import rows_of
 from experiments.columns.view import View
@@ -67,15 +67,15 @@ TRACES = View(
         *base.CLIP,
         *ANSWER,
         *base.TIMES,
-        *base.PLAYBACK,
-        *base.SCREEN,
+        *playback.PLAYBACK,
+        *playback.SCREEN,
         *base.EXCLUSION,
         *base.SAVED,
         *base.ORIGIN,
-        *base.CLOCK,
-        *base.VIEWS,
+        *playback.CLOCK,
+        *playback.VIEWS,
         *base.CHECK,
-        *base.PRESENTATION,
+        *playback.PRESENTATION,
         *base.EVIDENCE,
     ),
     rows=rows_of("continuous_rating", {"shown": "c"}, "LEFT JOIN clips k ON k.sha256 = c.clip_sha256\n"),

@@ -3,7 +3,7 @@
 Where two clips come one after the other, the first is the left one.
 """
 
-from experiments.columns import base
+from experiments.columns import base, playback
 from experiments.columns.column import Column
 from experiments.columns.tables import rows_of
 from experiments.columns.view import View
@@ -77,16 +77,16 @@ COMPARISONS = View(
         Column("reference", "text", "Cell of the reference clip shown before.", source="xc.cell"),
         *ANSWER,
         *base.TIMES,
-        *base.PLAYBACK,
-        *base.SCREEN,
+        *playback.PLAYBACK,
+        *playback.SCREEN,
         *base.EXCLUSION,
         *base.SAVED,
         *base.ORIGIN,
-        *base.CLOCK,
-        *base.VIEWS,
+        *playback.CLOCK,
+        *playback.VIEWS,
         *base.EVIDENCE,
         *base.CHECK,
-        *base.PRESENTATION,
+        *playback.PRESENTATION,
     ),
     rows=rows_of("paired_comparison", _ROLES),
 )

@@ -4,7 +4,7 @@ Aliases beside those of the base columns: q series_trials, w series_answers. The
 the stimulus; a standard is told by `interval`.
 """
 
-from experiments.columns import base
+from experiments.columns import base, playback
 from experiments.columns.column import Column
 from experiments.columns.tables import rows_of
 from experiments.columns.view import View
@@ -112,16 +112,16 @@ THRESHOLDS = View(
         *ANSWER,
         *ESTIMATE,
         *base.TIMES,
-        *base.PLAYBACK,
-        *base.SCREEN,
+        *playback.PLAYBACK,
+        *playback.SCREEN,
         *base.EXCLUSION,
         *base.SAVED,
         *base.ORIGIN,
-        *base.CLOCK,
-        *base.VIEWS,
+        *playback.CLOCK,
+        *playback.VIEWS,
         *base.EVIDENCE,
         *base.CHECK,
-        *base.PRESENTATION,
+        *playback.PRESENTATION,
     ),
     rows=rows_of("threshold", {}, _TABLES),
 )
