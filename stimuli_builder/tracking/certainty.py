@@ -27,9 +27,11 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     """Give a model what its errors are stated from: labelled frames left out of training.
 
     log(frame error) is regressed on log(residual / usual residual); the slope is kept between 0 and 2 and
-    shrunk as by ten more frames without a slope. A stated error is the root mean square on such frames.
+    shrunk as by ten more frames without a slope. A stated error is the root mean square on such frames,
+    those aside whose residual is above `limits` (eyes,): the tracker would call them lost and state nothing.
     """
-    seen = [one for one in held_out if one.residuals is not None and one.point_errors_px is not None]
+    fitted = [one for one in held_out if one.residuals is not None and one.point_errors_px is not None]
+    seen = [one for one in fitted if one.residuals is not None and (one.residuals <= limits).all()]
     if not seen:
         return believing(model, limits)
     residuals = np.array([one.residuals for one in seen])

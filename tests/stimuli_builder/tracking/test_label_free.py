@@ -1,6 +1,7 @@
 """Tracking without labels: contours, training on detections, doubts, relabelling; the real detector."""
 
 import csv
+from dataclasses import replace
 from itertools import islice
 
 import cv2
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
-from stimuli_builder.tracking.certainty import lid_difference, widths
+from stimuli_builder.tracking.certainty import lid_difference, widths, with_errors
 from stimuli_builder.tracking.detector.detection import along, eye_points
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.labelfree import (
@@ -96,6 +97,20 @@ def test_stated_errors_are_those_of_frames_left_out(lesson):
     stated = np.outer(np.array(excess) ** model.error_slope[0], np.sqrt((model.point_errors**2).mean()))
     true = np.sqrt(np.mean([result.rms_px**2 for result in known]))
     assert np.sqrt((stated**2).mean()) == pytest.approx(true, rel=0.35)
+
+
+def test_a_frame_that_the_tracker_would_call_lost_raises_no_stated_error(lesson):
+    limits = lesson.model.residual_limits
+    plain = with_errors(lesson.model, lesson.held_out, limits)
+    astray = replace(
+        lesson.held_out[0],
+        rms_px=143.5,
+        residuals=1.1 * limits,
+        point_errors_px=np.full(len(plain.point_errors), 143.5),
+    )
+    stated = with_errors(lesson.model, [*lesson.held_out, astray], limits)
+    assert stated.point_errors == pytest.approx(plain.point_errors)
+    assert stated.error_slope == pytest.approx(plain.error_slope)
 
 
 def test_a_detector_that_sees_the_lids_elsewhere_makes_a_frame_doubtful(lesson, recording):
