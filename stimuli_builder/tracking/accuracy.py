@@ -13,7 +13,7 @@ from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
 from stimuli_builder.tracking.picture import reduced, restored_points
 from stimuli_builder.tracking.search import Finder
-from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, inter_eyelid_distances
+from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, eye_spans, inter_eyelid_distances
 from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
 from stimuli_builder.video import Picture
 
@@ -34,6 +34,8 @@ class HeldOut:
         Root mean square grey levels.
     point_errors_px : float64 array (9 * eyes,) or None
         Distance of each landmark from its label.
+    width_px : float or None
+        Mean width of the labelled eyes.
     """
 
     frame: int
@@ -42,6 +44,7 @@ class HeldOut:
     distance_errors_px: Values | None
     residuals: Values | None
     point_errors_px: Values | None = None
+    width_px: float | None = None
 
 
 def cross_validate(
@@ -92,7 +95,9 @@ def _held_out(
     restored = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
     errors = inter_eyelid_distances(restored, model.markers) - inter_eyelid_distances(label, model.markers)
     away = np.hypot(*(restored - label).T)
-    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away)
+    spans = eye_spans(label)
+    width = float(np.hypot(spans[:, 0], spans[:, 1]).mean())
+    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away, width)
 
 
 def _rms(differences: Points) -> float:

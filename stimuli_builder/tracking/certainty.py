@@ -28,10 +28,9 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
 
     log(frame error) is regressed on log(residual / usual residual); the slope is kept between 0 and 2 and
     shrunk as by ten more frames without a slope. A stated error is the root mean square on such frames,
-    those aside whose residual is above `limits` (eyes,): the tracker would call them lost and state nothing.
+    those aside that tracking would not take: with a residual above `limits` (eyes,), or found elsewhere.
     """
-    fitted = [one for one in held_out if one.residuals is not None and one.point_errors_px is not None]
-    seen = [one for one in fitted if one.residuals is not None and (one.residuals <= limits).all()]
+    seen = [one for one in held_out if _would_be_taken(one, limits)]
     if not seen:
         return believing(model, limits)
     residuals = np.array([one.residuals for one in seen])
@@ -44,6 +43,14 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     scale = np.maximum((residuals / usual).max(1), 1.0) ** slope
     errors = np.array([one.point_errors_px for one in seen]) / scale[:, None]
     return believing(model, limits, usual, np.sqrt((errors**2).mean(0)), slope)
+
+
+def _would_be_taken(one: HeldOut, limits: Values) -> bool:
+    """Whether tracking would call such a fit neither lost nor, since its eyes jump, doubtful."""
+    if one.residuals is None or one.point_errors_px is None or one.width_px is None:
+        return False
+    away = one.point_errors_px.reshape(-1, EYE_POINTS)[:, CANTHI].max()
+    return bool((one.residuals <= limits).all() and away <= JUMP_SHARE * one.width_px)
 
 
 def stated_errors(model: CoupledModel, fit: Fit, difference_px: float | None) -> Values:

@@ -99,14 +99,15 @@ def test_stated_errors_are_those_of_frames_left_out(lesson):
     assert np.sqrt((stated**2).mean()) == pytest.approx(true, rel=0.35)
 
 
-def test_a_frame_that_the_tracker_would_call_lost_raises_no_stated_error(lesson):
+@pytest.mark.parametrize(("share_of_limit", "away_px"), [(1.1, 0.5), (0.9, 48.6)])
+def test_a_frame_that_tracking_would_not_take_raises_no_stated_error(lesson, share_of_limit, away_px):
     limits = lesson.model.residual_limits
     plain = with_errors(lesson.model, lesson.held_out, limits)
     astray = replace(
         lesson.held_out[0],
-        rms_px=143.5,
-        residuals=1.1 * limits,
-        point_errors_px=np.full(len(plain.point_errors), 143.5),
+        rms_px=away_px,
+        residuals=share_of_limit * limits,
+        point_errors_px=np.full(len(plain.point_errors), away_px),
     )
     stated = with_errors(lesson.model, [*lesson.held_out, astray], limits)
     assert stated.point_errors == pytest.approx(plain.point_errors)
