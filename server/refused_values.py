@@ -30,8 +30,8 @@ def refused_value(detail: Mapping[str, Any]) -> str:
     >>> refused_value({"type": "string_type", "loc": ("body", "password"), "input": 12345})
     'body.password: expected a text, got a number'
     """
-    place = ".".join(str(part)[:MAX_NAME] for part in detail["loc"])
-    return f"{place}: {_problem(detail)}"
+    location = ".".join(str(part)[:MAX_NAME] for part in detail["loc"])
+    return f"{location}: {_problem(detail)}"
 
 
 def _problem(detail: Mapping[str, Any]) -> str:
