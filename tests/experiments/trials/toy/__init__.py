@@ -12,7 +12,7 @@ from pydantic import Field
 from experiments import design
 from experiments.assignment.trial import Shown, Trial
 from experiments.base import Declaration, Translated
-from experiments.columns import Column, View, base
+from experiments.columns import Column, View, base, playback
 from experiments.columns.tables import rows_of
 from experiments.trials.kind import Answer, Kind, TrialDeclaration
 
@@ -69,7 +69,7 @@ TOY = Kind(
             Column("same", "boolean", "True where the two looked alike.", source="t.payload", member="same"),
             Column("first_cell", "text", "Cell of the clip shown first.", source="one.cell"),
             *base.TIMES,
-            *base.PLAYBACK,
+            *playback.PLAYBACK,
             *base.EXCLUSION,
             *base.SAVED,
             *base.ORIGIN,
