@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.text_table import name_lines, numbers, read_text_table, refuse_shared_roles, texts_required
+from analysis.read.number_columns import numbers, unusual_numbers
+from analysis.read.text_table import name_lines, read_text_table, refuse_shared_roles, texts_required
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -91,6 +92,8 @@ def read_items(
     if case:
         texts_required(table, case)
     answers = np.column_stack([numbers(table, name) for name in items])
+    for name, column in zip(items, answers.T, strict=True):
+        unusual_numbers(table, name, column)
     if scale is not None:
         _refuse_outside(table.source, items, answers, scale, table.lines)
         turned = [name in reverse for name in items]

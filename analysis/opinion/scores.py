@@ -9,14 +9,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.opinion.projection import Projection, alternating_projection
-from analysis.read.text_table import (
-    name_lines,
-    numbers,
-    read_text_table,
-    refuse_shared_roles,
-    texts_required,
-    unusual_numbers,
-)
+from analysis.read.number_columns import numbers, unusual_numbers
+from analysis.read.text_table import name_lines, read_text_table, refuse_shared_roles, texts_required
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
+from analysis.read.number_columns import MISSING_MARKS
 from analysis.read.text_table import (
-    MISSING_MARKS,
     TextTable,
     name_lines,
     read_text_table,

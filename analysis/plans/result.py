@@ -153,6 +153,12 @@ def group_decisions(anova: AnovaResult) -> tuple[str, ...]:
         named = ", ".join(f"{' '.join(levels)} {size}" for levels, size in sizes.items())
         kind = "III (every group mean weighs the same)" if anova.sum_of_squares == 3 else "II"
         said.append(f"groups differ in size ({named}); sums of squares of type {kind}")
+    for levels, size in sizes.items():
+        if size == 1:
+            said.append(
+                f"group {' '.join(levels)} is one participant: its own spread is unknown, so that its tests "
+                "and errors take that of the other groups"
+            )
     for covariate in design.covariates:
         if covariate.centred:
             said.append(

@@ -8,14 +8,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.read.number_columns import numbers, unusual_numbers
 from analysis.read.text_table import (
     TextTable,
     name_lines,
-    numbers,
     read_text_table,
     refuse_shared_roles,
     texts_required,
-    unusual_numbers,
 )
 from experiments.errors import InputError
 

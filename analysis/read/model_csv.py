@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
-from analysis.read.text_table import TextTable, numbers, read_text_table, texts_required, unusual_numbers
+from analysis.read.number_columns import numbers, unusual_numbers
+from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
 

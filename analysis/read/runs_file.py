@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis.read.number_columns import MISSING_MARKS
 from analysis.read.study_answers import StudyAnswers
-from analysis.read.text_table import MISSING_MARKS, read_text_table
+from analysis.read.text_table import read_text_table
 from experiments.columns.runs import EVIDENCE_COLUMNS
 
 VERDICT = "evidence_verdict"

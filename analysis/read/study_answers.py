@@ -10,8 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.errors import NoRatingsError
+from analysis.read.number_columns import numbers
 from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, TRIAL_PLACES, Reading
-from analysis.read.text_table import numbers, read_text_table
+from analysis.read.text_table import read_text_table
 from experiments.definition import Experiment
 from experiments.errors import InputError
 

@@ -1,6 +1,5 @@
 """Read a long table as text, with every doubt about it raised as one line."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,16 +15,6 @@ from analysis.read.files.programs import program_of, trials_only
 from analysis.read.wide import wide_hint
 from experiments.errors import InputError, did_you_mean
 
-MISSING_MARKS = frozenset({"", "NA", "NaN", "nan", "N/A", "n/a", "."})
-"""What counts as 'no rating here' in a rating column; never applied to names of people or levels."""
-
-_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
-_DECIMAL_POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+")
-_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
-_POINTED_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
-_HUNDREDS = re.compile(r"[+-]?[1-9][0-9]{2}")
-MISSING_CODES = (-9999.0, -999.0, -99.0, -88.0, -77.0, -9.0, 99.0, 999.0, 9999.0)
-"""Numbers by which people mark that there is none."""
 NAMED_ROWS = 5
 
 
@@ -33,7 +22,8 @@ NAMED_ROWS = 5
 class TextTable:
     """Columns of text (categorical, kept as written, stripped) and what was decided while reading.
 
-    `lines` (rows,) are where the rows stand in the file; `labels` has, of a column, the word for each code.
+    `lines` (rows,) are where the rows stand in the file; `labels` has, of a column, the word for each code;
+    `reader` reads further columns of the file.
     """
 
     columns: pd.DataFrame
@@ -42,6 +32,7 @@ class TextTable:
     lines: NDArray[np.int64] = field(repr=False)
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     decisions: list[str] = field(default_factory=list)
+    reader: Reader | None = field(default=None, repr=False)
 
     @property
     def synthetic(self) -> bool:
@@ -72,7 +63,7 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
     cells = trials_only(reader.cells(names), list(needed or ()), _sorts(reader, header))
     if cells.rows.empty:
         raise InputError(f"{path.name} has a header but no rows{' that are trials' * bool(cells.decisions)}")
-    table = TextTable(cells.rows, path.name, cells.header, cells.lines, cells.labels)
+    table = TextTable(cells.rows, path.name, cells.header, cells.lines, cells.labels, reader=reader)
     table.decisions.extend(cells.decisions)
     for name in names:
         table.columns[name] = _stripped(table.columns[name])
@@ -165,101 +156,6 @@ def _worded(column: "pd.Series[Any]", words: Mapping[str, str]) -> "pd.Series[An
         return column
     names = [words.get(text, text) for text in column.cat.categories]
     return pd.Series(categorical(column.cat.codes.to_numpy(), names), index=column.index)
-
-
-def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
-    """Parse a column of numbers; decimal commas are read (and reported), missing marks become NaN."""
-    categories = list(table.columns[name].cat.categories)
-    commas = [text for text in categories if _DECIMAL_COMMA.fullmatch(text)]
-    _refuse_two_readings(table, name, categories, commas)
-    values = np.array([_number(table, name, text) for text in [*categories, ""]])
-    if commas:
-        table.decisions.append(f"decimal commas in '{name}' (e.g. '{commas[0]}') read as decimal points")
-    parsed: NDArray[np.float64] = values[table.columns[name].cat.codes.to_numpy().astype(np.int64)]
-    return parsed
-
-
-def _refuse_two_readings(table: TextTable, name: str, categories: list[str], commas: list[str]) -> None:
-    """Refuse a column whose commas or points may part thousands as well as decimals, with both readings."""
-    thousands = [text for text in commas if _THOUSANDS.fullmatch(text)]
-    points = [text for text in categories if _DECIMAL_POINT.fullmatch(text)]
-    hundreds = [text for text in categories if _HUNDREDS.fullmatch(text)]
-    if points and not commas and hundreds and all(map(_POINTED_THOUSANDS.fullmatch, points)):
-        # 1.003 beside 950, as spreadsheets write it where the comma is the decimal mark
-        text, beside = points[0], hundreds[0]
-    elif thousands and (len(thousands) == len(commas) or points):
-        text, beside = thousands[0], next((t for t in points or categories if t and t not in commas), "")
-    else:
-        return
-    decimal, whole = text.replace(",", "."), re.sub("[.,]", "", text)
-    row = int(np.argmax((table.columns[name] == text).to_numpy()))
-    raise InputError(
-        f"{table.source}: '{text}' of '{name}' in line {table.line(row)} can be read as {decimal} or as "
-        f"{whole}{f' (beside it stands {beside})' if beside else ''}; write decimals with a point and "
-        "thousands without a mark"
-    )
-
-
-def unusual_numbers(
-    table: TextTable,
-    name: str,
-    values: NDArray[np.float64],
-    remedy: str = "correct them, leave them empty, or refuse them with --scale",
-) -> None:
-    """Say it where a few whole-number ratings lie far outside all others: typing errors, codes for missing.
-
-    Far: beyond the others by more than their whole range, where the others span at most 11 points and the
-    few are no more than one in twenty. Codes for missing (-99, 999) that lie so far, or below zero where
-    nothing else does, are named however many they are.
-    """
-    coded = _missing_codes(values)
-    if coded.any():
-        named = ", ".join(f"{value:g}" for value in sorted(set(values[coded])))
-        table.decisions.append(
-            f"'{name}' holds {named} ({name_lines(table, coded)}), by which missing ratings are often "
-            f"marked; they count: {remedy}"
-        )
-    given = values[~np.isnan(values) & ~coded]
-    values = np.where(coded, np.nan, values)
-    if len(given) < 20 or (given != np.round(given)).any():
-        return
-    low, high = np.quantile(given, [0.05, 0.95], method="nearest")
-    width = high - low
-    far = ~np.isnan(values) & ((values > high + width + 1) | (values < low - width - 1))
-    if 0 < width <= 10 and far.any() and far.sum() <= len(given) / 20:
-        named = ", ".join(f"{value:g}" for value in sorted(set(values[far])))
-        inside = given[(given <= high + width + 1) & (given >= low - width - 1)]
-        table.decisions.append(
-            f"'{name}' holds {named} ({name_lines(table, far)}), far from the others ({inside.min():g} to "
-            f"{inside.max():g}); they count: {remedy}"
-        )
-
-
-def _missing_codes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which values are codes for missing that lie where no other value does."""
-    coded = np.isin(values, MISSING_CODES)
-    others = values[~coded & ~np.isnan(values)]
-    if not coded.any() or len(others) < 2:
-        return np.zeros(len(values), dtype=bool)
-    low, high = others.min(), others.max()
-    beyond = (values > high + (high - low) + 1) | (values < low - (high - low) - 1)
-    return np.asarray(coded & (beyond | ((values < 0) & (low >= 0))))
-
-
-def _number(table: TextTable, name: str, text: str) -> float:
-    if text in MISSING_MARKS:
-        return np.nan
-    plain = text.replace(",", ".") if _DECIMAL_COMMA.fullmatch(text) else text
-    try:
-        value = float(plain)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value) or "_" in plain:
-        row = int(np.argmax((table.columns[name] == text).to_numpy()))
-        raise InputError(
-            f"{table.source}: '{name}' should be a number, got '{text}' in line {table.line(row)}"
-        )
-    return value
 
 
 def name_lines(table: TextTable, rows: NDArray[np.bool_]) -> str:

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from analysis.read.number_columns import numbers
 from analysis.read.text_table import (
     TextTable,
     name_lines,
-    numbers,
     read_text_table,
     refuse_shared_roles,
     texts_required,

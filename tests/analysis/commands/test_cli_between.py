@@ -156,3 +156,13 @@ def test_follow_up_tests_stand_in_the_json(tmp_path) -> None:
 )
 def test_wrong_follow_ups_are_refused(arguments, message) -> None:
     assert message in str(anova(OBK, "--within", "hour", *arguments).exception)
+
+
+def test_a_group_of_one_participant_is_named(tmp_path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(FULL.replace("7,h,", "7,alone,"))
+    result = anova(path, "--within", "face", "--between", "group")
+    assert result.exit_code == 0, result.output
+    said = " ".join(result.output.split())
+    assert "group alone is one participant: its own spread is unknown" in said
+    assert "group g is one" not in said

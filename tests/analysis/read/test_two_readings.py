@@ -118,3 +118,29 @@ def test_a_first_line_that_is_no_header_is_shown_with_what_to_do(tmp_path, first
     path.write_text(f"{first}\n{path.read_text()}")
     with pytest.raises(InputError, match=r"its first line is .*; it should name the columns"):
         read(path)
+
+
+def with_another(tmp_path: Path, other: list[str], ratings: list[str]) -> Path:
+    path = tmp_path / "t.csv"
+    rows = [f"{i // 2};{'ab'[i % 2]};{x};{y}" for i, (x, y) in enumerate(zip(other, ratings, strict=True))]
+    path.write_text("\n".join(["id;a;x;y", *rows]), encoding="utf-8")
+    return path
+
+
+def test_points_beside_another_columns_decimal_comma_are_refused_with_both_readings(tmp_path) -> None:
+    path = with_another(tmp_path, ["2,5", "NA", "3"], ["1.003", "2.500", ""])
+    with pytest.raises(InputError) as caught:
+        read(path)
+    said = str(caught.value)
+    assert "'1.003' of 'y' in line 2 can be read as 1.003 or as 1003 (beside it stands 2,5 of 'x')" in said
+
+
+@pytest.mark.parametrize(
+    "other", [["2.5", "3"], ["1,003", "2,500"], ["yes, 2,5", "2,5"], ["2", "3"], ["", ""]]
+)
+def test_points_are_decimal_where_no_other_column_has_a_decimal_comma(tmp_path, other) -> None:
+    assert read(with_another(tmp_path, other, ["1.003", "2.500"])).rows["y"].tolist() == [1.003, 2.5]
+
+
+def test_a_shown_decimal_point_is_one_beside_another_columns_comma(tmp_path) -> None:
+    assert read(with_another(tmp_path, ["2,5", "3"], ["1.003", "2.5"])).rows["y"].tolist() == [1.003, 2.5]

@@ -1,0 +1,144 @@
+"""Columns of numbers in a table of text: decimal commas, marks and codes for missing, unusual ratings."""
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.read.text_table import TextTable, name_lines
+from experiments.errors import InputError
+
+MISSING_MARKS = frozenset({"", "NA", "NaN", "nan", "N/A", "n/a", "."})
+"""What counts as 'no rating here' in a rating column; never applied to names of people or levels."""
+
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_DECIMAL_POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+")
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_POINTED_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
+_COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]+(,[0-9]+)?")
+_HUNDREDS = re.compile(r"[+-]?[1-9][0-9]{2}")
+MISSING_CODES = (-9999.0, -999.0, -99.0, -88.0, -77.0, -9.0, 99.0, 999.0, 9999.0)
+"""Numbers by which people mark that there is none."""
+
+
+def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
+    """Parse a column of numbers; decimal commas are read (and reported), missing marks become NaN."""
+    categories = list(table.columns[name].cat.categories)
+    commas = [text for text in categories if _DECIMAL_COMMA.fullmatch(text)]
+    _refuse_two_readings(table, name, categories, commas)
+    values = np.array([_number(table, name, text) for text in [*categories, ""]])
+    if commas:
+        table.decisions.append(f"decimal commas in '{name}' (e.g. '{commas[0]}') read as decimal points")
+    parsed: NDArray[np.float64] = values[table.columns[name].cat.codes.to_numpy().astype(np.int64)]
+    return parsed
+
+
+def _refuse_two_readings(table: TextTable, name: str, categories: list[str], commas: list[str]) -> None:
+    """Refuse a column whose commas or points may part thousands as well as decimals, with both readings."""
+    thousands = [text for text in commas if _THOUSANDS.fullmatch(text)]
+    points = [text for text in categories if _DECIMAL_POINT.fullmatch(text)]
+    hundreds = [text for text in categories if _HUNDREDS.fullmatch(text)]
+    if points and not commas and hundreds and all(map(_POINTED_THOUSANDS.fullmatch, points)):
+        # 1.003 beside 950, as spreadsheets write it where the comma is the decimal mark
+        text, beside = points[0], hundreds[0]
+    elif points and not commas and (elsewhere := _decimal_comma_elsewhere(table, name, categories)):
+        text, beside = points[0], elsewhere
+    elif thousands and (len(thousands) == len(commas) or points):
+        text, beside = thousands[0], next((t for t in points or categories if t and t not in commas), "")
+    else:
+        return
+    decimal, whole = text.replace(",", "."), re.sub("[.,]", "", text)
+    row = int(np.argmax((table.columns[name] == text).to_numpy()))
+    raise InputError(
+        f"{table.source}: '{text}' of '{name}' in line {table.line(row)} can be read as {decimal} or as "
+        f"{whole}{f' (beside it stands {beside})' if beside else ''}; write decimals with a point and "
+        "thousands without a mark"
+    )
+
+
+def _decimal_comma_elsewhere(table: TextTable, name: str, categories: list[str]) -> str:
+    """A decimal comma of another column where every number here is like 1.003; none without such a column.
+
+    Only such a column makes the points doubtful, so that other files are read once.
+    """
+    given = [text for text in categories if text not in MISSING_MARKS]
+    if table.reader is None or not all(map(_POINTED_THOUSANDS.fullmatch, given)):
+        return ""
+    others = [other for other in dict.fromkeys(table.header) if other and other != name]
+    if not others:
+        return ""
+    rows = table.reader.cells(others).rows
+    for other in others:
+        texts = {str(text).strip() for text in rows[other].unique()}
+        if shown := _shown_decimal_comma(texts - MISSING_MARKS):
+            return f"{shown} of '{other}'"
+    return ""
+
+
+def _shown_decimal_comma(texts: set[str]) -> str:
+    """The first number whose comma can only be a decimal one, of a column of numbers without points."""
+    if not all(map(_COMMA_OR_WHOLE.fullmatch, texts)):
+        return ""
+    return min((t for t in texts if "," in t and not _THOUSANDS.fullmatch(t)), default="")
+
+
+def unusual_numbers(
+    table: TextTable,
+    name: str,
+    values: NDArray[np.float64],
+    remedy: str = "correct them, leave them empty, or refuse them with --scale",
+) -> None:
+    """Say it where a few whole-number ratings lie far outside all others: typing errors, codes for missing.
+
+    Far: beyond the others by more than their whole range, where the others span at most 11 points and the
+    few are no more than one in twenty. Codes for missing (-99, 999) that lie so far, or below zero where
+    nothing else does, are named however many they are.
+    """
+    coded = _missing_codes(values)
+    if coded.any():
+        named = ", ".join(f"{value:g}" for value in sorted(set(values[coded])))
+        table.decisions.append(
+            f"'{name}' holds {named} ({name_lines(table, coded)}), by which missing ratings are often "
+            f"marked; they count: {remedy}"
+        )
+    given = values[~np.isnan(values) & ~coded]
+    values = np.where(coded, np.nan, values)
+    if len(given) < 20 or (given != np.round(given)).any():
+        return
+    low, high = np.quantile(given, [0.05, 0.95], method="nearest")
+    width = high - low
+    far = ~np.isnan(values) & ((values > high + width + 1) | (values < low - width - 1))
+    if 0 < width <= 10 and far.any() and far.sum() <= len(given) / 20:
+        named = ", ".join(f"{value:g}" for value in sorted(set(values[far])))
+        inside = given[(given <= high + width + 1) & (given >= low - width - 1)]
+        table.decisions.append(
+            f"'{name}' holds {named} ({name_lines(table, far)}), far from the others ({inside.min():g} to "
+            f"{inside.max():g}); they count: {remedy}"
+        )
+
+
+def _missing_codes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which values are codes for missing that lie where no other value does."""
+    coded = np.isin(values, MISSING_CODES)
+    others = values[~coded & ~np.isnan(values)]
+    if not coded.any() or len(others) < 2:
+        return np.zeros(len(values), dtype=bool)
+    low, high = others.min(), others.max()
+    beyond = (values > high + (high - low) + 1) | (values < low - (high - low) - 1)
+    return np.asarray(coded & (beyond | ((values < 0) & (low >= 0))))
+
+
+def _number(table: TextTable, name: str, text: str) -> float:
+    if text in MISSING_MARKS:
+        return np.nan
+    plain = text.replace(",", ".") if _DECIMAL_COMMA.fullmatch(text) else text
+    try:
+        value = float(plain)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value) or "_" in plain:
+        row = int(np.argmax((table.columns[name] == text).to_numpy()))
+        raise InputError(
+            f"{table.source}: '{name}' should be a number, got '{text}' in line {table.line(row)}"
+        )
+    return value
