@@ -27,6 +27,8 @@ SIGNED_IN_BYTES = 16 * 1024 * 1024
 """Of a JSON body under /api/admin from an account: a definition, or a table of clips."""
 HELD_BYTES = 32 * 1024 * 1024
 """Of all bodies under way in this process, the first `ANONYMOUS_BYTES` of each not counted."""
+QUERY_BYTES, MAX_HEADERS = 8 * 1024, 200
+"""A query of 60 kB or 3,000 headers took the loop, and with it every rater, for 60 ms."""
 BODY_S = 30.0
 UPLOAD_IDLE_S, UPLOAD_GRACE_S, UPLOAD_BYTES_PER_S = 30.0, 60.0, 16 * 1024
 UPLOADS = "/api/admin/uploads"
@@ -41,6 +43,20 @@ class BodyTooLarge(ApiError):
 
     status = 413
     code = "too_large"
+
+
+class AddressTooLong(ApiError):
+    """The address asks for more than any page does."""
+
+    status = 414
+    code = "address_too_long"
+
+
+class TooManyHeaders(ApiError):
+    """The request has more headers than any program sends."""
+
+    status = 431
+    code = "too_many_headers"
 
 
 class BodyTooSlow(ApiError):
@@ -105,11 +121,11 @@ class Door:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        if scope["method"] in ("GET", "HEAD"):
-            await self.app(scope, receive, send)
-            return
         try:
-            if kind_of(scope["method"], scope["path"]) == "upload":
+            _check_head(scope)
+            if scope["method"] in ("GET", "HEAD"):
+                inner = receive
+            elif kind_of(scope["method"], scope["path"]) == "upload":
                 inner = await self._upload(scope, receive)
             else:
                 inner = await self._collected(scope, receive)
@@ -169,6 +185,16 @@ class Door:
             body.limit = SIGNED_IN_BYTES
         if size > body.limit:
             raise too_large(body.limit)
+
+
+def _check_head(scope: Scope) -> None:
+    """Refuse what is slow to read before anything reads it."""
+    if len(scope["query_string"]) > QUERY_BYTES:
+        raise AddressTooLong(
+            f"The address is too long: at most {QUERY_BYTES >> 10} KiB after its ? are read."
+        )
+    if len(scope["headers"]) > MAX_HEADERS:
+        raise TooManyHeaders(f"The request has too many headers: at most {MAX_HEADERS} are read.")
 
 
 def _declared(scope: Scope) -> int:

@@ -6,13 +6,14 @@ import asyncio
 import json
 import time
 import uuid
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from multiprocessing.connection import Connection as Pipe
 from typing import Any
 
+from tools import raw_attacks
 from tools.load_connection import Connection
 
 CONNECTIONS = 16
@@ -137,6 +138,10 @@ def _streaming(path: str, kind: str) -> Attack:
     return lambda target, end: _stream(target, end, path, kind)
 
 
+def _raw(requests: Sequence[bytes], per_second: float) -> Attack:
+    return lambda target, end: raw_attacks.flood(target.port, end, requests, per_second)
+
+
 BROKEN, LARGE = {"device": {"browser": "\ud800"}}, {"device": {"browser": "x" * 30_000}}
 ATTACKS: dict[str, Attack] = {
     "half a surrogate pair, 50/s": _flooding(lambda t: _same("PUT", "/api/run/device", BROKEN, t.run), 50),
@@ -154,6 +159,10 @@ ATTACKS: dict[str, Attack] = {
     "run starts, 10/s": _flooding(lambda t: _starts(t.link), 10),
     "device reports of 30 kB, 50/s": _flooding(lambda t: _same("PUT", "/api/run/device", LARGE, t.run), 50),
     "200 half-sent requests": _slow,
+    "300 streams of one account": lambda target, end: raw_attacks.streams(
+        target.port, end, f"{STUDY}/monitor/stream".encode(), target.owner.encode(), 300
+    ),
+    **{name: _raw(*sent) for name, sent in raw_attacks.REQUESTS.items()},
 }
 """By the name that the table shows."""
 

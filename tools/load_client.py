@@ -16,7 +16,7 @@ from tools.load_connection import Connection
 
 RETRY_S = 0.2
 GIVE_UP_S = 120.0
-NEEDED = ("trial_index", "plays_done", "prompt", "clips", "clip_sha256", "frames", "fps")
+NEEDED = ("trial_index", "kind", "check", "plays_done", "prompt", "clips", "clip_sha256", "frames", "fps")
 
 
 @dataclass
@@ -95,7 +95,10 @@ class LoadRater:
         self.tally.rating_at.append(began)
         self.tally.rating_ms.append(1000 * (time.perf_counter() - began))
         if status in (200, 201):
-            self.tally.acknowledged[rating_id] = body["answer"]["answers"]["rating"]["response"]
+            answer = body["answer"]
+            is_check = answer["kind"] == "check"
+            given = answer["check"] if is_check else answer["answers"]["rating"]["response"]
+            self.tally.acknowledged[rating_id] = given
 
     async def insist(
         self, method: str, path: str, body: Any = None, *, keep: bool = True

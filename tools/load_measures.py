@@ -65,7 +65,9 @@ def stored(server: LoadServer, tally: Tally) -> tuple[int, int]:
     """Acknowledged ratings that are not in the database as sent, and ratings stored twice."""
     with server.services.database.read() as session:
         answers = session.execute(select(Rating.rating_id, Rating.payload))
-        responses = {rating_id: payload["response"] for rating_id, payload in answers}
+        responses = {
+            rating_id: payload.get("response", payload.get("check")) for rating_id, payload in answers
+        }
         plays = session.execute(
             text(
                 "SELECT count(*) FROM (SELECT 1 FROM trial_ratings "

@@ -85,3 +85,12 @@ def test_streams_of_an_account_are_bounded(
         with services.streams.one(account + 1) as others:
             assert others
     assert viewer.get(stream).text.count("event: monitor") == 1
+
+
+def test_heads_that_are_slow_to_read_are_refused(client: TestClient) -> None:
+    for method in ("GET", "POST"):
+        long = client.request(method, "/api/run?" + "a=1&" * 2049)
+        assert (long.status_code, long.json()["error"]["code"]) == (414, "address_too_long")
+        many = client.request(method, "/readyz", headers={f"x-{number}": "a" for number in range(201)})
+        assert (many.status_code, many.json()["error"]["code"]) == (431, "too_many_headers")
+    assert client.get("/readyz?" + "a=1&" * 2000).status_code == 200
