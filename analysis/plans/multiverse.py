@@ -19,7 +19,6 @@ from analysis.report.captions import caption
 from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import p_value, share
-from analysis.report.tables import effect_label
 from analysis.within.anova import AnovaResult
 from analysis.within.cell_means import CellTable
 from analysis.within.simple_effects import SIGNIFICANCE
@@ -203,7 +202,7 @@ def _table(analysis: Analysis, result: Multiverse) -> Table:
     declared = next(universe for universe in result.universes if universe.declared)
     rows = tuple(
         (
-            effect_label(analysis, factors),
+            analysis.labels.effect(factors),
             p_value(declared.p_values[i]),
             _range([p_value(value) for value in _ends(p[:, i])]),
             f"{int((p[:, i] < SIGNIFICANCE).sum())} of {len(p)}",

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 
+TIMES = " × "
+
+
 @dataclass(frozen=True)
 class Labels:
     """What tables call factors and levels; a name without a label is called by its name."""
@@ -33,6 +36,24 @@ class Labels:
     def level(self, factor: str, name: str) -> str:
         """Label of a factor's level."""
         return self.levels.get((factor, name), name)
+
+    def effect(self, factors: Sequence[str]) -> str:
+        """Label of an effect of several factors, or of one."""
+        return TIMES.join(map(self.factor, factors))
+
+    def cell(self, levels: Mapping[str, str]) -> str:
+        """Labels of the levels, by the names of their factors."""
+        return ", ".join(self.level(factor, name) for factor, name in levels.items())
+
+    def pair(self, effect: str, level_a: str, level_b: str) -> str:
+        """Two levels of a margin, where ':' joins the names of several factors and of their levels."""
+        if effect in self.factors or not self.factors:
+            return f"{self.factor(effect)}: {self.level(effect, level_a)} - {self.level(effect, level_b)}"
+        factors = effect.split(":")
+        first, second = (
+            self.cell(dict(zip(factors, level.split(":"), strict=True))) for level in (level_a, level_b)
+        )
+        return f"{self.effect(factors)}: {first} - {second}"
 
 
 def labels_of(experiment: "Experiment") -> Labels:

@@ -93,7 +93,7 @@ def mixed_model(analysis: Analysis) -> Section:
         df = f"{effect.df_effect}, {fixed(effect.df_error, 1)}"
         cells = (fixed(effect.f_value, 3), df, p_value(effect.p_value), p_value(ours.univariate.p_gg))
         holds = (holds_for(effect.effect, random, random_slopes),) if random else ()
-        rows.append((ours.effect, *cells, *holds))
+        rows.append((analysis.labels.effect(ours.factors), *cells, *holds))
     header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)", *(("holds for",) if random else ()))
     notes = (result.formula, *_parts(result.components), *result.notes)
     table = Table(
@@ -146,7 +146,7 @@ def ordinal_model(analysis: Analysis) -> Section:
             p_value(effect.p_value),
             p_value(ours.univariate.p_gg),
         )
-        rows.append((ours.effect, *cells))
+        rows.append((analysis.labels.effect(ours.factors), *cells))
     header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
     notes = (result.formula, f"Thresholds: {thresholds}.", *_parts(result.components), *result.notes)
@@ -185,7 +185,7 @@ def bayes_factors(analysis: Analysis) -> Section:
     rows = []
     for pair in pairs:
         bf = bayes_factor(pair.t, analysis.n_participants, pair.df)
-        name = f"{pair.effect}: {pair.level_a} - {pair.level_b}"
+        name = analysis.labels.pair(pair.effect, pair.level_a, pair.level_b)
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
     header = ("Margin: pair", "t", "BF10", "BF01", "evidence")
     table = Table(

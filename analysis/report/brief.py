@@ -5,7 +5,6 @@ import math
 from analysis.plans.result import Analysis
 from analysis.report.numbers import fixed
 from analysis.report.sentences import effect_p, statistics_in_brief
-from analysis.report.tables import effect_label
 from analysis.within.effect_tests import Effect
 from analysis.within.simple_effects import SIGNIFICANCE
 
@@ -19,7 +18,7 @@ def brief(analysis: Analysis) -> tuple[str, ...]:
     shown = [effect for effect in tested if effect_p(analysis, effect) < SIGNIFICANCE]
     lines = [f"{analysis.n_participants} participants with data in every cell."]
     lines += [_line(analysis, effect) for effect in shown]
-    rest = [effect_label(analysis, effect.factors) for effect in tested if effect not in shown]
+    rest = [analysis.labels.effect(effect.factors) for effect in tested if effect not in shown]
     if rest:
         lines.append(f"No effect was shown, which is no proof of none, of: {', '.join(rest)}.")
     return tuple(lines)
@@ -27,7 +26,7 @@ def brief(analysis: Analysis) -> tuple[str, ...]:
 
 def _line(analysis: Analysis, effect: Effect) -> str:
     kind = "differ by" if len(effect.factors) == 1 else "differ by the interaction of"
-    said = f"Ratings {kind} {effect_label(analysis, effect.factors)}"
+    said = f"Ratings {kind} {analysis.labels.effect(effect.factors)}"
     return f"{said}, {statistics_in_brief(analysis, effect)}{_means(analysis, effect)}."
 
 

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from analysis.plans.result import Analysis
 from analysis.report.contents import Picture
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, in_both_formats, new_figure, write_note
-from analysis.report.tables import effect_label
 from analysis.within.simple_effects import SIGNIFICANCE
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
         )
         p = np.array([universe.p_values for universe in order])
         drawn = _drawn(p[[universe.declared for universe in order]][0])
-        _tests(upper, p[:, drawn], [effect_label(analysis, result.effects[i]) for i in drawn])
+        _tests(upper, p[:, drawn], [analysis.labels.effect(result.effects[i]) for i in drawn])
         _rules(lower, np.array([universe.applied for universe in order]), result.rules)
         declared = next(at for at, universe in enumerate(order) if universe.declared)
         for axes in (upper, lower):

@@ -8,7 +8,6 @@ from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, interval, p_value
 from analysis.report.r_robust import robust_files
-from analysis.report.tables import effect_label
 from analysis.robust.companions import Companions
 from analysis.robust.permutation import PermutationTest
 from analysis.robust.ranks import RankTest
@@ -39,7 +38,7 @@ def _effects(analysis: Analysis, companions: Companions) -> Table:
     ranks = {test.effect: test for test in companions.ranks}
     rows = tuple(
         (
-            effect_label(analysis, effect.factors),
+            analysis.labels.effect(effect.factors),
             p_value(effect.univariate.p_gg),
             p_value(permuted.p_value),
             *_rank_cells(ranks.get(effect.effect)),
@@ -81,9 +80,8 @@ def _pairs(analysis: Analysis, companions: Companions) -> Table:
 
 
 def _pair_cells(analysis: Analysis, pair: TrimmedPair) -> tuple[str, ...]:
-    levels = [analysis.labels.level(pair.effect, name) for name in (pair.level_a, pair.level_b)]
     return (
-        f"{analysis.labels.factor(pair.effect)}: {levels[0]} - {levels[1]}",
+        analysis.labels.pair(pair.effect, pair.level_a, pair.level_b),
         fixed(pair.difference),
         fixed(pair.se, 3),
         fixed(pair.t),

@@ -3,8 +3,10 @@
 import math
 
 from analysis.plans.result import Analysis
+from analysis.report.effect_tables import has_sphericity
 from analysis.report.numbers import apa_p, fixed, share, share_interval
-from analysis.report.tables import corrected_df, effect_label, has_sphericity, uses_multivariate
+from analysis.report.table_cells import corrected_df
+from analysis.report.tables import uses_multivariate
 from analysis.within.effect_tests import Effect, MultivariateTest, UnivariateTest
 from analysis.within.simple_effects import SIGNIFICANCE
 
@@ -17,7 +19,7 @@ def sentences(analysis: Analysis) -> tuple[str, ...]:
 
 def _sentence(analysis: Analysis, effect: Effect, multivariate: bool) -> str:
     kind = "main effect of" if len(effect.factors) == 1 else "interaction of"
-    name = effect_label(analysis, effect.factors)
+    name = analysis.labels.effect(effect.factors)
     p = _p(effect, multivariate)
     if not math.isfinite(p):
         return f"The {kind} {name} could not be tested: {effect.univariate_reason}."

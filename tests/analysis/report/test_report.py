@@ -167,7 +167,7 @@ def test_bayes_factors_stand_beside_the_planned_pairs(tmp_path) -> None:
     section = bayes_factors(analysis_of("exp3", tmp_path, 12))
     (table,) = section.tables
     assert len(table.rows) == 6
-    assert all(row[0].startswith("lower_lid: ") for row in table.rows)
+    assert all(row[0].startswith("Lower-lid motion: ") for row in table.rows)
 
 
 @pytest.mark.parametrize(
