@@ -72,6 +72,7 @@ screenshots: setup-test ## make the pictures of README and docs anew (needs the 
 	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
 	@PYTHONPATH=. $(BIN)/python tools/screenshots_performance.py
 	@$(BIN)/python tools/screenshots_admin.py
+	@$(BIN)/python tools/screenshots_builder.py
 
 scope: setup-test ## what reaches a virtual screen against what is recorded (hours; SCOPE=short, SCOPE="rows --plays 20")
 	@$(BIN)/python -m tools.scope $(SCOPE)

@@ -57,6 +57,10 @@ WATCH_FOR_A_NOTICE = """() => {
 }"""
 """The places of notice, dialog and tabs in the moment that a notice comes: it goes by itself."""
 
+CUT_OFF = """[...document.querySelectorAll(".mantine-SegmentedControl-root")]
+    .filter((choices) => choices.scrollWidth > choices.clientWidth).map((choices) => choices.innerText)"""
+"""Rows of choices whose last ones are not to be seen."""
+
 
 def shoot(dashboard: Dashboard, name: str) -> None:
     folder = os.environ.get("SCREENSHOTS")
@@ -88,6 +92,7 @@ def test_dark_and_narrow(dashboard: Dashboard, name: str) -> None:
         shoot(dashboard, f"{name}-dark-narrow")
         width = page.evaluate("document.documentElement.scrollWidth")
         assert width <= 390, f"the page is {width} px wide on a screen of 390"
+        assert page.evaluate(CUT_OFF) == []
         assert axe_violations(dashboard.page) == []
     finally:
         page.emulate_media(color_scheme="light")

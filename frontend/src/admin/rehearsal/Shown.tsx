@@ -23,12 +23,13 @@ function Part({ title, children }: { title: string; children: ReactNode }) {
 
 export function Summary({ result }: Props) {
   const minutes = result.people.map((person) => person.minutes).sort((one, other) => one - other);
+  const [fewest, most] = [fixed(minutes[0], 1), fixed(minutes.at(-1), 1)];
   return (
     <Part title="Time">
       <Text>
         {result.complete} of {result.participants} came to the end and left {result.answers} answers. By the declared seconds a trial, the
-        trials take {fixed(result.expected_minutes, 1)} minutes; by clips and simulated answers {fixed(minutes[0], 1)} to{" "}
-        {fixed(minutes.at(-1), 1)} minutes, without consent, forms, instructions and breaks.
+        trials take {fixed(result.expected_minutes, 1)} minutes; by clips and simulated answers{" "}
+        {fewest === most ? most : `${fewest} to ${most}`} minutes, without consent, forms, instructions and breaks.
       </Text>
     </Part>
   );

@@ -14,6 +14,9 @@ function shown(fallback: unknown): string {
     : `${typeof fallback === "string" ? fallback : JSON.stringify(fallback)} (default)`;
 }
 
+/** Numbers and choices are short; the help above them is not. */
+const NARROW = { wrapper: "narrow-field" };
+
 export function Flag(props: FieldProps) {
   const { value, fallback, label, help, problem, set } = useField(props);
   const checked = typeof value === "boolean" ? value : fallback === true;
@@ -32,7 +35,7 @@ export function Numeric(props: FieldProps) {
       description={help}
       error={problem}
       required={required}
-      maw={380}
+      classNames={NARROW}
       placeholder={shown(fallback)}
       allowDecimal={!editor.whole}
       {...(editor.maximum === undefined ? {} : { max: editor.maximum })}
@@ -57,7 +60,7 @@ export function Choice(props: FieldProps) {
       description={help}
       error={problem}
       required={required}
-      maw={380}
+      classNames={NARROW}
       placeholder={shown(fallback)}
       data={editor.options.map((option) => ({ value: option, label: option.replaceAll("_", " ") }))}
       value={typeof value === "string" ? value : null}
@@ -97,7 +100,7 @@ export function OneText(props: FieldProps) {
     value: typeof value === "string" ? value : "",
   };
   const change = (text: string) => set(text === "" && !required ? undefined : text);
-  if (offered.length > 0) return <Autocomplete {...common} maw={380} data={[...new Set(offered)]} onChange={change} />;
+  if (offered.length > 0) return <Autocomplete {...common} classNames={NARROW} data={[...new Set(offered)]} onChange={change} />;
   return <TextInput {...common} onChange={(event) => change(event.currentTarget.value)} />;
 }
 
