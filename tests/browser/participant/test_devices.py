@@ -133,6 +133,22 @@ def test_a_browser_that_is_too_old_is_told_so(
     assert "old_browser" in str(server.rows(EVENTS))
 
 
+def test_a_page_whose_every_script_was_lost_can_be_loaded_again(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    page.route("**/assets/participant/*.js*", lambda route: route.abort())
+    page.goto(f"{server.address}/run/{study.link_token}")
+    link = page.get_by_role("link", name="Load the page again")
+    assert not link.is_visible()
+    page.evaluate("document.getAnimations().forEach((one) => one.finish())")
+    assert axe_violations(page) == []
+    page.unroute_all()
+    link.click()
+    page.wait_for_selector("h1")
+
+
 @pytest.fixture
 def insecure(chromium: Browser) -> Iterator[Page]:
     """A page whose address is neither https nor this machine's own name, as in a laboratory without https."""

@@ -77,9 +77,9 @@ export const messages: Messages = {
   distance_title: "Wie weit weg sitzen Sie?",
   distance_text: {
     by: "times",
-    one: "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
+    one: "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste oder den Knopf, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
     other:
-      "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
+      "Sitzen Sie so, wie Sie es in der Studie tun werden. Decken Sie mit der Hand das rechte Auge zu. Schauen Sie mit dem linken Auge auf das Quadrat und nicht davon weg. Drücken Sie die Leertaste oder den Knopf, wenn der Punkt verschwindet. Das wiederholen wir {times} Mal.",
   },
   distance_start: "Beginnen (Leertaste)",
   distance_gone: "Der Punkt ist weg (Leertaste)",
@@ -88,7 +88,7 @@ export const messages: Messages = {
   distance_cm: "Abstand von Ihren Augen zum Bildschirm in Zentimetern",
   distance_bad: "Bitte geben Sie einen Abstand von {minimum} bis {maximum} cm ein.",
   distance_missed:
-    "Diese Runde zählt nicht. Schauen Sie die ganze Zeit auf das Quadrat und drücken Sie die Leertaste, sobald der Punkt verschwindet.",
+    "Diese Runde zählt nicht. Schauen Sie die ganze Zeit auf das Quadrat und drücken Sie die Leertaste oder den Knopf, sobald der Punkt verschwindet.",
 
   preload_title: "Die Filme werden geholt",
   preload_text: "Sie werden vorher geladen, damit jeder ohne Stocken läuft.",

@@ -77,9 +77,9 @@ export const messages = {
   distance_title: "How far away do you sit?",
   distance_text: {
     by: "times",
-    one: "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} time.",
+    one: "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space or the button when the dot disappears. We do this {times} time.",
     other:
-      "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space when the dot disappears. We do this {times} times.",
+      "Sit as you will during the study. Cover your right eye with your hand. With the left eye, look at the square and do not look away. Press Space or the button when the dot disappears. We do this {times} times.",
   },
   distance_start: "Start (Space)",
   distance_gone: "The dot is gone (Space)",
@@ -87,7 +87,7 @@ export const messages = {
   distance_type: "Enter the distance instead",
   distance_cm: "Distance from your eyes to the screen, in centimetres",
   distance_bad: "Please enter a distance from {minimum} to {maximum} cm.",
-  distance_missed: "That round does not count. Keep looking at the square, and press Space as soon as the dot disappears.",
+  distance_missed: "That round does not count. Keep looking at the square, and press Space or the button as soon as the dot disappears.",
 
   preload_title: "Getting the clips",
   preload_text: "They are loaded beforehand, so that each one runs smoothly.",

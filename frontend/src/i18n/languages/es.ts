@@ -78,9 +78,9 @@ export const messages: Messages = {
   distance_title: "¿A qué distancia está sentado?",
   distance_text: {
     by: "times",
-    one: "Siéntese como lo hará durante el estudio. Tápese el ojo derecho con la mano. Con el ojo izquierdo mire el cuadrado y no aparte la vista. Pulse Espacio cuando el punto desaparezca. Lo haremos {times} vez.",
+    one: "Siéntese como lo hará durante el estudio. Tápese el ojo derecho con la mano. Con el ojo izquierdo mire el cuadrado y no aparte la vista. Pulse Espacio o el botón cuando el punto desaparezca. Lo haremos {times} vez.",
     other:
-      "Siéntese como lo hará durante el estudio. Tápese el ojo derecho con la mano. Con el ojo izquierdo mire el cuadrado y no aparte la vista. Pulse Espacio cuando el punto desaparezca. Lo haremos {times} veces.",
+      "Siéntese como lo hará durante el estudio. Tápese el ojo derecho con la mano. Con el ojo izquierdo mire el cuadrado y no aparte la vista. Pulse Espacio o el botón cuando el punto desaparezca. Lo haremos {times} veces.",
   },
   distance_start: "Empezar (Espacio)",
   distance_gone: "El punto ha desaparecido (Espacio)",
@@ -88,7 +88,7 @@ export const messages: Messages = {
   distance_type: "Escribir la distancia en su lugar",
   distance_cm: "Distancia de sus ojos a la pantalla, en centímetros",
   distance_bad: "Escriba una distancia de {minimum} a {maximum} cm.",
-  distance_missed: "Este intento no cuenta. Siga mirando el cuadrado y pulse Espacio en cuanto el punto desaparezca.",
+  distance_missed: "Este intento no cuenta. Siga mirando el cuadrado y pulse Espacio o el botón en cuanto el punto desaparezca.",
 
   preload_title: "Cargando los vídeos",
   preload_text: "Se cargan de antemano, para que cada uno se vea sin saltos.",

@@ -83,9 +83,9 @@ export const messages: Messages = {
   distance_title: "À quelle distance êtes-vous assis ?",
   distance_text: {
     by: "times",
-    one: "Asseyez-vous comme vous le serez pendant l’étude. Couvrez votre œil droit de la main. De l’œil gauche, regardez le carré et ne le quittez pas des yeux. Appuyez sur Espace quand le point disparaît. Nous le faisons {times} fois.",
+    one: "Asseyez-vous comme vous le serez pendant l’étude. Couvrez votre œil droit de la main. De l’œil gauche, regardez le carré et ne le quittez pas des yeux. Appuyez sur Espace ou sur le bouton quand le point disparaît. Nous le faisons {times} fois.",
     other:
-      "Asseyez-vous comme vous le serez pendant l’étude. Couvrez votre œil droit de la main. De l’œil gauche, regardez le carré et ne le quittez pas des yeux. Appuyez sur Espace quand le point disparaît. Nous le faisons {times} fois.",
+      "Asseyez-vous comme vous le serez pendant l’étude. Couvrez votre œil droit de la main. De l’œil gauche, regardez le carré et ne le quittez pas des yeux. Appuyez sur Espace ou sur le bouton quand le point disparaît. Nous le faisons {times} fois.",
   },
   distance_start: "Commencer (Espace)",
   distance_gone: "Le point a disparu (Espace)",
@@ -93,7 +93,7 @@ export const messages: Messages = {
   distance_type: "Saisir plutôt la distance",
   distance_cm: "Distance de vos yeux à l’écran, en centimètres",
   distance_bad: "Veuillez saisir une distance de {minimum} à {maximum} cm.",
-  distance_missed: "Cet essai ne compte pas. Regardez toujours le carré et appuyez sur Espace dès que le point disparaît.",
+  distance_missed: "Cet essai ne compte pas. Regardez toujours le carré et appuyez sur Espace ou sur le bouton dès que le point disparaît.",
 
   preload_title: "Chargement des vidéos",
   preload_text: "Elles sont chargées à l’avance, pour que chacune soit fluide.",

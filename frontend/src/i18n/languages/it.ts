@@ -79,9 +79,9 @@ export const messages: Messages = {
   distance_title: "A che distanza è seduto?",
   distance_text: {
     by: "times",
-    one: "Si sieda come farà durante lo studio. Copra l’occhio destro con la mano. Con l’occhio sinistro guardi il quadrato e non distolga lo sguardo. Prema Spazio quando il punto scompare. Lo facciamo {times} volta.",
+    one: "Si sieda come farà durante lo studio. Copra l’occhio destro con la mano. Con l’occhio sinistro guardi il quadrato e non distolga lo sguardo. Prema Spazio o il pulsante quando il punto scompare. Lo facciamo {times} volta.",
     other:
-      "Si sieda come farà durante lo studio. Copra l’occhio destro con la mano. Con l’occhio sinistro guardi il quadrato e non distolga lo sguardo. Prema Spazio quando il punto scompare. Lo facciamo {times} volte.",
+      "Si sieda come farà durante lo studio. Copra l’occhio destro con la mano. Con l’occhio sinistro guardi il quadrato e non distolga lo sguardo. Prema Spazio o il pulsante quando il punto scompare. Lo facciamo {times} volte.",
   },
   distance_start: "Inizia (Spazio)",
   distance_gone: "Il punto è scomparso (Spazio)",
@@ -89,7 +89,7 @@ export const messages: Messages = {
   distance_type: "Inserisci invece la distanza",
   distance_cm: "Distanza dei Suoi occhi dallo schermo, in centimetri",
   distance_bad: "Inserisca una distanza da {minimum} a {maximum} cm.",
-  distance_missed: "Questo tentativo non conta. Continui a guardare il quadrato e prema Spazio appena il punto scompare.",
+  distance_missed: "Questo tentativo non conta. Continui a guardare il quadrato e prema Spazio o il pulsante appena il punto scompare.",
 
   preload_title: "Caricamento dei video",
   preload_text: "Vengono caricati in anticipo, così che ciascuno scorra senza scatti.",

@@ -75,7 +75,7 @@ export const messages: Messages = {
   distance_text: {
     by: "times",
     other:
-      "調査中と同じ姿勢で座ってください。右目を手で覆い、左目で四角を見つめて、目をそらさないでください。点が消えたらスペースキーを押してください。これを{times}回行います。",
+      "調査中と同じ姿勢で座ってください。右目を手で覆い、左目で四角を見つめて、目をそらさないでください。点が消えたらスペースキーまたはボタンを押してください。これを{times}回行います。",
   },
   distance_start: "始める（スペース）",
   distance_gone: "点が消えた（スペース）",
@@ -83,7 +83,7 @@ export const messages: Messages = {
   distance_type: "代わりに距離を入力する",
   distance_cm: "目から画面までの距離（センチメートル）",
   distance_bad: "{minimum}から{maximum} cmまでの距離を入力してください。",
-  distance_missed: "今の回は数えません。四角を見続け、点が消えたらすぐにスペースキーを押してください。",
+  distance_missed: "今の回は数えません。四角を見続け、点が消えたらすぐにスペースキーまたはボタンを押してください。",
 
   preload_title: "動画を読み込んでいます",
   preload_text: "滑らかに再生できるように、前もって読み込みます。",

@@ -76,9 +76,9 @@ export const messages: Messages = {
   distance_title: "Hoe ver weg zit u?",
   distance_text: {
     by: "times",
-    one: "Ga zitten zoals u tijdens het onderzoek zult zitten. Bedek uw rechteroog met uw hand. Kijk met het linkeroog naar het vierkant en kijk niet weg. Druk op Spatie als de stip verdwijnt. We doen dit {times} keer.",
+    one: "Ga zitten zoals u tijdens het onderzoek zult zitten. Bedek uw rechteroog met uw hand. Kijk met het linkeroog naar het vierkant en kijk niet weg. Druk op Spatie of op de knop als de stip verdwijnt. We doen dit {times} keer.",
     other:
-      "Ga zitten zoals u tijdens het onderzoek zult zitten. Bedek uw rechteroog met uw hand. Kijk met het linkeroog naar het vierkant en kijk niet weg. Druk op Spatie als de stip verdwijnt. We doen dit {times} keer.",
+      "Ga zitten zoals u tijdens het onderzoek zult zitten. Bedek uw rechteroog met uw hand. Kijk met het linkeroog naar het vierkant en kijk niet weg. Druk op Spatie of op de knop als de stip verdwijnt. We doen dit {times} keer.",
   },
   distance_start: "Beginnen (Spatie)",
   distance_gone: "De stip is weg (Spatie)",
@@ -86,7 +86,7 @@ export const messages: Messages = {
   distance_type: "In plaats daarvan de afstand invullen",
   distance_cm: "Afstand van uw ogen tot het scherm, in centimeters",
   distance_bad: "Vul een afstand in van {minimum} tot {maximum} cm.",
-  distance_missed: "Deze ronde telt niet. Blijf naar het vierkant kijken en druk op Spatie zodra de stip verdwijnt.",
+  distance_missed: "Deze ronde telt niet. Blijf naar het vierkant kijken en druk op Spatie of op de knop zodra de stip verdwijnt.",
 
   preload_title: "De filmpjes worden opgehaald",
   preload_text: "Ze worden vooraf geladen, zodat elk vloeiend loopt.",

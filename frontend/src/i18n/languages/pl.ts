@@ -82,11 +82,11 @@ export const messages: Messages = {
   distance_title: "Jak daleko od ekranu?",
   distance_text: {
     by: "times",
-    one: "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację. Robimy to {times} raz.",
-    few: "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację. Robimy to {times} razy.",
-    many: "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację. Robimy to {times} razy.",
+    one: "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację lub przycisk. Robimy to {times} raz.",
+    few: "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację lub przycisk. Robimy to {times} razy.",
+    many: "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację lub przycisk. Robimy to {times} razy.",
     other:
-      "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację. Robimy to {times} razu.",
+      "Proszę usiąść tak jak podczas badania. Proszę zakryć dłonią prawe oko. Lewym okiem proszę patrzeć na kwadrat i nie odwracać wzroku. Gdy kropka zniknie, proszę nacisnąć Spację lub przycisk. Robimy to {times} razu.",
   },
   distance_start: "Rozpocznij (Spacja)",
   distance_gone: "Kropka zniknęła (Spacja)",
@@ -94,7 +94,7 @@ export const messages: Messages = {
   distance_type: "Zamiast tego wpisać odległość",
   distance_cm: "Odległość oczu od ekranu w centymetrach",
   distance_bad: "Proszę wpisać odległość od {minimum} do {maximum} cm.",
-  distance_missed: "Ta próba się nie liczy. Proszę stale patrzeć na kwadrat i nacisnąć Spację, gdy tylko kropka zniknie.",
+  distance_missed: "Ta próba się nie liczy. Proszę stale patrzeć na kwadrat i nacisnąć Spację lub przycisk, gdy tylko kropka zniknie.",
 
   preload_title: "Pobieranie filmów",
   preload_text: "Są ładowane wcześniej, aby każdy szedł płynnie.",

@@ -77,9 +77,9 @@ export const messages: Messages = {
   distance_title: "A que distância está sentado?",
   distance_text: {
     by: "times",
-    one: "Sente-se como vai estar durante o estudo. Tape o olho direito com a mão. Com o olho esquerdo olhe para o quadrado e não desvie o olhar. Prima Espaço quando o ponto desaparecer. Fazemos isto {times} vez.",
+    one: "Sente-se como vai estar durante o estudo. Tape o olho direito com a mão. Com o olho esquerdo olhe para o quadrado e não desvie o olhar. Prima Espaço ou o botão quando o ponto desaparecer. Fazemos isto {times} vez.",
     other:
-      "Sente-se como vai estar durante o estudo. Tape o olho direito com a mão. Com o olho esquerdo olhe para o quadrado e não desvie o olhar. Prima Espaço quando o ponto desaparecer. Fazemos isto {times} vezes.",
+      "Sente-se como vai estar durante o estudo. Tape o olho direito com a mão. Com o olho esquerdo olhe para o quadrado e não desvie o olhar. Prima Espaço ou o botão quando o ponto desaparecer. Fazemos isto {times} vezes.",
   },
   distance_start: "Começar (Espaço)",
   distance_gone: "O ponto desapareceu (Espaço)",
@@ -87,7 +87,7 @@ export const messages: Messages = {
   distance_type: "Em vez disso, escrever a distância",
   distance_cm: "Distância dos seus olhos ao ecrã, em centímetros",
   distance_bad: "Escreva uma distância de {minimum} a {maximum} cm.",
-  distance_missed: "Esta tentativa não conta. Continue a olhar para o quadrado e prima Espaço assim que o ponto desaparecer.",
+  distance_missed: "Esta tentativa não conta. Continue a olhar para o quadrado e prima Espaço ou o botão assim que o ponto desaparecer.",
 
   preload_title: "A carregar os vídeos",
   preload_text: "São carregados antes, para que cada um corra sem saltos.",

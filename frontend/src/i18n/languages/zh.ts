@@ -72,7 +72,7 @@ export const messages: Messages = {
   distance_title: "您坐得有多远？",
   distance_text: {
     by: "times",
-    other: "请按研究中的姿势坐好。用手遮住右眼。左眼注视方块，不要移开视线。圆点消失时按空格键。我们做 {times} 次。",
+    other: "请按研究中的姿势坐好。用手遮住右眼。左眼注视方块，不要移开视线。圆点消失时按空格键或按钮。我们做 {times} 次。",
   },
   distance_start: "开始（空格键）",
   distance_gone: "圆点消失了（空格键）",
@@ -80,7 +80,7 @@ export const messages: Messages = {
   distance_type: "改为输入距离",
   distance_cm: "眼睛到屏幕的距离（厘米）",
   distance_bad: "请输入 {minimum} 到 {maximum} 厘米的距离。",
-  distance_missed: "这一次不算。请一直注视方块，圆点一消失就按空格键。",
+  distance_missed: "这一次不算。请一直注视方块，圆点一消失就按空格键或按钮。",
 
   preload_title: "正在获取短片",
   preload_text: "短片会提前加载，以便每一段都流畅播放。",
