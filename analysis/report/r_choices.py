@@ -1,7 +1,6 @@
 """Scripts in R that compute the reports of pairs and of thresholds anew, and compare."""
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.factors import ItemFactors
 from analysis.pairs.findings import Findings
 from analysis.report.r_script import SCRIPT
-from analysis.report.r_text import as_csv, r_number
+from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
 
 if TYPE_CHECKING:
@@ -39,10 +38,7 @@ def pairs_files(
     shown = factors if findings.factors is not None else None
     text = filled(
         "verify-pairs.R.j2",
-        title=" ".join(title.split()),
-        version=version("palpebra"),
-        script=script,
-        data=data,
+        **head_of_script(title, script, data),
         items=[" ".join(name.split()) for name in comparisons.items],
         ties=ties,
         raters=len(comparisons.participants) > 1,
@@ -130,10 +126,7 @@ def threshold_files(
         printed.append(["p Holm", label, d.p_holm])
     text = filled(
         "verify-thresholds.R.j2",
-        title=" ".join(title.split()),
-        version=version("palpebra"),
-        script=script,
-        data=data,
+        **head_of_script(title, script, data),
         series=[{"key": name, "label": " ".join(one.label.split())} for name, one in fitted.items()],
         shape=example.shape,
         guess=r_number(example.guess),

@@ -1,14 +1,13 @@
 """A script in R that fits the mixed and ordinal models of a report anew, and compares."""
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from analysis.plans.result import Analysis
 from analysis.report.r_script import SCRIPT
-from analysis.report.r_text import as_csv, r_number
+from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
 
 if TYPE_CHECKING:
@@ -45,10 +44,7 @@ def model_files(
     with_df = isinstance(model, MixedResult) and not shared and not model.singular
     text = filled(
         "verify-models.R.j2",
-        title=" ".join(analysis.title.split()),
-        version=version("palpebra"),
-        script=script,
-        data=data,
+        **head_of_script(analysis.title, script, data),
         factors=[{"name": names[name], "levels": len(levels[name])} for name in model.factors],
         slopes=[f"c({slope})" for slope in coded],
         fixed=" * ".join(names.values()),

@@ -1,10 +1,8 @@
 """A script in R that computes the robust companions of a report anew, and compares."""
 
-from importlib.metadata import version
-
 from analysis.plans.result import Analysis
-from analysis.report.r_script import DATA, SCRIPT, factors_in_r, formula_in_r, safe_names
-from analysis.report.r_text import as_csv, r_number
+from analysis.report.r_script import DATA, SCRIPT, design_in_r, safe_names
+from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
 from analysis.robust.companions import Companions
 from analysis.robust.trimmed import TRIM
@@ -19,17 +17,12 @@ def robust_files(analysis: Analysis, companions: Companions, key: str = "") -> d
     design = analysis.anova.between
     text = filled(
         "verify-robust.R.j2",
-        title=" ".join(analysis.title.split()),
-        version=version("palpebra"),
-        script=script,
-        data=data,
-        factors=factors_in_r(analysis, names),
+        **head_of_script(analysis.title, script, data),
+        **design_in_r(analysis, names),
         between=[names[name] for name in (*design.factors, *(c.name for c in design.covariates))],
         terms=[":".join(names[part] for part in term) for term in design.terms[1:]],
         groups=[names[name] for name in design.factors],
         within=[names[name] for name in analysis.anova.factors],
-        formula=formula_in_r(analysis, names),
-        type=analysis.anova.sum_of_squares,
         trim=TRIM,
         permutations=_permutations(analysis, companions, names),
         ranks=_ranks(analysis, companions, names),

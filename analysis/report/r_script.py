@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Sequence
-from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
 from analysis.plans.result import Analysis
 from analysis.report.r_sizes import sizes
-from analysis.report.r_text import as_csv, r_number
+from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
 from analysis.within.simple_effects import SimpleEffect
 
@@ -26,14 +26,9 @@ def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
     names = safe_names(analysis)
     text = filled(
         "verify.R.j2",
-        title=" ".join(analysis.title.split()),
-        version=version("palpebra"),
-        script=script,
-        data=data,
-        factors=factors_in_r(analysis, names),
+        **head_of_script(analysis.title, script, data),
+        **design_in_r(analysis, names),
         within=bool(analysis.anova.factors),
-        formula=formula_in_r(analysis, names),
-        type=analysis.anova.sum_of_squares,
         effects=_effects(analysis, names),
         means=_means(analysis, names),
         pairs=_pairs(analysis, names),
@@ -75,6 +70,15 @@ def _factor(name: str, levels: Sequence[str]) -> dict[str, str]:
 def factors_in_r(analysis: Analysis, names: dict[str, str]) -> list[dict[str, str]]:
     """Every factor's name in R, its levels as text and the codes that stand for them there."""
     return [_factor(names[name], levels) for name, levels in _factors(analysis)]
+
+
+def design_in_r(analysis: Analysis, names: dict[str, str]) -> dict[str, Any]:
+    """What every script of an ANOVA says of its design: factors, formula, type of sums of squares."""
+    return {
+        "factors": factors_in_r(analysis, names),
+        "formula": formula_in_r(analysis, names),
+        "type": analysis.anova.sum_of_squares,
+    }
 
 
 def formula_in_r(analysis: Analysis, names: dict[str, str]) -> str:

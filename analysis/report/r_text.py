@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Iterable, Sequence
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -18,3 +19,8 @@ def as_csv(rows: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
+
+
+def head_of_script(title: str, script: str, data: str) -> dict[str, str]:
+    """What every script says first: of which report it is, who wrote it, its name and its data."""
+    return {"title": " ".join(title.split()), "version": version("palpebra"), "script": script, "data": data}
