@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.number_columns import numbers, unusual_numbers
+from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -81,6 +81,7 @@ def read_long_table(
         _report_copies(table, needed, values)
     measured = {name: numbers(table, name) for name in covariates}
     for name, given in measured.items():
+        unusual_numbers(table, name, given, IN_COVARIATE)
         keep &= _with_covariate(table, participant, name, given)
     if not keep.any():
         raise InputError(f"{path.name}: no participant has a rating and every covariate")

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
-from analysis.read.number_columns import numbers, unusual_numbers
+from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
@@ -65,6 +65,8 @@ def read_model_input(
     unusual_numbers(table, rating, values)
     _refuse_participants_as_items(table, participant, item)
     measured = {name: numbers(table, name) for name in covariates}
+    for name, given in measured.items():
+        unusual_numbers(table, name, given, IN_COVARIATE)
     rows = table.columns.assign(**{rating: values}, **measured)
     keep = ~np.isnan(values)
     decisions = list(table.decisions)

@@ -19,6 +19,8 @@ _COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]+(,[0-9]+)?")
 _HUNDREDS = re.compile(r"[+-]?[1-9][0-9]{2}")
 MISSING_CODES = (-9999.0, -999.0, -99.0, -88.0, -77.0, -9.0, 99.0, 999.0, 9999.0)
 """Numbers by which people mark that there is none."""
+IN_COVARIATE = "correct them or leave them empty"
+"""What to do about unusual numbers where there is no scale that would refuse them."""
 
 
 def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
@@ -98,7 +100,7 @@ def unusual_numbers(
     if coded.any():
         named = ", ".join(f"{value:g}" for value in sorted(set(values[coded])))
         table.decisions.append(
-            f"'{name}' holds {named} ({name_lines(table, coded)}), by which missing ratings are often "
+            f"'{name}' holds {named} ({name_lines(table, coded)}), by which missing values are often "
             f"marked; they count: {remedy}"
         )
     given = values[~np.isnan(values) & ~coded]

@@ -75,7 +75,7 @@ def _of_pairs(experiment: Experiment) -> PlanCommand:
     arguments = ["plan", "pairs", "--abilities", abilities]
     if (repeats := shown // of_items) > 1:
         arguments += ["--repeats", str(repeats)]
-    often = "once" if repeats == 1 else f"{repeats} times"
+    often = {1: "once", 2: "twice"}.get(repeats, f"{repeats} times")
     return PlanCommand(
         arguments,
         f"neighbouring items differ by {STEP} in log odds, each participant compares every two items "

@@ -64,9 +64,14 @@ _WATCHING = {
 }
 
 
+_TASK = {"pairs": "compare two at a time", "just_noticeable": "compare two at a time"}
+"""What is done with the clips, where it is not the rating of each."""
+
+
 def _texts(asked: OwnClips) -> dict[str, str]:
+    task = _TASK.get(asked.template, "rate each of them")
     return {
-        "consent": f"# {asked.title}\n\nYou will watch short clips and rate each of them. "
+        "consent": f"# {asked.title}\n\nYou will watch short clips and {task}. "
         "Taking part is voluntary: you may choose *I do not agree*, and stop at any time with *Stop*. "
         "Your name and internet address are not stored.\n",
         "instructions": f"# What you will do\n\n{_WATCHING[asked.template]}*{asked.question}*\n",

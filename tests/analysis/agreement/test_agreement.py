@@ -155,4 +155,4 @@ def test_codes_for_missing_among_the_answers_are_named(tmp_path) -> None:
     rows = [f"{1 + i % 5},{-99 if i == 4 else 1 + i * i % 5},{1 + i % 4}" for i in range(20)]
     path.write_text("\n".join(["q1,q2,q3", *rows]))
     (said,) = read_items(path, ["q1", "q2", "q3"]).decisions
-    assert "'q2' holds -99 (line 6), by which missing ratings are often marked; they count" in said
+    assert "'q2' holds -99 (line 6), by which missing values are often marked; they count" in said

@@ -115,6 +115,19 @@ def test_a_participant_without_a_covariate_is_left_out_and_named(tmp_path) -> No
     assert "7 participants" in result.output
 
 
+def test_a_code_for_missing_in_a_covariate_is_named(tmp_path) -> None:
+    file = tmp_path / "a.csv"
+    rows = [
+        f"{person},{face},{age},{1 + (person * place) % 5}"
+        for person, age in enumerate((23, -99, 31, 27, 40, 35, 29), 1)
+        for place, face in enumerate("ab", 1)
+    ]
+    file.write_text("\n".join(["id,face,age,y", *rows]), encoding="utf-8")
+    result = anova(file, "--within", "face", "--covariate", "age")
+    assert result.exit_code == 0, result.output
+    assert "'age' holds -99 (lines 4, 5), by which missing values" in " ".join(result.output.split())
+
+
 def test_a_covariate_that_the_groups_determine_is_refused(tmp_path) -> None:
     file = tmp_path / "t.csv"
     file.write_text("id,g,x,y\n" + "".join(f"{i},{'ab'[i % 2]},{i % 2},{i * i % 7}\n" for i in range(8)))

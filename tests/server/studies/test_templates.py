@@ -37,6 +37,9 @@ def test_a_template_is_a_study_that_can_be_taken_part_in(
     made = own_study(experimenter, template, FILES)
     assert made.status_code == 201, made.text
     assert made.json()["design"]["trials_per_participant"] == trials
+    consent = tomllib.loads(made.json()["toml"])["texts"]["en"]["consent"]
+    task = "compare two at a time" if template in ("pairs", "just_noticeable") else "rate each of them"
+    assert f"watch short clips and {task}." in consent
     link = experimenter.send(
         "POST", "/studies/own/links", {"kind": "preview", "labels": [], "count": 1}
     ).json()
