@@ -40,6 +40,7 @@ def prepare(study: str, stamp_text: str) -> None:
     has_database = bool(os.environ.get("DATABASE_URL")) or (DATA / "palpebra.sqlite").is_file()
     if has_database and stamp.is_file() and stamp.read_text() == stamp_text:
         return
+    print(f"[clips] {study}: rendering those that are not there yet", flush=True)
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
     call("server", "study", "add", study, "--clips", str(folder), "--open")
     stamp.write_text(stamp_text)

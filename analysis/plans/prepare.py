@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.errors import NoRatingsError
 from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.plans.plan import Plan, plan_of
-from analysis.read.pool import Pool, pooled
+from analysis.read.pool import Pool, origins, pooled
 from analysis.read.runs_file import RunEvidence, with_verdicts
 from analysis.read.study_answers import StudyAnswers
 from analysis.report.evidence import evidence_section
@@ -86,7 +86,7 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
         )
     checked = replace(answers, rows=rows)
     exclusions = apply_exclusions(experiment, checked)
-    _refuse_nobody(exclusions, answers.source, pool)
+    _refuse_nobody(exclusions, answers, chosen, pool)
     decisions = (*answers.decisions, *pooling, *repeats)
     return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions, checked)
 
@@ -132,10 +132,20 @@ def _without_repeats(
     return rows[~again], (f"{again.sum()} repeated rows of trials already there, counted once",)
 
 
-def _refuse_nobody(exclusions: Exclusions, source: str, pool: Pool) -> None:
+def _refuse_nobody(exclusions: Exclusions, answers: StudyAnswers, chosen: pd.DataFrame, pool: Pool) -> None:
+    source = answers.source
     if not exclusions.n_runs:
         aside = f" (set aside: {'; '.join(exclusions.set_aside)})" if exclusions.set_aside else ""
         raise NoRatingsError(f"{source} has no ratings{pool} yet{aside}")
     if exclusions.rows.empty:
         excluded = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
-        raise NoRatingsError(f"{source}: no participant remains after the declared exclusions: {excluded}")
+        raise NoRatingsError(
+            f"{source}: no participant remains after the declared exclusions: {excluded}"
+            f"{_other_origins(answers.rows, chosen)}"
+        )
+
+
+def _other_origins(rows: pd.DataFrame, chosen: pd.DataFrame) -> str:
+    """What to do where there are answers of origins that were not asked for."""
+    others = sorted(set(origins(rows)) - set(origins(chosen)))
+    return "; answers of other origins: " + ", ".join(f"--origin {name}" for name in others) if others else ""

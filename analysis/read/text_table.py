@@ -13,7 +13,7 @@ from analysis.read.files.cells import Cells
 from analysis.read.files.open import Reader, reader_of
 from analysis.read.files.programs import program_of, trials_only
 from analysis.read.wide import wide_hint
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, nearest
 
 NAMED_ROWS = 5
 
@@ -90,12 +90,17 @@ def _names_to_read(
 ) -> list[str]:
     for name in needed:
         if name not in header:
-            hint = wide_hint(header) or _lines_above(header) or did_you_mean(name, header)
+            hint = wide_hint(header) or _lines_above(header) or _columns_there(name, header)
             raise InputError(f"{source} has no column '{name}'{hint}")
     for name in header:
         if name and header.count(name) > 1 and name in (*needed, *optional):
             raise InputError(f"{source} has two columns called '{name}'; rename one")
     return list(dict.fromkeys([*needed, *(name for name in optional if name in header)]))
+
+
+def _columns_there(name: str, header: Sequence[str]) -> str:
+    near = nearest(name, header)
+    return f"; did you mean '{near}'?" if near else f"; its columns are {', '.join(header)}"
 
 
 def _lines_above(header: Sequence[str]) -> str:

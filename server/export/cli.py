@@ -15,7 +15,7 @@ from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out
 from server.export.extract import ExportOrigin, Extract
-from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed
+from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed, row_count
 from server.export.repository import runs_by_origin
 from server.export.scripts import LANGUAGES, script
 from server.studies.lookup import find_study
@@ -100,11 +100,14 @@ def export(
                 f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
             ) from error
         there = runs_by_origin(session, known)
+        rows = None if form == "codebook" else row_count(form, session, known, extract)
     if str(out_file) != "-":
-        out.print(f"{out_file}: {size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
-    if form not in ("codebook", "identities") and origin != "all" and origin not in there and there:
-        others = ", ".join(f"{number} of origin {name}" for name, number in sorted(there.items()))
-        typer.echo(f"no runs of origin {origin}; there are {others} (--origin)", err=True)
+        counted = "" if rows is None else f"{rows:,} row{'' if rows == 1 else 's'}, "
+        out.print(f"{out_file}: {counted}{size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
+    others = {name: number for name, number in sorted(there.items()) if name != origin}
+    if rows == 0 and form != "identities" and origin != "all" and others:
+        named = ", ".join(f"{number} of origin {name}" for name, number in others.items())
+        typer.echo(f"nothing of origin {origin} to export; there are runs: {named} (--origin)", err=True)
 
 
 def _write_scripts(out_file: Path, experiment: Experiment) -> str:

@@ -99,9 +99,12 @@ def database(services: Services) -> Iterator[Finding]:
     where = opened.url.render_as_string(hide_password=True)
     fine = revision == expected
     said = f"{where}, revision {revision or 'none'}"
-    yield Finding(
-        "database", "ok" if fine else "failed", said, "" if fine else "run: server database upgrade"
-    )
+    advice = "" if fine else "run: server database upgrade"
+    if revision is None:
+        advice = (
+            "it is empty: is this the folder of the study's data (PALPEBRA_DATA_FOLDER)? if so, " + advice
+        )
+    yield Finding("database", "ok" if fine else "failed", said, advice)
     yield from _sqlite(services) if opened.is_sqlite else _postgres(services)
 
 
@@ -207,7 +210,7 @@ def people(services: Services) -> Iterator[Finding]:
     yield Finding("accounts", "ok" if owners else "warning", counted, advice)
     if without:
         advice = "ask them to set it up under their account"
-        yield Finding("second factor", "warning", f"{without} accounts without", advice)
+        yield Finding("second factor", "warning", f"{without} account{'s' * (without > 1)} without", advice)
     advice = "" if studies else "run: server study add exp3 --clips FOLDER"
     yield Finding("studies", "ok" if studies else "warning", str(studies), advice)
 

@@ -26,7 +26,7 @@ def retention(
         bool, typer.Option("--dry-run", help="Show what is due and when more will be; erase nothing.")
     ] = False,
 ) -> None:
-    """Erase what is due by the periods that studies declare under [retention]; the server does so each hour.
+    """Erase what is due by the retention that studies declare; the server does so each hour.
 
     Erased visits are in the ledger of erasures, so that no restore brings them back, and in the audit log.
 

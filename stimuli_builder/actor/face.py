@@ -105,4 +105,4 @@ def lid_distances(points: Values) -> Values:
         along = (eye[5] - eye[0]) * np.sign(eye[5, 0] - eye[0, 0])
         gap = eye[7] - (eye[2] + eye[3]) / 2
         distances.append((along[0] * gap[1] - along[1] * gap[0]) / np.hypot(*along))
-    return np.array(distances)
+    return np.maximum(distances, 0.0)

@@ -40,6 +40,9 @@ from stimuli_builder.blinks.review import (
 from stimuli_builder.blinks.series import read_series
 from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
 
+FEW_BLINKS = 3
+"""Fewer than these say nothing of how far this person's lids close at most."""
+
 
 @dataclass(frozen=True)
 class BlinksJob:
@@ -224,6 +227,11 @@ def _report(
         table.add_row(row["column"], *counts, str(row["rejected"]), *medians, closure)
     console.print(table)
     for row in summaries:
+        if 0 < row["blinks"] < FEW_BLINKS and job.closed is None:
+            console.print(
+                f"{row['column']}: too few blinks to say which are complete: closed is what they themselves "
+                "reach; give --closed where it is known"
+            )
         for refused in row["refused"]:
             console.print(
                 f"{row['column']}: minimum at frame {refused['minimum']} left out: {refused['reason']}"

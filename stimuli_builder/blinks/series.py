@@ -111,7 +111,10 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
     """
     measured = _measured_fps(table, path, uneven=uneven) if "time_s" in table.columns else None
     if fps is None and measured is None:
-        raise InputError(f"{path.name} has no column time_s: give the recording's rate with --fps")
+        raise InputError(
+            f"{path.name} has no column time_s (it has {', '.join(map(str, table.columns))}); expected a "
+            "track, or a series of lid distances and its rate with --fps"
+        )
     if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
         raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
     if fps is not None and measured is not None and abs(fps / measured - 1) > 0.01:
@@ -175,7 +178,10 @@ def make_series(
             "mend the series, or label round the gap with --allow-gaps"
         )
     if np.nanmin(values) < 0:
-        raise InputError(f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g})")
+        raise InputError(
+            f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g}); lids that meet "
+            "are 0 apart: set them to 0, or name another column with --column"
+        )
     lid = tracked_lower_lid(table, column) if column in DISTANCE_COLUMNS else None
     up, nasal = (None, None) if lid is None else (bridge_gaps(coordinate, reach)[0] for coordinate in lid)
     return BlinkSeries(

@@ -189,7 +189,7 @@ def _pictures(job: TrackJob, info: VideoInfo, model: CoupledModel) -> None:
         print(f"{job.preview}: preview written")
     if job.plot is not None:
         count = plot_track(job.out, info.fps, job.plot)
-        print(f"{job.plot}: trace with {count} blinks")
+        print(f"{job.plot}: trace with {count} blink{'' if count == 1 else 's'}")
 
 
 def report_modes(lesson: Lesson) -> None:

@@ -46,7 +46,9 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     out = sources / "short.csv"
     people = run_server_command(settings, "export", "short", "--out", str(out))
     assert people.returncode == 0, people.stderr
-    assert "no runs of origin participant; there are 2 of origin simulated (--origin)" in people.stderr
+    assert "short.csv: 0 rows, " in people.stdout.replace("\n", "")
+    assert "nothing of origin participant to export" in people.stderr
+    assert "there are runs: 2 of origin simulated (--origin)" in people.stderr
     assert len(out.read_text(encoding="utf-8").splitlines()) == 1
     exported = run_server_command(settings, "export", "short", "--origin", "simulated", "--out", str(out))
     assert exported.returncode == 0, exported.stderr

@@ -199,6 +199,10 @@ def test_nothing_to_analyse_is_told_from_bad_input(tmp_path, rows) -> None:
         analyse(tmp_path, rows, pool=Pool(Origin.PARTICIPANT))
     with pytest.raises(NoRatingsError, match="no participant remains"):
         analyse(tmp_path, change(rows, lambda row: True, run_status="withdrawn"))
+    gone = change(rows, lambda row: True, run_status="withdrawn", run_origin="participant")
+    made = [row | {"run": f"{row['run']}-s", "run_origin": "simulated"} for row in rows]
+    with pytest.raises(NoRatingsError, match=r"answers of other origins: --origin simulated$"):
+        analyse(tmp_path, [*gone, *made])
     with pytest.raises(NoRatingsError, match="there is no database"):
         load_database(f"sqlite:///{tmp_path}/none.sqlite", EXP3, READING)
     empty = make_database(tmp_path / "x.sqlite", EXP3, np.full((2, 4, 1), 3), participants=["a", "b"])

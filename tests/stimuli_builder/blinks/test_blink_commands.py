@@ -49,6 +49,23 @@ def test_the_summary_tells_rate_spread_and_histograms(stimuli, series_file, tmp_
     assert max(summary["mean_blink"]["closure"]) > 0.8
 
 
+def test_few_blinks_do_not_tell_how_far_lids_close(stimuli, series_file, tmp_path):
+    pd.read_csv(series_file).head(1000).to_csv(tmp_path / "short.csv", index=False)
+    command = (
+        "blinks",
+        tmp_path / "short.csv",
+        "--column",
+        "gap_l",
+        "--fps",
+        300,
+        "--out",
+        tmp_path / "b.csv",
+    )
+    said = "gap_l: too few blinks to say which are complete"
+    assert said in " ".join(stimuli(*command).out.split())
+    assert said not in " ".join(stimuli(*command, "--closed", 2).out.split())
+
+
 def test_a_real_series_from_the_command_line(stimuli, shared_data, tmp_path):
     series = shared_data / "blink_series" / "espbm_sample_ear_short.csv"
     ended = stimuli("blinks", series, "--column", "EAR_l", "--fps", 240, "--out", tmp_path / "b.csv")
