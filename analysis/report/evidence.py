@@ -43,7 +43,7 @@ def evidence_section(rows: pd.DataFrame, runs: RunEvidence | None) -> tuple[Sect
     ]
     if runs is not None:
         numbers["signals"] = summaries(runs.signals.loc[runs.signals.index.isin(rows["run"].astype(str))])
-        tables.append(_signals(numbers["signals"]))
+        tables += [_signals(numbers["signals"])] if numbers["signals"] else []
     return Section(TITLE, ABOUT, tuple(tables)), numbers
 
 

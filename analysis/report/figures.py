@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -18,10 +18,7 @@ from analysis.plans.result import Analysis
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, write_note
 from analysis.within.marginal_means import level_combinations, margin
 from experiments.error_bars import within_participant_errors
-from experiments.trials.scales import scale_called
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+from experiments.trials.scales import RatedScale, scale_called
 
 Floats = NDArray[np.float64]
 
@@ -207,9 +204,8 @@ def _jitter(n: int) -> Floats:
     return spread
 
 
-def _asked(experiment: "Experiment") -> str:
+def _asked(scale: RatedScale, language: str) -> str:
     """What the axis of ratings is called: the ends of the scale as participants read them."""
-    scale, language = scale_called(experiment), experiment.languages[0]
     low = f"{scale.minimum:g} {scale.low.get(language, '')}".strip()
     high = f"{scale.maximum:g} {scale.high.get(language, '')}".strip()
     return f"Rating ({low} – {high})"
@@ -218,9 +214,10 @@ def _asked(experiment: "Experiment") -> str:
 def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_title(spec.title, fontsize=10, loc="left")
     axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
-    axes.set_ylabel(_asked(analysis.experiment) if analysis.experiment else analysis.rating)
+    axes.set_ylabel(analysis.rating)
     if analysis.experiment is not None:
         scale = scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
+        axes.set_ylabel(_asked(scale, analysis.experiment.languages[0]))
         margin = (scale.maximum - scale.minimum) / 30
         axes.set_ylim(scale.minimum - margin, scale.maximum + margin)
         if scale.type == "points":

@@ -74,7 +74,10 @@ def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> No
         assert np.mean(main) == pytest.approx(np.mean(mine))
     assert numbers["cronbach_alpha"]["alpha"] == pytest.approx(alpha_of(rows))
     assert numbers["cronbach_alpha"]["alpha"] > 0.5
-    assert len(list(out.glob("*.svg"))) >= len(SCALES)
+    figures = {path.name.split("-")[0]: path.read_text(encoding="utf-8") for path in out.glob("*.svg")}
+    assert figures.keys() == {scale.name for scale in SCALES}
+    assert "Rating (1 not at all – 5 very)" in figures["naturalness"]
+    assert "Rating (0 wide awake – 100 very tired)" in figures["tiredness"]
 
 
 def test_each_scale_has_its_companions_models_and_multiverse(tmp_path, rows) -> None:

@@ -69,6 +69,12 @@ def test_counts_and_signals_stand_in_page_and_numbers(answers, runs, tmp_path) -
     assert "rt_median" in (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
 
 
+def test_runs_without_signals_have_no_table_of_them(answers, runs) -> None:
+    contents = study_contents(RULE, answers, runs=replace(runs, signals=runs.signals.iloc[:0]))
+    assert contents.evidence is not None
+    assert [table.key for table in contents.evidence.tables] == ["evidence-verdicts"]
+
+
 def test_data_from_before_there_were_verdicts_say_so(answers) -> None:
     older = replace(answers, rows=answers.rows.drop(columns="evidence_verdict"))
     contents = study_contents(RULE, older)
