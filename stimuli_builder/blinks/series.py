@@ -113,7 +113,7 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
     if fps is None and measured is None:
         raise InputError(
             f"{path.name} has no column time_s (it has {', '.join(map(str, table.columns))}); expected a "
-            "track, or a series of lid distances and its rate with --fps"
+            "track, or lid distances: give the recording's rate with --fps"
         )
     if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
         raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
