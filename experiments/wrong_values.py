@@ -36,10 +36,10 @@ LIMITS: dict[str, Callable[[Context], str]] = {
     "less_than_equal": lambda limit: f"at most {_number(limit['le'])}",
     "multiple_of": lambda limit: f"a multiple of {_number(limit['multiple_of'])}",
     "string_pattern_mismatch": lambda limit: f"a text that matches {limit['pattern']}",
-    "string_too_short": lambda limit: f"a text of {_counted(limit['min_length'], 'character')} or more",
-    "string_too_long": lambda limit: f"a text of at most {_counted(limit['max_length'], 'character')}",
-    "too_short": lambda limit: f"a list of {_counted(limit['min_length'], 'item')} or more",
-    "too_long": lambda limit: f"a list of at most {_counted(limit['max_length'], 'item')}",
+    "string_too_short": lambda limit: f"a text of {counted(limit['min_length'], 'character')} or more",
+    "string_too_long": lambda limit: f"a text of at most {counted(limit['max_length'], 'character')}",
+    "too_short": lambda limit: f"a list of {counted(limit['min_length'], 'item')} or more",
+    "too_long": lambda limit: f"a list of at most {counted(limit['max_length'], 'item')}",
 }
 
 
@@ -142,5 +142,6 @@ def _number(limit: float | str) -> str:
     return f"{limit:,}" if limit != int(limit) else f"{int(limit):,}"
 
 
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+def counted(number: int, noun: str) -> str:
+    """How many of what, such as `1 item`, `2,000 items`."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

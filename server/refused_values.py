@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.wrong_values import expectation, shown
+from experiments.wrong_values import counted, expectation, shown
 
 JSON_WORDS = {"a table": "an object", "a text in quotes": "a text"}
 """Words of TOML and what the same is called in a request."""
@@ -51,15 +51,11 @@ def _problem(detail: Mapping[str, Any]) -> str:
 
 def _kind(given: Any) -> str:
     if isinstance(given, str):
-        return f"a text of {_counted(len(given), 'character')}"
+        return f"a text of {counted(len(given), 'character')}"
     if isinstance(given, list | tuple):
-        return f"a list of {_counted(len(given), 'item')}"
+        return f"a list of {counted(len(given), 'item')}"
     if isinstance(given, bool):
         return "true" if given else "false"
     if given is None:
         return "nothing"
     return "a number" if isinstance(given, int | float) else "an object"
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -13,7 +13,7 @@ from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
 from stimuli_builder.tracking.picture import reduced, restored_points
 from stimuli_builder.tracking.search import Finder
-from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, eye_spans, inter_eyelid_distances
+from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, inter_eyelid_distances, widths
 from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
 from stimuli_builder.video import Picture
 
@@ -95,9 +95,7 @@ def _held_out(
     restored = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
     errors = inter_eyelid_distances(restored, model.markers) - inter_eyelid_distances(label, model.markers)
     away = np.hypot(*(restored - label).T)
-    spans = eye_spans(label)
-    width = float(np.hypot(spans[:, 0], spans[:, 1]).mean())
-    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away, width)
+    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away, widths(label))
 
 
 def _rms(differences: Points) -> float:

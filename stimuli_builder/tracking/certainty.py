@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from stimuli_builder.tracking.accuracy import HeldOut
 from stimuli_builder.tracking.fit import Fit
 from stimuli_builder.tracking.model import CoupledModel, believing
-from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, eye_axis, eye_spans
+from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, eye_axis, widths
 
 Values = NDArray[np.float64]
 
@@ -96,12 +96,6 @@ def doubt(
     if rms > DOUBTFUL_SHARE * width:
         return f"the picture fits badly: stated error {rms:.1f} px is {rms / width:.0%} of the eye's width"
     return ""
-
-
-def widths(points: Points) -> float:
-    """Mean width of the eyes, canthus to canthus, in pixels."""
-    spans = eye_spans(points)
-    return float(np.hypot(spans[:, 0], spans[:, 1]).mean())
 
 
 def jump_px(points: Points, before: Points) -> float:

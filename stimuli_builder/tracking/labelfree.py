@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.certainty import widths
 from stimuli_builder.tracking.detector.detection import LidDetector
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.labels import Labels, save_labels
@@ -23,6 +22,7 @@ from stimuli_builder.tracking.shapes import (
     mean_shape,
     moved,
     similarity_between,
+    widths,
 )
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 

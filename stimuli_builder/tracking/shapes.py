@@ -48,9 +48,7 @@ def eye_axis(eye: Points) -> tuple[Points, Points, float]:
     eye : (9, 2) array
         In pixels.
     """
-    span = eye[CANTHI[1]] - eye[CANTHI[0]]
-    if span[0] < 0:
-        span = -span
+    (span,) = eye_spans(eye)
     width = float(np.hypot(*span))
     along = span / width
     return along, np.array([-along[1], along[0]]), width
@@ -67,6 +65,12 @@ def eye_spans(points: Points) -> Points:
     eyes = points.reshape(-1, EYE_POINTS, 2)
     spans = eyes[:, CANTHI[1]] - eyes[:, CANTHI[0]]
     return np.asarray(np.where(spans[:, :1] < 0, -spans, spans))
+
+
+def widths(points: Points) -> float:
+    """Mean width of the eyes, canthus to canthus, in pixels."""
+    spans = eye_spans(points)
+    return float(np.hypot(spans[:, 0], spans[:, 1]).mean())
 
 
 def inter_eyelid_distances(points: Points, markers: LidMarkers) -> NDArray[np.float64]:

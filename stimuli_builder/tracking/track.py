@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors, widths
+from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
 from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.picture import reduced, reduced_points, restored_points
@@ -23,6 +23,7 @@ from stimuli_builder.tracking.shapes import (
     inter_eyelid_distances,
     similarity_between,
     unmoved,
+    widths,
     with_border,
 )
 from stimuli_builder.tracking.table import TrackWriter

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
-from stimuli_builder.tracking.certainty import lid_difference, widths, with_errors
+from stimuli_builder.tracking.certainty import lid_difference, with_errors
 from stimuli_builder.tracking.detector.detection import along, eye_points
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.labelfree import (
@@ -26,6 +26,7 @@ from stimuli_builder.tracking.labelfree import (
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
+from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.track import FROZEN, Tracker, track_video
 from stimuli_builder.video import frames, rgb, scan_video
 
