@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn, Protocol, cast
 
 from experiments.errors import InputError
+from experiments.wrong_values import expectation, wrong_value
 
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 """What a disk says that is full or may not be written to."""
@@ -18,6 +19,7 @@ class WrongCall(Protocol):
 
     exit_code: int
     ctx: Any
+    __cause__: BaseException | None
 
     def format_message(self) -> str:
         """What is wrong, without the usage."""
@@ -48,11 +50,23 @@ def run_command_line(app: Callable[..., object]) -> None:
 
 
 def _wrong_call(error: WrongCall) -> str:
-    message = error.format_message()
+    message = _refused_option(error) or error.format_message()
     if not message or "\n" in message:  # a command without its subcommand: the help itself
         return message and message + "\n"
     path = error.ctx.command_path if getattr(error, "ctx", None) is not None else ""
     return f"error: {message.rstrip('.')}{f'; see {path} --help' if path else ''}\n"
+
+
+def _refused_option(error: WrongCall) -> str:
+    """A value refused for its type or limit, in the words of refused declarations; else empty."""
+    errors = getattr(error.__cause__, "errors", None)  # pydantic's, where Typer loaded it: it is slow to load
+    param = getattr(error, "param", None)
+    if errors is None or param is None:
+        return ""
+    (detail, *_) = errors()
+    option = " / ".join(param.opts) if param.param_type_name == "option" else param.human_readable_name
+    problem = wrong_value(detail) if expectation(detail) else detail["msg"].removeprefix("Value error, ")
+    return f"{option}: {problem.rstrip('.')}"
 
 
 def _say_disk(error: Exception) -> NoReturn:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from experiments.counted import counted
 from experiments.errors import did_you_mean
 
 MAX_SHOWN = 60
@@ -140,8 +141,3 @@ def _number(limit: float | str) -> str:
     if isinstance(limit, str):  # a point in time
         return limit
     return f"{limit:,}" if limit != int(limit) else f"{int(limit):,}"
-
-
-def counted(number: int, noun: str) -> str:
-    """How many of what, such as `1 item`, `2,000 items`."""
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"

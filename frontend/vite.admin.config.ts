@@ -9,6 +9,7 @@ export default defineConfig({
   build: {
     outDir: "../../dist/admin",
     emptyOutDir: true,
+    rolldownOptions: { checks: { bundlerTimings: false } },
     assetsDir: "",
     assetsInlineLimit: 0,
     target: "es2022",

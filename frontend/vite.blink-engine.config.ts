@@ -5,6 +5,7 @@ export default defineConfig({
   build: {
     outDir: "dist/blink-engine",
     emptyOutDir: true,
+    rolldownOptions: { checks: { bundlerTimings: false } },
     target: "es2022",
     lib: { entry: "src/blink-engine/index.ts", formats: ["es"], fileName: () => "index.js" },
   },

@@ -51,6 +51,7 @@ export default defineConfig({
     sourcemap: false,
     manifest: true,
     rolldownOptions: {
+      checks: { bundlerTimings: false },
       input: { index: "src/participant/index.html", [OFFLINE]: "src/participant/service-worker.ts" },
       output: {
         entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : NAMED),

@@ -5,6 +5,7 @@ export default defineConfig({
   build: {
     outDir: "dist/playground",
     emptyOutDir: true,
+    rolldownOptions: { checks: { bundlerTimings: false } },
     target: "es2022",
     cssCodeSplit: false,
     lib: {

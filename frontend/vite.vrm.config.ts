@@ -5,6 +5,7 @@ export default defineConfig({
   build: {
     outDir: "dist/vrm",
     emptyOutDir: true,
+    rolldownOptions: { checks: { bundlerTimings: false } },
     target: "es2022",
     chunkSizeWarningLimit: 2000,
     lib: { entry: "src/demos/vrm/main.ts", formats: ["iife"], name: "vrm", fileName: () => "vrm.js", cssFileName: "vrm" },

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from server.cli_common import migrated_services, out
 from server.db import open_database
@@ -55,7 +56,7 @@ def recount() -> None:
     """
     with migrated_services() as services:
         mended, runs = repair(services.database, services.versions)
-    out.print(f"{runs} runs counted, {mended} mended")
+    out.print(f"{counted(runs, 'run')} counted, {mended} mended")
 
 
 @app.command("rewrap")
@@ -94,4 +95,4 @@ def erase_again() -> None:
     """
     with migrated_services() as services, services.database.write() as session:
         erased = replay(session, services.settings)
-    out.print(f"{erased} runs erased")
+    out.print(f"{counted(erased, 'run')} erased")

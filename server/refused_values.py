@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.wrong_values import counted, expectation, shown
+from experiments.counted import counted
+from experiments.wrong_values import expectation, shown
 
 JSON_WORDS = {"a table": "an object", "a text in quotes": "a text"}
 """Words of TOML and what the same is called in a request."""

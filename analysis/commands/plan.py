@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 SizesOption = Annotated[
     str, typer.Option("--n", help="Numbers of participants: first:last:step, or 20,30,43.")
 ]
-SimulationsOption = Annotated[int, typer.Option(help="Data sets a number of participants.")]
-AlphaOption = Annotated[float, typer.Option(help="Level of the tests.")]
+SimulationsOption = Annotated[int, typer.Option(help="Data sets a number of participants.", min=1)]
+AlphaOption = Annotated[float, typer.Option(help="Level of the tests.", min=1e-6, max=0.5)]
 PowerOption = Annotated[float, typer.Option("--power", help="Power to look for.", min=0.01, max=0.999)]
 SeedOption = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
 PlotOption = Annotated[

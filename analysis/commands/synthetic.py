@@ -50,7 +50,7 @@ def power(
         str, typer.Argument(help="exp1 to exp3; or another study of ratings, with --effect.")
     ],
     n: Annotated[str, typer.Option("--n", help="Sample sizes: first:last:step, or 20,30,43.")] = "10:60:5",
-    simulations: Annotated[int, typer.Option(help="Data sets a sample size.")] = 1000,
+    simulations: Annotated[int, typer.Option(help="Data sets a sample size.", min=1)] = 1000,
     alpha: Annotated[float, typer.Option(help="Level of the tests.")] = 0.05,
     statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = StatisticChoice.MULTIVARIATE,
     scale: Annotated[

@@ -12,6 +12,7 @@ from itertools import islice
 from typing import Literal
 from urllib.parse import urlsplit
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from server.context import Services
 from server.identities.repository import readable
@@ -145,10 +146,13 @@ def counts(services: Services) -> Iterator[Finding]:
     if wrong:
         advice = "run: server database recount"
         yield Finding(
-            "counts", "failed", f"of {wrong} of {compared.runs} runs differ from their ratings", advice
+            "counts",
+            "failed",
+            f"of {wrong} of {counted(compared.runs, 'run')} differ from their ratings",
+            advice,
         )
     else:
-        yield Finding("counts", "ok", f"of {compared.runs} runs, as their ratings")
+        yield Finding("counts", "ok", f"of {counted(compared.runs, 'run')}, as their ratings")
 
 
 def identities(services: Services) -> Iterator[Finding]:

@@ -49,7 +49,7 @@ def copy_database(
 def _copy(source: Database, target: Database, told: Callable[[str, Content], None]) -> dict[str, Content]:
     copied: dict[str, Content] = {}
     with snapshot(source) as reading, target.write_connection() as writing:
-        refuse_unless_empty(writing, address(target.url.render_as_string()))
+        refuse_unless_empty(writing, address(target.url.render_as_string()), "give an empty database")
         into = {table.name: table for table in tables_of(writing)}
         for table in tables_of(reading):
             written = write_rows(writing, into[table.name], read_rows(reading, table))

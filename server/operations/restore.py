@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from sqlalchemy import Connection, Table
 from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from server.context import Services
 from server.migrate import alembic_config, known_revision
@@ -29,6 +30,12 @@ from server.runs.erasure import replay
 from server.settings import Settings
 
 FORMAT = 1
+
+ELSEWHERE = (
+    "a backup comes back into an empty one: name a new folder in PALPEBRA_DATA_FOLDER, or an empty "
+    "PostgreSQL database in DATABASE_URL, restore there and start the server with the same settings"
+)
+"""What to do where the database of the settings is in use."""
 
 
 def restore(
@@ -95,7 +102,7 @@ def _erase_again(services: Services, told: Callable[[str], None]) -> None:
         return
     with services.database.write() as session:
         erased = replay(session, services.settings)
-    told(f"{erased} runs erased again, by {path}")
+    told(f"{counted(erased, 'run')} erased again, by {path}")
 
 
 def _description(tar: tarfile.TarFile, path: Path) -> Description:
@@ -138,7 +145,7 @@ def _restore_rows(
     told: Callable[[str], None],
 ) -> None:
     with services.database.write_connection() as connection:
-        refuse_unless_empty(connection, "the database")
+        refuse_unless_empty(connection, "the database", ELSEWHERE)
         command.upgrade(alembic_config(connection), described.revision)
         known = {table.name: table for table in tables_of(connection)}
         for name in _in_order(known, described):

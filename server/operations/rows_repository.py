@@ -74,11 +74,11 @@ def content_of(connection: Connection, table: Table) -> Content:
     return digest.content()
 
 
-def refuse_unless_empty(connection: Connection, what: str) -> None:
-    """InputError where any table holds a row."""
+def refuse_unless_empty(connection: Connection, what: str, way_out: str) -> None:
+    """InputError, with what to do instead, where any table holds a row."""
     for table in tables_of(connection):
         if connection.scalar(select(func.count()).select_from(table)):
-            raise InputError(f"{what} already holds rows (table {table.name}); give an empty database")
+            raise InputError(f"{what} already holds rows (table {table.name}); {way_out}")
 
 
 def _next_ids(connection: Connection, table: Table) -> None:

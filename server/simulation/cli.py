@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from server.app import create_app
 from server.cli_common import migrated_services, out
@@ -99,7 +100,9 @@ def simulate(
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise InputError(f"the server refused a simulated participant: {error}") from error
             advance()
-    out.print(f"study {study}: {participants} simulated participants, {ratings} ratings")
+    out.print(
+        f"study {study}: {counted(participants, 'simulated participant')}, {counted(ratings, 'rating')}"
+    )
 
 
 def _as(

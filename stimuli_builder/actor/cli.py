@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from experiments.counted import counted
+
 if TYPE_CHECKING:
     from stimuli_builder.actor.recording import Actor
 
@@ -54,7 +56,8 @@ def actor(
         task = progress.add_task("drawing", total=options.frame_count)
         write_video(person, out, lambda: progress.advance(task))
     print(
-        f"{out}: {options.frame_count:,} frames at {fps:g} frames/s, {int(person.course.blink.max())} blinks"
+        f"{out}: {counted(options.frame_count, 'frame')} at {fps:g} frames/s, "
+        f"{counted(int(person.course.blink.max()), 'blink')}"
     )
     if truth is not None:
         write_truth(person, truth)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from experiments.counted import counted
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.plots import sequence_figure, series_figure
 from stimuli_builder.blinks.profile import Array
@@ -160,7 +161,7 @@ def pair_lines(accepted: pd.DataFrame) -> list[str]:
     first = pairs[pairs["column"] == columns[0]]
     alone = [int((accepted["column"] == c).sum() - (pairs["column"] == c).sum()) for c in columns]
     lines = [
-        f"{len(first)} blinks in both eyes; {alone[0]} in {columns[0]} alone, "
+        f"{counted(len(first), 'blink')} in both eyes; {alone[0]} in {columns[0]} alone, "
         f"{alone[1]} in {columns[1]} alone"
     ]
     if len(first):

@@ -9,6 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from experiments.counted import counted
 from experiments.errors import InputError, did_you_mean
 from experiments.files import temporary_beside, whole_text
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
@@ -93,12 +94,14 @@ def sample_blinks(
     made = draw(_model(model_path, pca), count, duration, seed, full_closure=full_closure)
     if plot is not None:
         shown = [replace(p, source=p.profile_id) for p in made[:8]]
-        save_figure(profiles_figure(shown, f"{len(shown)} blinks made by the model, seed {seed}"), plot)
+        save_figure(
+            profiles_figure(shown, f"{counted(len(shown), 'blink')} made by the model, seed {seed}"), plot
+        )
     write_profile_table(out, made)
     frames = [profile.duration_frames_30fps for profile in made]
     closures = [float(profile.closure.max()) for profile in made]
     Console().print(
-        f"{count} blinks of {min(frames):.1f} to {max(frames):.1f} frames at 30 fps, "
+        f"{counted(count, 'blink')} of {min(frames):.1f} to {max(frames):.1f} frames at 30 fps, "
         f"closure {min(closures):.2f} to {max(closures):.2f}; wrote {out}"
     )
 
@@ -166,7 +169,10 @@ def export_curve(job: ExportJob) -> None:
     text = write_curve(job.format_name, curve, job.names)
     with whole_text(job.out) as stream:
         stream.write(text)
-    Console().print(f"{len(curve.blinks)} blinks, {curve.left.size} frames at {rate:g} fps; wrote {job.out}")
+    Console().print(
+        f"{counted(len(curve.blinks), 'blink')}, {counted(curve.left.size, 'frame')} at {rate:g} fps; "
+        f"wrote {job.out}"
+    )
 
 
 def _check_export(job: ExportJob) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from experiments.counted import counted
 from experiments.errors import InputError, did_you_mean
 from experiments.files import whole_file
 from stimuli_builder.blinks.blink_model import BlinkModel
@@ -131,7 +132,7 @@ def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":
         for closure in closures:
             blinks.plot(time_ms, 1 - closure, color=BLUE, lw=0.7, alpha=0.45)
         blinks.plot(time_ms, 1 - closures.mean(axis=0), color=RED, lw=2.2, label="mean")
-        blinks.set_title(f"{title}: {len(profiles)} blinks", loc="left", fontsize=10)
+        blinks.set_title(f"{title}: {counted(len(profiles), 'blink')}", loc="left", fontsize=10)
         blinks.legend(frameon=False, loc="lower right")
         _tidy(blinks, "time from the minimum (ms)", "opening (1 = open)")
         lengths = np.array([profile.duration_frames_30fps for profile in profiles])
@@ -141,8 +142,8 @@ def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":
             [p.closure.max() for p in profiles], np.linspace(0, 1, AMPLITUDE_BINS + 1), color=BLUE, rwidth=0.9
         )
         _tidy(amplitudes, "greatest closure", "blinks")
-        for counted in (durations, amplitudes):
-            counted.yaxis.get_major_locator().set_params(integer=True)
+        for histogram in (durations, amplitudes):
+            histogram.yaxis.get_major_locator().set_params(integer=True)
     return figure
 
 

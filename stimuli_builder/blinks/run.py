@@ -11,6 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from experiments.files import check_targets
 from stimuli_builder.blinks.events.recognise import recognise
@@ -252,5 +253,6 @@ def _report(
     events = job.events if job.classify else None
     written = [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, job.plot_aligned]
     console.print(
-        f"{len(frame)} blinks; wrote " + ", ".join(str(path) for path in written if path is not None)
+        f"{counted(len(frame), 'blink')}; wrote "
+        + ", ".join(str(path) for path in written if path is not None)
     )

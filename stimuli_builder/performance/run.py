@@ -9,6 +9,7 @@ from rich.console import Console
 
 from blink_engine import Performance, StateName, default_parameters, perform
 from blink_engine.speech import Speech, speech_events, speech_states
+from experiments.counted import counted
 from experiments.errors import InputError, did_you_mean
 from experiments.files import check_targets, whole_text
 from stimuli_builder.blinks.export.curve import AnimationCurve
@@ -66,7 +67,7 @@ def write_performance(job: PerformanceJob) -> None:
     spoken_s = sum(one.end_s - one.start_s for one in stretches)
     heard = f"{spoken_s:.1f} s of speech in {len(stretches)} stretches; " if stretches else ""
     Console().print(
-        f"{heard}{len(done.blinks)} blinks in {duration_s:.1f} s, {done.left.size} frames at "
+        f"{heard}{counted(len(done.blinks), 'blink')} in {duration_s:.1f} s, {done.left.size} frames at "
         f"{job.fps:g} fps; wrote {job.out}"
     )
     if job.source is not None and not stretches:

@@ -1,6 +1,7 @@
 """What `stimuli track` does: one video, or every video of a folder."""
 
 import sys
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -54,7 +55,9 @@ def run_track(job: TrackJob) -> None:
 
 
 def _track(job: TrackJob, info: VideoInfo) -> None:
+    started = time.monotonic()
     model, hints = _model(job, info)
+    prepared_s = time.monotonic() - started
     with frame_progress() as progress:
         task = progress.add_task("tracking", total=info.frame_count)
         summary = track_video(
@@ -64,7 +67,7 @@ def _track(job: TrackJob, info: VideoInfo) -> None:
             lambda now: progress.update(task, completed=now.frames, refresh=False),
             hints,
         )
-    _report(job.out, summary)
+    _report(job.out, summary, prepared_s)
     if job.accept_damaged_end:
         _say_how_far(info)
     if job.relabel is not None:
@@ -152,7 +155,7 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[i
         seen = survey(info, one_eye=job.one_eye, advance=lambda now: progress.update(task, completed=now))
     line = f"eyes found on {len(seen.points):,} of {seen.looked_at:,} frames looked at"
     more = f"; {seen.several_faces:,} show several faces, the largest is taken" if seen.several_faces else ""
-    print(line + more)
+    print(f"{line}{more}; training on them", flush=True)
     lesson = label_free_lesson(info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand)
     report_modes(lesson)
     return lesson.model, seen.points
@@ -171,13 +174,14 @@ def _relabel(
     print(f"{path}: {new} frames to correct on the labelling page; run the same command again then")
 
 
-def _report(out: Path, summary: TrackSummary) -> None:
+def _report(out: Path, summary: TrackSummary, prepared_s: float) -> None:
     print(
         f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
         f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
         f"{summary.lost:,} lost\n"
         f"{summary.fit_fps:,.0f} frames/s fit only, "
-        f"{summary.end_to_end_fps:,.0f} frames/s with decoding"
+        f"{summary.end_to_end_fps:,.0f} frames/s with decoding; "
+        f"{summary.total_s:,.1f} s after {prepared_s:,.1f} s for the model"
     )
 
 

@@ -15,8 +15,13 @@ BIN = Path(sys.executable).parent
         (("analysis", "anova", "--nope"), "No such option: --nope"),
         (("analysis", "anvoa"), "anvoa"),
         (("stimuli", "build"), "Missing argument 'experiment'; see stimuli build --help"),
-        (("stimuli", "clip", "--fps", "fast", "--out", "x.mp4"), "Invalid value for '--fps'"),
-        (("server", "run", "--port", "abc"), "Invalid value for '--port'"),
+        (
+            ("stimuli", "clip", "--fps", "fast", "--out", "x.mp4"),
+            "expected a whole number, got 'fast'",
+        ),
+        (("server", "run", "--port", "abc"), "--port: expected a whole number, got 'abc'"),
+        (("server", "simulate", "exp3", "--participants", "0"), "expected 1 or more, got '0'; see server"),
+        (("analysis", "plan", "anova", "--statistic", "wilks"), "--statistic: 'wilks' is not one of 'multi"),
     ],
 )
 def test_a_wrong_call_is_one_line(call: tuple[str, ...], line: str, tmp_path: Path) -> None:

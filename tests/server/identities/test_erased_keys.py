@@ -233,7 +233,7 @@ def test_the_ledger_goes_along_so_that_a_new_machine_erases_again(
     experimenter.send("POST", f"/studies/short/runs/{run}/erase", {"confirm": run})
     back_up(services, tmp_path / "b" / "newer.tar", with_clips=False)
     again, lines = restored(older, f"sqlite:///{tmp_path / 'x.sqlite'}", tmp_path / "new")
-    assert any(line.startswith("1 runs erased again") for line in lines)
+    assert any(line.startswith("1 run erased again") for line in lines)
     with again.database.read() as session:
         erased = session.scalars(select(StudyRun.public_id).where(StudyRun.erased_at.is_not(None))).all()
     assert erased == [run]

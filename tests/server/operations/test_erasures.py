@@ -77,7 +77,7 @@ def test_a_restore_does_not_bring_an_erased_person_back(
     assert any(line.startswith(f"no ledger of erasures at {folder}") for line in lines)
     assert erased_runs(restored) == set()
     shutil.copy(erasures.ledger(services.settings), erasures.ledger(settings))
-    assert run_server_command(settings, "database", "erase-again").stdout == "1 runs erased\n"
+    assert run_server_command(settings, "database", "erase-again").stdout == "1 run erased\n"
     assert erased_runs(restored) == {run}
     assert run_server_command(settings, "database", "erase-again").stdout == "0 runs erased\n"
     restored.database.close()
@@ -96,7 +96,7 @@ def test_a_restore_replays_the_ledger_that_is_there(
         stream.write('{"run": "cut o')
     restored, lines = open_services(settings), list[str]()
     restore(restored, backup, lines.append)
-    assert f"1 runs erased again, by {erasures.ledger(settings)}" in lines
+    assert f"1 run erased again, by {erasures.ledger(settings)}" in lines
     assert erased_runs(restored) == {participant.run_id}
     assert erasures.ledger(settings).stat().st_mode & 0o077 == 0
     restored.database.close()

@@ -121,7 +121,7 @@ def test_who_is_erased_since_is_erased_again_from_an_older_one(
     new = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
     address = str(tmp_path / "elsewhere" / older.name)
     done = run_server_command(new, "restore", address, "--identity", str(keys[1]))
-    assert "1 runs erased again" in done.stdout, done.stderr
+    assert "1 run erased again" in done.stdout, done.stderr
     assert "0 recruiters' ids; of 1 there is no key any more" in done.stdout
 
 
