@@ -47,6 +47,7 @@ class Dependency(Strict):
 
 class Service(Strict):
     image: str
+    profiles: list[str] = []
     build: str | None = None
     user: str | None = None
     restart: Literal["no", "always", "on-failure", "unless-stopped"]
@@ -132,6 +133,7 @@ def test_the_proxy_alone_is_open_and_the_database_cannot_be_reached_from_outside
 def test_variables_are_those_of_the_example_and_no_secret_has_a_default(compose: Compose) -> None:
     used = set(re.findall(r"\$\{([A-Z0-9_]+)", PATH.read_text(encoding="utf-8")))
     example = (REPOSITORY / "deploy" / "example.env").read_text(encoding="utf-8")
+    used.add("COMPOSE_PROFILES")  # read by docker compose itself
     assert used == set(re.findall(r"^([A-Z0-9_]+)=", example, flags=re.MULTILINE))
     for secret in ("POSTGRES_PASSWORD", "METRICS_TOKEN", "AWS_SECRET_ACCESS_KEY"):
         assert re.search(rf"^{secret}=$", example, flags=re.MULTILINE)
