@@ -29,6 +29,13 @@ QUIET = (
     "urllib3",
 )
 
+NEEDLESS = (
+    "Exception in ASGI application",  # our own handler has logged it
+    "Unsupported upgrade request",  # there is no WebSocket here, and whoever asks for one would fill the log
+    "No supported WebSocket library detected",
+)
+"""How lines of uvicorn begin that are left out."""
+
 
 class JsonLines(logging.Formatter):
     """Each record as one JSON object: time, level, logger, message, fields, error."""
@@ -61,12 +68,12 @@ class PlainLines(logging.Formatter):
         return line
 
 
-class Once(logging.Filter):
-    """Leave out what uvicorn says of a failure that our own handler has logged."""
+class Needless(logging.Filter):
+    """Leave out what uvicorn says beside our own lines."""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """False for the repetition."""
-        return not str(record.msg).startswith("Exception in ASGI application")
+        """False for what is said already, or says nothing of this server."""
+        return not str(record.msg).startswith(NEEDLESS)
 
 
 def described(error: BaseException) -> str:
@@ -93,13 +100,13 @@ def logging_configuration(settings: Settings) -> dict[str, Any]:
         "version": 1,
         "disable_existing_loggers": False,
         "formatters": {"lines": {"()": formatter}},
-        "filters": {"once": {"()": Once}},
+        "filters": {"needless": {"()": Needless}},
         "handlers": {
             "stderr": {
                 "class": "logging.StreamHandler",
                 "stream": "ext://sys.stderr",
                 "formatter": "lines",
-                "filters": ["once"],
+                "filters": ["needless"],
             }
         },
         "root": {"handlers": ["stderr"], "level": "INFO" if as_json else "WARNING"},

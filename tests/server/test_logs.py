@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from server.context import Services
-from server.logs import JsonLines, Once, PlainLines, described, logging_configuration
+from server.logs import JsonLines, Needless, PlainLines, described, logging_configuration
 from server.operations.observer import Observer
 from server.settings import Settings
 
@@ -55,11 +55,18 @@ def test_the_databases_own_first_line_is_kept() -> None:
     )
 
 
-def test_uvicorn_does_not_tell_a_failure_twice() -> None:
-    record = logging.LogRecord(
-        "uvicorn.error", logging.ERROR, "", 1, "Exception in ASGI application\n", (), None
-    )
-    assert not Once().filter(record)
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [
+        ("Exception in ASGI application\n", False),
+        ("Unsupported upgrade request.", False),
+        ("No supported WebSocket library detected. Please use ...", False),
+        ("Invalid HTTP request received.", True),
+    ],
+)
+def test_uvicorn_tells_no_failure_twice_and_nothing_of_websockets(line: str, kept: bool) -> None:
+    record = logging.LogRecord("uvicorn.error", logging.WARNING, "", 1, line, (), None)
+    assert Needless().filter(record) is kept
 
 
 @pytest.mark.parametrize("form", ["json", "text"])
