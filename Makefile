@@ -17,7 +17,7 @@ run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 
 test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
 	@cd frontend && npm run --silent test
-	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
 	@$(BIN)/ruff check .

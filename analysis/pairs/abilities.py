@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from statsmodels.stats.multitest import multipletests
 
 from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons
 from analysis.pairs.connected import refuse_disconnected, separated
@@ -23,6 +22,7 @@ from analysis.pairs.likelihood import (
     scores,
 )
 from analysis.pairs.transitivity import Transitivity, transitivity
+from analysis.within.adjustments import holm
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -285,7 +285,7 @@ def _contrasts(
 def _holm(p: list[float | None]) -> list[float | None]:
     """Those that there are, corrected for their number."""
     told = [value for value in p if value is not None]
-    corrected = iter(multipletests(told, method="holm")[1].tolist() if told else [])
+    corrected = iter(holm(np.array(told)).tolist() if told else [])
     return [None if value is None else next(corrected) for value in p]
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
-from statsmodels.stats.multitest import multipletests
 
 from analysis.plans.plan import Plan
 from analysis.plans.prepare import Prepared, refuse_unknown, where
@@ -18,6 +17,7 @@ from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from analysis.thresholds.likelihood import Trials
 from analysis.thresholds.people import Answers, ThresholdsResult, counted, fit_thresholds
+from analysis.within.adjustments import holm
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.threshold.answer import CODES
@@ -152,8 +152,8 @@ def differences(
 ) -> tuple[Difference, ...]:
     """The estimates by person of every two series compared, in pairs where the same people have both."""
     made = [row for one, other in combinations(series, 2) if (row := _compared(one, other)) is not None]
-    holm = multipletests([row[-1] for row in made], method="holm")[1].tolist() if made else []
-    return tuple(Difference(*row, p, what) for row, p in zip(made, holm, strict=True))
+    corrected = holm(np.array([row[-1] for row in made])).tolist() if made else []
+    return tuple(Difference(*row, p, what) for row, p in zip(made, corrected, strict=True))
 
 
 def _compared(
