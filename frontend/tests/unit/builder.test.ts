@@ -9,6 +9,7 @@ import { type Data, freeName, isTable, labelOf, listAt, type Path, valueAt, with
 import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
 import { type Editor, editorOf, effectOf, EXPERIMENT, type Schema, starter, starterOf } from "../../src/admin/builder/schema";
 import { helpOf } from "../../src/admin/builder/help";
+import { shownClips } from "../../src/admin/builder/shown-clips";
 import { SECTIONS } from "../../src/admin/builder/sections";
 import { suggestionsFor } from "../../src/admin/builder/suggestions";
 
@@ -206,5 +207,24 @@ describe("help", () => {
     const named = texts.map(helpOf).filter((help) => /\[\[|`|\b[a-z]+_(ms|per|person|narrow|title|frames|mm|on_focus_lost)\b/.test(help));
     // Columns of the exported data are called so there, too.
     expect(named.filter((help) => !/px_per_mm|viewing_distance_mm/.test(help))).toEqual([]);
+  });
+});
+
+describe("the preview of a trial", () => {
+  it.each<[string, object, string[], boolean]>([
+    ["a rating", { kind: "clip_rating" }, ["clip"], false],
+    ["a rating after its reference", { kind: "clip_rating", reference: { level: "a" } }, ["reference", "clip"], false],
+    ["a pair", { kind: "paired_comparison" }, ["left clip", "right clip"], false],
+    ["a stacked pair", { kind: "paired_comparison", presentation: { arrangement: "stacked" } }, ["upper clip", "lower clip"], true],
+    [
+      "a pair in turn",
+      { kind: "paired_comparison", presentation: { arrangement: "one_after_the_other" } },
+      ["1st clip", "2nd clip"],
+      false,
+    ],
+    ["two intervals", { kind: "threshold", task: { asks: "two_interval" } }, ["1st clip", "2nd clip"], false],
+    ["yes or no", { kind: "threshold", task: { asks: "yes_no" } }, ["clip"], false],
+  ])("has the clips of %s", (_, trial, words, stacked) => {
+    expect(shownClips(trial)).toEqual({ words, stacked });
   });
 });

@@ -4,6 +4,7 @@ import { Group, Paper, SegmentedControl, Slider, Stack, Text } from "@mantine/co
 import { useState } from "react";
 import { languageName } from "../ui/format";
 import { type Data, isTable, textAt } from "./data";
+import { shownClips } from "./shown-clips";
 import { useBuilderHere } from "./useBuilder";
 
 const DEFAULT_POINTS: [number, number] = [1, 7];
@@ -13,6 +14,7 @@ export function TrialPreview() {
   const builder = useBuilderHere();
   const [chosen, setChosen] = useState<string | null>(null);
   const language = chosen !== null && builder.languages.includes(chosen) ? chosen : (builder.languages[0] ?? "en");
+  const clips = shownClips(builder.data["trial"]);
   const asked = scalesIn(builder.data["trial"]);
   return (
     <Paper withBorder p="md" role="group" aria-label="Preview of the trial">
@@ -30,7 +32,13 @@ export function TrialPreview() {
           />
         )}
       </Group>
-      <div className="preview-clip">clip</div>
+      <div className={`preview-clips ${clips.stacked ? "stacked" : ""}`}>
+        {clips.words.map((word) => (
+          <div key={word} className="preview-clip">
+            {word}
+          </div>
+        ))}
+      </div>
       <Stack gap="lg" mt="md" align="center">
         {asked.map((scale, index) => (
           <OneScale key={index} scale={scale} language={language} />
