@@ -11,5 +11,6 @@ from tests.helpers.databases import (  # noqa: F401 - fixtures
     settings,
     sqlite_template,
 )
+from tests.helpers.passwords import quick_hashes  # noqa: F401 - fixture
 from tests.helpers.seeds import one_seed, seeds_by_name  # noqa: F401 - fixtures
 from tests.helpers.studies import client, participant, study  # noqa: F401 - fixtures

@@ -186,3 +186,7 @@ def test_resets_by_command_line_are_audited(
     unknown = run_server_command(settings, "account", "reset-second-factor", "the owne")
     assert unknown.returncode == 2
     assert len(unknown.stderr.splitlines()) == 1
+
+
+def test_a_hash_costs_what_is_recommended() -> None:
+    assert hash_password("four walruses sang in March", "Ada").startswith("$argon2id$v=19$m=65536,t=3,p=4$")
