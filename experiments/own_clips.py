@@ -11,6 +11,7 @@ from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
 from experiments.factor_names import TAKES, name_and_prefix
+from experiments.level_order import in_order
 from experiments.trials import reserved_names
 
 Placed = dict[str, tuple[dict[str, str], int]]
@@ -124,17 +125,9 @@ def check_factorial(placed: Placed) -> None:
 
 
 def levels_of(placed: Placed) -> dict[str, list[str]]:
-    """Levels of each factor: numbers in their order, other words in the order in which clips have them."""
+    """Levels of each factor: those of numbers and known scales in their order, others as clips have them."""
     names = next(iter(placed.values()))[0]
-    return {name: _in_order([levels[name] for levels, _ in placed.values()]) for name in names}
-
-
-def _in_order(levels: Sequence[str]) -> list[str]:
-    different = list(dict.fromkeys(levels))
-    try:
-        return sorted(different, key=float)
-    except ValueError:
-        return different
+    return {name: in_order([levels[name] for levels, _ in placed.values()]) for name in names}
 
 
 def check_names(names: Iterable[str]) -> None:
