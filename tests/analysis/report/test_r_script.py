@@ -123,6 +123,16 @@ def test_r_finds_a_changed_number(of_r) -> None:
     assert "Some numbers DIFFER from R." in of_r["changed"]
 
 
+def test_r_finds_a_number_that_it_has_not_and_a_row_too_few(tmp_path) -> None:
+    needed("afex", "car", "emmeans")
+    missing = report(tmp_path / "missing", *CASES["few"])
+    spoilt = missing.read_text().replace("means$SE", "NA * means$SE")
+    missing.write_text(spoilt.replace("apart(mine$df, compared$df)", "apart(mine$df, compared$df[-1])"))
+    (said,) = run_together([missing])
+    differing = {line.split()[0] for line in said.splitlines() if line.endswith("DIFFER")}
+    assert differing == {"means", "pairs"}
+
+
 def test_names_and_levels_that_r_would_read_as_code_stay_text(tmp_path) -> None:
     path = tmp_path / "odd.csv"
     rows = [
