@@ -40,6 +40,9 @@ def run_command_line(app: Callable[..., object]) -> None:
     except BrokenPipeError:
         sys.exit(0)
     except Exception as error:
+        if type(error).__name__ == "Abort":  # Typer's, of a question without a yes or without anybody to ask
+            sys.stderr.write("stopped: the question was not answered by yes\n")
+            sys.exit(1)
         if not hasattr(error, "format_message"):
             _say_disk(error)
         sys.stderr.write(_wrong_call(cast(WrongCall, error)))

@@ -67,8 +67,12 @@ def locate(name_or_path: str) -> Path:
     if path.is_file():
         return path
     if path.suffix == ".toml":
-        raise InputError(f"no file {name_or_path}; expected a TOML file or one of {', '.join(SHIPPED)}")
-    raise InputError(f"no experiment '{name_or_path}'{did_you_mean(stem, (*SHIPPED, *DEMOS))}")
+        raise InputError(
+            f"no file {name_or_path}; expected a TOML file or one of {', '.join((*SHIPPED, *DEMOS))}"
+        )
+    near = did_you_mean(stem, (*SHIPPED, *DEMOS))
+    path_too = "" if near.startswith("; did you mean") else ", or the path of a TOML file"
+    raise InputError(f"no experiment '{name_or_path}'{near}{path_too}")
 
 
 def parse_experiment(text: str, source: str = "definition", *, has_data: bool = False) -> Experiment:

@@ -100,6 +100,8 @@ def _check_free(host: str, port: int) -> None:
             probe.bind((host, port))
         except OSError as error:
             reason = error.strerror or str(error)
+            if isinstance(error, socket.gaierror):
+                raise InputError(f"cannot listen on '{host}' ({reason}); choose another by --host") from error
             raise InputError(
                 f"cannot listen on {host}:{port} ({reason}); "
                 "choose another by --port (with make: PORT=8001 make run)"

@@ -91,8 +91,12 @@ def load_database(
     try:
         rows = query.rows(reading.further if whole else (), experiment.factor_names)
         if rows.empty:
-            named = f"study '{study}'" if study else f"experiment '{experiment.name}'"
-            raise NoRatingsError(f"{named} has no ratings yet in {query.name}")
+            if study:
+                raise NoRatingsError(
+                    f"{query.name} has no ratings of experiment '{experiment.name}' in a study '{study}'; "
+                    "give the definition that this study has, and its name as `server study list` shows it"
+                )
+            raise NoRatingsError(f"experiment '{experiment.name}' has no ratings yet in {query.name}")
         rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
         return StudyAnswers(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
     finally:

@@ -147,10 +147,12 @@ def _complete(
         for i in np.flatnonzero(~whole)
     )
     if not whole.any():
+        _refuse_between_factors(factors, counts)
         first = dropped[0]
         raise InputError(
             f"no participant has a rating in every cell (e.g. '{first.participant}' lacks "
-            f"{name_cells(first.missing_cells)}); leave a factor out or collect the missing cells"
+            f"{name_cells(first.missing_cells)}){_case_alone(factors, levels)}; "
+            "leave a factor out or collect the missing cells"
         )
     return CellTable(
         participants=tuple(people[i] for i in np.flatnonzero(whole)),
@@ -161,6 +163,30 @@ def _complete(
         dropped=dropped,
         constant=tuple(people[i] for i in np.flatnonzero(whole & constant)),
     )
+
+
+def _refuse_between_factors(factors: list[str], counts: Integers) -> None:
+    """A factor of which everybody has one level alone lies between participants."""
+    for axis, name in enumerate(factors, start=1):
+        others = tuple(other for other in range(1, counts.ndim) if other != axis)
+        seen = (counts > 0).any(axis=others)
+        if seen.shape[1] > 1 and (seen.sum(axis=1) <= 1).all():
+            raise InputError(
+                f"'{name}' never varies within a participant, so it cannot be a factor within; "
+                f"give it as a factor between participants (--between {name})"
+            )
+
+
+def _case_alone(factors: list[str], levels: list[list[str]]) -> str:
+    """Which levels of a factor are told apart by their case alone: the likely cause of missing cells."""
+    for name, own in zip(factors, levels, strict=True):
+        by_letters: dict[str, str] = {}
+        for level in own:
+            if by_letters.setdefault(level.casefold(), level) != level:
+                return (
+                    f"; levels '{by_letters[level.casefold()]}' and '{level}' of {name} differ in case alone"
+                )
+    return ""
 
 
 def _refuse_empty_cells(factors: list[str], levels: list[list[str]], counts: Integers) -> None:

@@ -94,7 +94,11 @@ def _escaped(text: str) -> str:
 
 
 def sentences(
-    experiment: Experiment, recruiter: str, counted: Mapping[str, Number], rules: Sequence[tuple[str, str]]
+    experiment: Experiment,
+    origin: str,
+    recruiter: str,
+    counted: Mapping[str, Number],
+    rules: Sequence[tuple[str, str]],
 ) -> tuple[str, ...]:
     """The sentences that apply to a study.
 
@@ -104,6 +108,7 @@ def sentences(
         Name of the number and words of each declared exclusion that a report has applied.
     """
     return (
+        *_origin(origin),
         *_recruitment(recruiter, counted),
         *_screening(experiment),
         *_checks(experiment, counted),
@@ -111,6 +116,14 @@ def sentences(
         *_exclusions(experiment, rules),
         *_display(experiment),
         *_evidence(counted),
+    )
+
+
+def _origin(origin: str) -> list[str]:
+    return (
+        []
+        if origin == PARTICIPANTS
+        else [f"These visits are no data of participants: their origin is '{origin}'."]
     )
 
 
@@ -125,9 +138,12 @@ def _recruitment(recruiter: str, counted: Mapping[str, Number]) -> list[str]:
         "Of all visits {complete} were completed, {withdrew} ended at the person's wish, "
         "{screened_out} by screening, and {unfinished} were left open."
     )
+    if counted["erased"].value:
+        lines.append("Erased afterwards, answers and consent with them: {erased}.")
     return lines
 
 
+PARTICIPANTS = "participant"
 RECRUITERS = {"prolific": "Prolific", "sona": "SONA", "mturk": "Amazon Mechanical Turk"}
 
 

@@ -54,7 +54,7 @@ def paragraph_of(known: Counted, results: dict[str, Any] | None) -> Methods:
     excluded = _excluded(results)
     rules = [(name, words) for name, (words, _) in excluded.items()]
     counts = known.numbers | {name: number for name, (_, number) in excluded.items()}
-    lines = sentences(known.experiment, known.recruiter, counts, rules)
+    lines = sentences(known.experiment, known.origin, known.recruiter, counts, rules)
     return Methods(known.study, known.origin, known.series, lines, counts)
 
 

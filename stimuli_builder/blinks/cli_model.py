@@ -50,7 +50,14 @@ def fit(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Model to write (JSON).")] = None,
-    components: Annotated[int, typer.Option(help="Principal components to keep.")] = 5,
+    components: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Principal components to keep; where not given 5, or one fewer than there are profiles.",
+            show_default=False,
+        ),
+    ] = None,
     eyes: Annotated[
         str,
         typer.Option(

@@ -23,17 +23,19 @@ from stimuli_builder.blinks.profile_table import read_profile_table, write_profi
 from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, textbook_profile
 
 EYES = ("auto", "each", "both")
+DEFAULT_COMPONENTS = 5
 
 
 def fit_model(
-    tables: Sequence[Path], out: Path | None, components: int, eyes: str, plot: Path | None, seed: int
+    tables: Sequence[Path], out: Path | None, components: int | None, eyes: str, plot: Path | None, seed: int
 ) -> None:
     """Fit, report, write; see `stimuli model fit --help`."""
     if eyes not in EYES:
         raise InputError(f"unknown --eyes '{eyes}'{did_you_mean(eyes, EYES)}")
     _check_outputs(out, plot)
     training = training_profiles(tables, eyes)
-    model = BlinkModel.fit(training, components)
+    most = max(1, min(DEFAULT_COMPONENTS, len(training) - 1))
+    model = BlinkModel.fit(training, components or most)
     if plot is not None:
         rng = np.random.default_rng(seed)
         save_figure(model_figure(model, training, [model.sample(rng=rng) for _ in range(20)]), plot)

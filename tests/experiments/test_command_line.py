@@ -5,8 +5,21 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
+
+from experiments.command_line import run_command_line
 
 BIN = Path(sys.executable).parent
+
+
+def test_a_question_that_nobody_answers_is_no_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    def asks(**_options: object) -> None:
+        raise typer.Abort
+
+    with pytest.raises(SystemExit) as ended:
+        run_command_line(asks)
+    assert ended.value.code == 1
+    assert capsys.readouterr().err == "stopped: the question was not answered by yes\n"
 
 
 @pytest.mark.parametrize(

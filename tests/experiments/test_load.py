@@ -56,6 +56,8 @@ def test_every_problem_is_listed() -> None:
 
 
 def test_an_unknown_experiment_is_refused_with_the_nearest() -> None:
+    with pytest.raises(InputError, match=r"'robots'; expected one of: .*, or the path of a TOML file"):
+        load_experiment("robots")
     with pytest.raises(InputError, match=r"no experiment 'exp11'; did you mean 'exp1'\?"):
         load_experiment("exp11")
 

@@ -59,6 +59,9 @@ def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
     other = call("run", "exp1", "--no-report")
     assert other.exit_code == 1
     assert "'exp1' has no ratings yet" in other.stderr
+    elsewhere = call("run", "exp3", "--no-report", "--study", "foo")
+    assert elsewhere.exit_code == 1
+    assert "no ratings of experiment 'exp3' in a study 'foo'" in elsewhere.stderr
 
 
 def test_run_of_an_empty_export_exits_1(tmp_path) -> None:

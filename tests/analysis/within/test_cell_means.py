@@ -78,7 +78,15 @@ def test_natural_order(names, order) -> None:
 def test_a_cell_nobody_rated_and_a_table_without_complete_participants_are_refused() -> None:
     with pytest.raises(InputError, match="nobody rated A=b B=y"):
         cell_table(rows("p1 a x 1\np1 a y 1\np1 b x 1\np2 a x 1\np2 a y 1"), "who", "y", ["A", "B"])
+    half = "p1 a x 1\np1 b y 1\np2 a y 1\np2 b x 1"
     with pytest.raises(InputError, match="no participant has a rating in every cell"):
+        cell_table(rows(half), "who", "y", ["A", "B"])
+    with pytest.raises(InputError, match="levels 'X' and 'x' of B differ in case alone; leave a factor out"):
+        cell_table(rows(half.replace("b x", "b X").replace("b y", "a X")), "who", "y", ["B"])
+
+
+def test_a_factor_between_participants_is_called_so() -> None:
+    with pytest.raises(InputError, match=r"'A' never varies within a participant.*--between A"):
         cell_table(rows("p1 a x 1\np2 b x 1"), "who", "y", ["A"])
 
 

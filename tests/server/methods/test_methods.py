@@ -16,6 +16,7 @@ from server.context import Services
 from server.methods.paragraph import Methods
 from server.methods.repository import Number
 from server.methods.service import methods_of
+from server.runs.erasure import erase
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
@@ -31,6 +32,23 @@ def taken_part(client: TestClient, study: StudyInDatabase) -> None:
     Participant(client, study.link(recruiter={"kind": "sona"})).start(query={"survey_code": "7"})
     gone = Participant(client, study.link("personal", label="P1")).agree()
     gone.request("POST", "/withdraw")
+
+
+def test_erased_visits_are_no_withdrawals_and_other_origins_are_named(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, services: Services
+) -> None:
+    taken_part(client, study)
+    person = Participant(client, study.link_token).agree()
+    with services.database.write() as session:
+        known = find_study(session, study.name, OPERATOR, "edit")
+        erase(session, services.settings, known, person.run_id, person.run_id, OPERATOR)
+    answer = viewer.get("/studies/short/methods").json()
+    numbers = {one["name"]: one["value"] for one in answer["numbers"]}
+    assert (numbers["withdrew"], numbers["erased"]) == (1, 1)
+    assert "Erased afterwards, answers and consent with them: 1." in answer["paragraph"]
+    assert "no data of participants" not in answer["paragraph"]
+    simulated = viewer.get("/studies/short/methods?origin=simulated").json()["paragraph"]
+    assert simulated.startswith("These visits are no data of participants: their origin is 'simulated'.")
 
 
 def test_the_counts_are_those_of_the_runs(

@@ -170,7 +170,7 @@ def test_a_model_is_fitted_drawn_from_and_plotted(stimuli, series_file, tmp_path
     labelled = ("--column", "gap_l", "--column", "gap_r", "--fps", 300, "--out", tmp_path / "b.csv")
     assert stimuli("blinks", series_file, *labelled).code == 0
     fitted = stimuli(
-        "model", "fit", tmp_path / "b.profiles.csv", "--components", 2, "--out", tmp_path / "m.json",
+        "model", "fit", tmp_path / "b.profiles.csv", "--out", tmp_path / "m.json",
         "--plot", tmp_path / "m.png",
     )  # fmt: skip
     assert "left and right together" in fitted.out, fitted.err
