@@ -74,7 +74,8 @@ def restore(
             for sha256 in described.clips:
                 _restore_clip(services, tar, sha256)
     except (tarfile.TarError, EOFError, gzip.BadGzipFile) as error:
-        raise InputError(f"{path} is damaged or no backup of `server backup`: {error}") from error
+        (reason, *_) = str(error).splitlines() or [type(error).__name__]
+        raise InputError(f"{path} is damaged or no backup of `server backup`: {reason}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise InputError(f"no room left for what {path} holds; make room and restore again") from error

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError
 from experiments.files import whole_file
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array, BlinkProfile, Eye
 from stimuli_builder.blinks.series import read_table
@@ -56,8 +56,11 @@ def read_profile_table(path: Path) -> list[BlinkProfile]:
     table = read_table(path)
     for name in TABLE_COLUMNS:
         if name not in table.columns:
-            near = did_you_mean(name, [str(column) for column in table.columns])
-            raise InputError(f"{path.name} is no table of profiles: it lacks the column '{name}'{near}")
+            there = ", ".join(map(str, table.columns))
+            raise InputError(
+                f"{path.name} is no table of profiles (NAME.profiles.csv of `stimuli blinks`): "
+                f"it lacks the column '{name}' and has {there}"
+            )
     groups = table.groupby("profile_id", sort=False)
     return [_profile(str(name), group, path) for name, group in groups]
 

@@ -100,7 +100,7 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
         return tracked
     if len(candidates) == 1:
         return candidates
-    there = ", ".join(candidates) or "no numbers"
+    there = ", ".join(candidates) or "no column of decimal numbers but the times"
     raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
 
 

@@ -161,6 +161,11 @@ def compare_with_truth(track: Path, truth: Path) -> TruthReport:
             raise InputError(
                 f"{track}: its frames are not those of {truth}; compare a track with its own truth"
             )
+        if "status" in true and "status" not in row:
+            raise InputError(
+                f"expected a track, which has a column 'status', and then its truth; got {track} and "
+                f"{truth}: give them the other way round"
+            )
         again += row.get("status") == "reinitialised"
         if row.get("status") == "lost":
             lost += 1

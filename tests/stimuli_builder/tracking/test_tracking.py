@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from experiments.errors import InputError
 from stimuli_builder.tracking.accuracy import compare_with_truth, residual_limits
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import load_model, save_model
@@ -22,6 +23,8 @@ def track(recording, lesson, tmp_path_factory):
 
 
 def test_actor_is_tracked_within_the_limits(track, recording):
+    with pytest.raises(InputError, match="give them the other way round"):
+        compare_with_truth(recording.truth, track[0])
     report = compare_with_truth(track[0], recording.truth)
     assert (report.frames, report.lost, report.reinitialised) == (200, 0, 0)
     assert report.rms_px < 0.5
