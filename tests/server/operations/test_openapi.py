@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 import schemathesis
+import schemathesis.specs.openapi.schemas  # now: Python 3.11 cannot always parse what it loads beside threads
 from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, Phase, given, settings
 

@@ -202,7 +202,7 @@ def test_the_command_simulates_observers_beside_checks(services: Services, tmp_p
     study = add_study(services, tmp_path / "clips", checked(text_with(SHORT, YES_NO)))
     called = run_server_command(services.settings, "simulate", study.name, "--participants", "1")
     assert (called.returncode, called.stderr.count("Traceback")) == (0, 0), called.stderr
-    assert "1 simulated participants" in called.stdout
+    assert "1 simulated participant," in called.stdout
     kept = [row for row in rows(services, study.name) if row["kind"] == "check"]
     assert kept
     assert all(row["check_response"] for row in kept)
