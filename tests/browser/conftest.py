@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
+from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -57,7 +58,7 @@ def chromium() -> Iterator[Browser]:
 @pytest.fixture
 def server(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
     """A server process with a data folder of its own, not yet started, so that studies can be added."""
-    process = ServerProcess(tmp_path / "data")
+    process = ForkedServer(tmp_path / "data")
     yield process
     process.stop()
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from playwright.sync_api import Page
 
+from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import without
 from tests.browser.visit import Visit
@@ -48,7 +49,7 @@ class Served:
 @contextmanager
 def serve(folder: Path, studies: Mapping[str, tuple[str, int]], **settings: str) -> Iterator[Served]:
     """A server with studies: by name a declaration (called `browser` in itself) and the frames of a clip."""
-    server = ServerProcess(folder / "data", **settings)
+    server = ForkedServer(folder / "data", **settings)
     made = {}
     for name, (declared, frames) in studies.items():
         own = without(declared, ('name = "browser"', f'name = "{name}"'))

@@ -9,7 +9,7 @@ import urllib.error
 import urllib.request
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from sqlalchemy import text
 
@@ -25,6 +25,14 @@ from tests.helpers.studies import StudyInDatabase, add_study, link_token
 START_LIMIT_S = 240.0
 
 
+class Launched(Protocol):
+    """What is asked of a process: as `subprocess.Popen` has it."""
+
+    def send_signal(self, sig: int, /) -> None: ...
+    def wait(self, timeout: float | None = None) -> int: ...
+    def poll(self) -> int | None: ...
+
+
 class ServerProcess:
     """The server on a data folder. `kill` is kill -9; `start` after it takes the same port.
 
@@ -36,7 +44,7 @@ class ServerProcess:
         self.further = {f"PALPEBRA_{name.upper()}": value for name, value in further.items()}
         self.port = free_port()
         self.log = data_folder.with_suffix(".log")
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process: Launched | None = None
 
     @property
     def address(self) -> str:
@@ -89,11 +97,17 @@ class ServerProcess:
             "PALPEBRA_DATA_FOLDER": str(self.settings.data_folder),
             "PALPEBRA_SECRET_KEY": self.settings.secret_key,
         }
-        command = [sys.executable, "-m", "server", "run", "--port", str(self.port)]
-        with self.log.open("ab") as log:
-            self.process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+        self.process = self._launch(environment)
         self._wait()
         return self
+
+    def _launch(self, environment: dict[str, str]) -> "Launched":
+        command = [sys.executable, "-m", *self._arguments()]
+        with self.log.open("ab") as log:
+            return subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+
+    def _arguments(self) -> list[str]:
+        return ["server", "run", "--port", str(self.port)]
 
     def kill(self) -> None:
         """End it as a power cut would."""

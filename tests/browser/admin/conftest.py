@@ -13,6 +13,7 @@ from server.accounts import invitations
 from server.app import create_app
 from server.cli_common import migrated_services
 from tests.browser.conftest import REPOSITORY
+from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
 from tests.helpers.admins import PASSWORD
 from tests.helpers.studies import SHORT, Participant
@@ -51,7 +52,7 @@ def built_admin() -> None:
 def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     """A server with the short study and four visits, three of them complete."""
     folder = tmp_path_factory.mktemp("admin")
-    process = ServerProcess(folder / "data")
+    process = ForkedServer(folder / "data")
     study = process.add_study(folder / "clips", SHORT)
     chance = random.Random(1)
     with TestClient(create_app(process.settings)) as client:

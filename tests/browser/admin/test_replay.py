@@ -16,6 +16,7 @@ from playwright.sync_api import Page, expect
 from server.app import create_app
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.admin.test_walk import shoot
+from tests.browser.forked_server import ForkedServer
 from tests.browser.participant.test_continuous import declared as continuous
 from tests.browser.participant.test_pairs import IN_TURN, PAIRS, STACKED
 from tests.browser.participant.test_thresholds import IN_TURN as THRESHOLD
@@ -150,7 +151,7 @@ class Runs:
 def runs(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runs]:
     """A server with a run of every kind of trial."""
     folder = tmp_path_factory.mktemp("replay")
-    process = ServerProcess(folder / "data")
+    process = ForkedServer(folder / "data")
     made = {}
     with TestClient(create_app(process.settings)) as client:
         for kind, (text, frames) in KINDS.items():

@@ -14,6 +14,7 @@ from server.app import create_app
 from server.simulation.person import Person, Rater
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.admin.test_walk import shoot
+from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
 from tests.browser.visit import axe_violations
 from tests.helpers.simulated import Api
@@ -50,7 +51,7 @@ COVERED = """() => [...document.querySelectorAll('.plot svg:not([class*=ramp])')
 def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     """A server with the three demonstrations, each answered by simulated people alone."""
     folder = tmp_path_factory.mktemp("kinds")
-    process = ServerProcess(folder / "data")
+    process = ForkedServer(folder / "data")
     with TestClient(create_app(process.settings)) as client:
         for demo, people in PEOPLE.items():
             study = process.add_study(

@@ -10,6 +10,7 @@ from playwright.sync_api import Page
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services
 from server.workspaces import service as workspaces
+from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
 from tests.helpers.providers import SECRET, provider_for
 
@@ -21,7 +22,7 @@ PATIENCE_MS = 120_000
 @pytest.fixture
 def server(built_admin: None, tmp_path: Path) -> Iterator[ServerProcess]:
     """A server that knows a provider by two names: one has a rule that lets people in."""
-    process = ServerProcess(tmp_path / "data")
+    process = ForkedServer(tmp_path / "data")
     secret = tmp_path / "client secret"
     secret.write_text(SECRET)
     with migrated_services(process.settings) as services, services.database.write() as session:
