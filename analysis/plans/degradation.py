@@ -9,6 +9,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis.plans.prepare import Prepared
+from analysis.plans.result import labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part
 from analysis.report.formats import Table
@@ -40,6 +41,8 @@ class CellScore:
 
     Attributes
     ----------
+    label : str
+        The labels of the cell's levels, as tables and sentences call it.
     turned : bool
         Whether the scale is reverse-keyed, hence its answers turned: a high score is little impairment.
     dmos, sd, ci_low, ci_high : float
@@ -53,6 +56,7 @@ class CellScore:
     scale: str
     turned: bool
     cell: str
+    label: str
     dmos: float
     sd: float
     n: int
@@ -75,8 +79,12 @@ def scores(prepared: Prepared) -> tuple[CellScore, ...]:
 
 def _of_scale(prepared: Prepared, scale: RatedScale) -> list[CellScore]:
     means = _means(prepared, scale)
-    references = _references(prepared)
-    return [_scored(scale, cell, means, references.get(cell)) for cell in references if cell in means]
+    labels = labels_of(prepared.experiment)
+    return [
+        _scored(scale, (clip.cell, labels.cell(dict(clip.levels))), means, reference)
+        for clip, reference in _references(prepared)
+        if clip.cell in means
+    ]
 
 
 def _means(prepared: Prepared, scale: RatedScale) -> Mapping[str, "pd.Series[float]"]:
@@ -96,16 +104,16 @@ def _means(prepared: Prepared, scale: RatedScale) -> Mapping[str, "pd.Series[flo
     }
 
 
-def _references(prepared: Prepared) -> dict[str, str | None]:
-    """The reference's cell of each cell; None where it is its own."""
+def _references(prepared: Prepared) -> list[tuple[ClipSpec, str | None]]:
+    """A clip of each cell, and the cell of its reference; None where it is its own."""
     experiment = prepared.experiment
     declared = _reference_of(prepared)
-    cells_of: dict[str, str | None] = {}
-    for levels in design.cells(experiment):
-        clip = ClipSpec(levels, 1)
-        reference = declared.of(experiment, clip)
-        cells_of[clip.cell] = None if reference == clip else reference.cell
-    return cells_of
+    clips = [ClipSpec(levels, 1) for levels in design.cells(experiment)]
+    references = [declared.of(experiment, clip) for clip in clips]
+    return [
+        (clip, None if reference == clip else reference.cell)
+        for clip, reference in zip(clips, references, strict=True)
+    ]
 
 
 def _reference_of(prepared: Prepared) -> RatingReference:
@@ -116,16 +124,17 @@ def _reference_of(prepared: Prepared) -> RatingReference:
 
 
 def _scored(
-    scale: RatedScale, cell: str, means: Mapping[str, "pd.Series[float]"], reference: str | None
+    scale: RatedScale, named: tuple[str, str], means: Mapping[str, "pd.Series[float]"], reference: str | None
 ) -> CellScore:
-    mine = means[cell]
+    """The score of a cell `named` by its name and its label."""
+    mine = means[named[0]]
     mean, sd, low, high = _interval(mine.to_numpy(dtype=float))
     differential: tuple[float | None, ...] = (None, None, None)
     if reference is not None and reference in means:
         both = (mine - means[reference]).dropna().to_numpy(dtype=float) + scale.maximum
         at, _, from_, to = _interval(both)
         differential = (at, from_, to)
-    return CellScore(scale.name, scale.reverse, cell, mean, sd, len(mine), low, high, *differential)
+    return CellScore(scale.name, scale.reverse, *named, mean, sd, len(mine), low, high, *differential)
 
 
 def _interval(values: np.ndarray[Any, Any]) -> tuple[float, float, float, float]:
@@ -162,7 +171,7 @@ def _table(every: tuple[CellScore, ...], prepared: Prepared) -> Table:
     rows = tuple(
         (
             f"{one.scale} (turned)" if one.turned else one.scale,
-            one.cell,
+            one.label,
             fixed(one.dmos),
             fixed(one.sd),
             str(one.n),
@@ -196,6 +205,6 @@ def _extremes_of(cells: list[CellScore], scale: str) -> str:
         return f"No cell has a rating{on_scale}."
     least, most = max(told, key=lambda one: one.dmos), min(told, key=lambda one: one.dmos)
     return (
-        f"The least impaired cell{on_scale} is {least.cell} (DMOS {fixed(least.dmos)}, n = {least.n}), the "
-        f"most impaired {most.cell} (DMOS {fixed(most.dmos)}, n = {most.n})."
+        f"The least impaired cell{on_scale} is {least.label} (DMOS {fixed(least.dmos)}, n = {least.n}), the "
+        f"most impaired {most.label} (DMOS {fixed(most.dmos)}, n = {most.n})."
     )

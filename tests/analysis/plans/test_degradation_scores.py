@@ -81,7 +81,7 @@ def test_intervals_are_those_of_the_formula() -> None:
 
 def cell(scale: str, name: str, dmos: float) -> CellScore:
     """A cell's score on a scale, and nothing else of note."""
-    return CellScore(scale, False, name, dmos, 1.0, 9, dmos - 1, dmos + 1, None, None, None)
+    return CellScore(scale, False, name, name, dmos, 1.0, 9, dmos - 1, dmos + 1, None, None, None)
 
 
 def test_the_least_impaired_cell_is_found_on_each_scale() -> None:
