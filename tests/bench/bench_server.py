@@ -7,6 +7,8 @@ Real servers on SQLite, or the pages and exports alone on a PostgreSQL of its ow
 monitor's page is opened in Chromium where there is one.
 """
 
+import csv
+import io
 import os
 import shutil
 import statistics
@@ -32,6 +34,7 @@ from tools.load_database import load_database
 
 TRIALS = 400
 RUNS = 500
+EXPORT_AIM = "> 60,000"
 UPDATES = 10
 CHANGED = 100
 STUDY = "/api/admin/studies/short"
@@ -95,9 +98,12 @@ def export(folder: Path, rows: int, database: str = "") -> None:
         owner = Owner(process)
         assert process.process is not None
         before = peak_mb(process.process.pid)
-        for file, must in (("ratings.csv", "> 50,000"), ("psych-ds.zip", "")):
+        baseline = plainly_written(process)
+        print_line("the view's rows selected and written as CSV, rows a second", f"{rows / baseline:,.0f}")
+        for file, must in (("ratings.csv", EXPORT_AIM), ("psych-ds.zip", "")):
             seconds, _ = owner.time_of(f"{STUDY}/data/{file}?origin=all")
             print_line(f"{file} over HTTP, rows a second", f"{rows / seconds:,.0f}", must)
+            print_line("its time against the baseline's", f"{seconds / baseline:.2f}")
         print_line(
             "peak memory of the server, before and after",
             f"{before:.0f}, {peak_mb(process.process.pid):.0f} MB",
@@ -105,6 +111,16 @@ def export(folder: Path, rows: int, database: str = "") -> None:
     finally:
         process.stop()
     command_line(process, folder, rows)
+
+
+def plainly_written(process: ServerProcess) -> float:
+    """Seconds that a program takes which only selects the view and writes its rows: an export's baseline."""
+    begun = time.monotonic()
+    with migrated_services(process.settings) as services, services.database.read() as session:
+        rows = session.connection().execute(text("SELECT * FROM ratings")).cursor
+        while some := rows.fetchmany(500):
+            csv.writer(io.StringIO(), lineterminator="\n").writerows(some)
+    return time.monotonic() - begun
 
 
 LINKS = 5_000
@@ -167,7 +183,7 @@ def command_line(process: ServerProcess, folder: Path, rows: int) -> None:
     assert status == 0
     with out.open(encoding="utf-8") as stream:
         assert sum(1 for _ in stream) == rows + 1
-    print_line("`server export`, rows a second, start included", f"{rows / seconds:,.0f}", "> 50,000")
+    print_line("`server export`, rows a second, start included", f"{rows / seconds:,.0f}", EXPORT_AIM)
     print_line("its peak memory", f"{peak:.0f} MB")
 
 
