@@ -1,5 +1,6 @@
 """A script in R that computes a report's tables anew with afex, car and emmeans, and compares."""
 
+import itertools
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -29,6 +30,7 @@ def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
         **head_of_script(analysis.title, script, data),
         **design_in_r(analysis, names),
         within=bool(analysis.anova.factors),
+        confidence=r_number(analysis.anova.confidence),
         effects=_effects(analysis, names),
         means=_means(analysis, names),
         pairs=_pairs(analysis, names),
@@ -114,35 +116,63 @@ def _effects(analysis: Analysis, names: dict[str, str]) -> str:
     return as_csv(rows).strip()
 
 
+def _margins(analysis: Analysis) -> dict[str, tuple[str, ...]]:
+    """The factors of each margin, by its name."""
+    return {mean.effect: tuple(mean.levels) for mean in analysis.means}
+
+
+def _in_r(factors: Sequence[str], names: dict[str, str]) -> str:
+    """A margin's name in R; a factor's own where it is of one."""
+    return ":".join(names[factor] for factor in factors)
+
+
 def _means(analysis: Analysis, names: dict[str, str]) -> str:
-    rows = [[names[m.effect], r_number(m.mean), r_number(m.se)] for m in analysis.means if m.effect in names]
-    return as_csv(rows).strip()
-
-
-def _pairs(analysis: Analysis, names: dict[str, str]) -> str:
     rows = [
-        [names[pair.effect], *map(r_number, (pair.difference, pair.se, pair.df, pair.t, pair.p))]
-        for pair in analysis.pairs
-        if pair.effect in names
+        [
+            _in_r(tuple(mean.levels), names),
+            _cells(analysis, tuple(mean.levels))[tuple(mean.levels.values())],
+            *map(r_number, (mean.mean, mean.se, *mean.ci)),
+        ]
+        for mean in analysis.means
     ]
     return as_csv(rows).strip()
 
 
+def _cells(analysis: Analysis, factors: Sequence[str]) -> dict[tuple[str, ...], str]:
+    """The codes of each cell of a margin, joined as R joins them, by the names of its levels."""
+    levels = dict(_factors(analysis))
+    of = [[(name, f"l{i}") for i, name in enumerate(levels[factor], start=1)] for factor in factors]
+    return {
+        tuple(name for name, _ in cell): ":".join(code for _, code in cell) for cell in itertools.product(*of)
+    }
+
+
+def _pairs(analysis: Analysis, names: dict[str, str]) -> str:
+    rows, margins = [], _margins(analysis)
+    for pair in analysis.pairs:
+        factors = margins[pair.effect]
+        codes = {":".join(cell): code for cell, code in _cells(analysis, factors).items()}
+        numbers = (pair.difference, pair.se, pair.df, pair.t, pair.p, *pair.ci)
+        cells = (codes[pair.level_a], codes[pair.level_b])
+        rows.append([_in_r(factors, names), *cells, *map(r_number, numbers)])
+    return as_csv(rows).strip()
+
+
 def _adjusted(analysis: Analysis, names: dict[str, str]) -> str:
+    margins = _margins(analysis)
     rows = [
         [
-            names[pair.effect],
+            _in_r(margins[pair.effect], names),
             *map(r_number, (pair.p, pair.p_bonferroni, pair.p_holm, pair.p_sidak, pair.p_fdr)),
         ]
         for pair in analysis.pairs
-        if pair.effect in names
     ]
     return as_csv(rows).strip()
 
 
 def _contrasts(analysis: Analysis, names: dict[str, str]) -> str:
     rows = [
-        [names[c.factor], f"contrast {i}", *map(r_number, (c.estimate, c.se, c.t, c.p))]
+        [names[c.factor], f"contrast {i}", *map(r_number, (c.estimate, c.se, c.t, c.p, *c.ci))]
         for i, c in enumerate((*analysis.trends, *analysis.contrasts), start=1)
     ]
     return as_csv(rows).strip()

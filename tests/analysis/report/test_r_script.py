@@ -123,6 +123,59 @@ def test_r_finds_a_changed_number(of_r) -> None:
     assert "Some numbers DIFFER from R." in of_r["changed"]
 
 
+ALTERED = {
+    "margin,cell,mean,se,low,high": {"phase:hour": ("mean", "low"), "treatment": ("high",)},
+    "margin,first,second,difference,se,df,t,p,low,high": {"hour": ("low",), "gender": ("t",)},
+    "factor,name,estimate,se,t,p,low,high": {"hour": ("p",)},
+    "of,F,df,df_error,p,within": {"phase": ("df",)},
+}
+"""By the head of a table of `verify.R`: of which rows the first has another number, and which."""
+
+
+def altered(script: str) -> str:
+    """The script with a hundredth more of each number of `ALTERED`."""
+    lines = script.splitlines()
+    for head, rows in ALTERED.items():
+        start = next(i for i, line in enumerate(lines) if line.endswith(f'"{head}')) + 1
+        for name, columns in rows.items():
+            at = next(i for i in range(start, len(lines)) if lines[i].startswith(f"{name},"))
+            cells = lines[at].split(",")
+            for column in columns:
+                place = head.split(",").index(column)
+                cells[place] = repr(float(cells[place]) * 1.01 + 0.01)
+            lines[at] = ",".join(cells)
+    return "\n".join(lines)
+
+
+def test_r_finds_each_altered_number_and_no_other(tmp_path) -> None:
+    needed("afex", "car", "emmeans")
+    path = report(tmp_path / "altered", *CASES["both"])
+    path.write_text(altered(path.read_text()))
+    (said,) = run_together([path])
+    differing = {tuple(line.split()[:-7]) for line in said.splitlines() if line.endswith(": DIFFER")}
+    assert {" ".join(words) for words in differing} == {
+        "means phase:hour",
+        "means ci phase:hour",
+        "means ci treatment",
+        "pairs gender",
+        "pairs ci hour",
+        "contrast hour",
+        "simple df",
+    }
+
+
+def test_r_agrees_with_pairs_of_two_factors(tmp_path) -> None:
+    needed("afex", "car", "emmeans")
+    data = read_long_table(GOLDEN / "within/complete_2.csv", "participant", "rating", ["A", "B"])
+    cells = cell_table(data.rows, "participant", "rating", ["A", "B"])
+    about = {"name": "two", "title": "two", "source": "complete_2.csv", "rating": "rating"}
+    for name, content in r_files(analyse_cells(cells, **about, two_factor_pairs=True)).items():
+        (tmp_path / name).write_bytes(content)
+    (said,) = run_together([tmp_path / "verify.R"])
+    assert "\npairs    A:B " in said
+    assert "Every number agrees with R." in said
+
+
 def test_r_finds_a_number_that_it_has_not_and_a_row_too_few(tmp_path) -> None:
     needed("afex", "car", "emmeans")
     missing = report(tmp_path / "missing", *CASES["few"])
