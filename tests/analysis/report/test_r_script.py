@@ -164,10 +164,13 @@ def test_r_finds_each_altered_number_and_no_other(tmp_path) -> None:
     }
 
 
-def test_r_agrees_with_pairs_of_two_factors(tmp_path) -> None:
+def test_r_agrees_with_pairs_of_two_factors_and_a_cell_in_which_nobody_differs(tmp_path) -> None:
+    """An error that is zero, or rounding, is no number to compare relatively."""
     needed("afex", "car", "emmeans")
-    data = read_long_table(GOLDEN / "within/complete_2.csv", "participant", "rating", ["A", "B"])
-    cells = cell_table(data.rows, "participant", "rating", ["A", "B"])
+    rows = read_long_table(GOLDEN / "within/complete_2.csv", "participant", "rating", ["A", "B"]).rows
+    first = (rows["A"] == rows["A"].iloc[0]) & (rows["B"] == rows["B"].iloc[0])
+    rows.loc[first, "rating"] = 6.1
+    cells = cell_table(rows, "participant", "rating", ["A", "B"])
     about = {"name": "two", "title": "two", "source": "complete_2.csv", "rating": "rating"}
     for name, content in r_files(analyse_cells(cells, **about, two_factor_pairs=True)).items():
         (tmp_path / name).write_bytes(content)
