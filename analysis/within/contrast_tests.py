@@ -72,9 +72,10 @@ def contrasts_of(
             raise InputError(
                 f"the weights of contrast '{name}' of '{factor}' should sum to zero, and not all be zero"
             )
-    estimates, errors = margin.contrasts(np.array([weights for _, weights in named], dtype=np.float64))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.where(errors > 0, estimates / errors, np.nan)
+    every = np.array([weights for _, weights in named], dtype=np.float64)
+    # Weights of a contrast may be of any size: so is what rounding leaves of it.
+    scale = float(np.abs(result.y).max()) * max(1.0, float(np.abs(every).sum(axis=1).max()))
+    estimates, errors, t = margin.tested(every, scale)
     p = 2 * special.stdtr(margin.df, -np.abs(t))
     reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2)) * errors
     return tuple(

@@ -53,6 +53,17 @@ class Margin:
         variance = np.einsum("gh,cgh->c", spread, squares) / self.df
         return estimates, np.sqrt(np.maximum(variance, 0.0))
 
+    def tested(self, weights: Floats, scale: float) -> tuple[Floats, Floats, Floats]:
+        """Estimates, standard errors and t of contrasts (each (c,)) of ratings as large as `scale`.
+
+        An error that is only rounding is 0, and its t NaN: nobody differs.
+        """
+        estimates, errors = self.contrasts(weights)
+        rounding = 16 * np.finfo(float).eps * scale / np.sqrt(self.df + 1)
+        errors = np.where(errors > rounding, errors, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return estimates, errors, np.where(errors > 0, estimates / errors, np.nan)
+
 
 def margin_of(result: AnovaResult, names: Sequence[str]) -> Margin:
     """The margin of the factors `names` (any order): others are averaged over with equal weight.

@@ -71,11 +71,9 @@ def _tested(
     scale: float,
     confidence: float,
 ) -> tuple[Pair, ...]:
-    estimate, se = margin.contrasts(weights)
-    se = np.where(se > 16 * np.finfo(float).eps * scale / np.sqrt(margin.df + 1), se, 0.0)
+    estimate, se, t = margin.tested(weights, scale)
     spread = _spread(margin, weights)
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.where(se > 0, estimate / se, np.nan)
         size = np.where(se > 0, estimate / spread, np.nan)
     p = 2 * special.stdtr(margin.df, -np.abs(t))
     family = [bonferroni(p), holm(p), sidak(p), tukey(t, len(margin.combinations), margin.df)]

@@ -71,6 +71,14 @@ def test_trends_use_the_spacing_of_the_levels() -> None:
     )
 
 
+def test_a_trend_that_is_the_same_in_everybody_has_no_t() -> None:
+    """Its error is rounding, and t would be a number of 10^15."""
+    constant = np.array([0.1, 0.7, 1.3, 1.9]) + np.arange(8)[:, None] / 7
+    linear, *rest = trends(within_anova(constant, ("duration",), (("1", "2", "3", "4"),)))
+    assert (linear.se, np.isnan(linear.t), np.isnan(linear.p)) == (0.0, True, True)
+    assert all(one.se == 0.0 and np.isnan(one.t) for one in rest)
+
+
 def test_contrasts_must_sum_to_zero_and_fit() -> None:
     with pytest.raises(InputError, match="sum to zero"):
         contrasts_of(RESULT, "face", [("x", [1, 1, -1])])
