@@ -66,12 +66,7 @@ def link(
 @account_app.command("reset-password")
 def reset_password(
     name: Annotated[str, typer.Argument(help="Name of the account.")],
-    password: Annotated[
-        str,
-        typer.Option(
-            prompt=True, hide_input=True, confirmation_prompt=True, help="Asked for where not given."
-        ),
-    ] = "",
+    password: Annotated[str, typer.Option(help="Asked for where not given.")] = "",
 ) -> None:
     """Give an account a new password; its sessions, API tokens and logins by providers end.
 
@@ -80,7 +75,11 @@ def reset_password(
     Example: server account reset-password ada
     """
     with migrated_services() as services:
-        fresh = hash_password(password, name)
+        with services.database.write() as session:
+            service.check_known(session, name)
+        # Only now: who mistyped the name has typed no password twice.
+        given = password or typer.prompt("Password", hide_input=True, confirmation_prompt=True)
+        fresh = hash_password(given, name)
         with services.database.write() as session:
             logins = service.reset_password(session, name, fresh)
     out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")

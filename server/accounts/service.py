@@ -216,6 +216,17 @@ def own_code_failure(services: Services, identity: Identity, code: str) -> ApiEr
         return second_factor_failure(services, account, code)
 
 
+def check_known(session: Session, name: str) -> None:
+    """Refuse the name of no account.
+
+    Raises
+    ------
+    NotFound
+        With the name that comes nearest.
+    """
+    _named(session, name)
+
+
 def reset_password(session: Session, name: str, fresh: str) -> str:
     """From the command line: give an account a new password (its hash); says what became of its logins."""
     account = _named(session, name)

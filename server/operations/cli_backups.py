@@ -73,6 +73,7 @@ def backup(
         str,
         typer.Option(help="Public key to encrypt for; PALPEBRA_BACKUP_RECIPIENT where not given."),
     ] = "",
+    replace: Annotated[bool, typer.Option("--replace", help="Write over a FILE that is there.")] = False,
 ) -> None:
     """Write database, clips and secret key of this moment into one file, while the server goes on.
 
@@ -95,6 +96,8 @@ def backup(
         _back_up_to(to, recipient, name, with_clips=not without_clips, keep=keep)
         return
     path = file or Path(name)
+    if path.exists() and not replace:
+        raise InputError(f"{path} is there already; name another file, or add --replace to write over it")
     with migrated_services() as services:
         described = backups.back_up(
             services, path, with_clips=not without_clips, keys=keys or services.settings.backup_keys

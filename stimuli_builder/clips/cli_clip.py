@@ -63,6 +63,10 @@ def clip_command(
     """Render one clip."""
     from stimuli_builder.clips.single import SingleClip, render_single
 
+    if out.suffix.lower() != ".mp4":
+        raise InputError(
+            f"--out: expected a file that ends in .mp4, got '{out.name}'; clips are H.264 in MP4"
+        )
     width, height = parse_size(size)
     settings = settings_from(
         character=character,

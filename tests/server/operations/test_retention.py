@@ -34,6 +34,12 @@ def test_two_backups_a_minute_apart_leave_the_one_of_twenty_days_ago(
     assert old.exists()
     assert own.exists()
     assert len(list(tmp_path.glob("*.tar"))) == 4
+    again = run_server_command(settings, "backup", str(own))
+    assert again.returncode == 2
+    assert again.stderr.startswith(f"error: {own} is there already; name another file")
+    assert own.stat().st_size == 0
+    assert run_server_command(settings, "backup", str(own), "--replace").returncode == 0
+    assert own.stat().st_size > 0
 
 
 def test_beyond_the_days_everything_goes_and_each_day_keeps_its_last() -> None:

@@ -135,6 +135,13 @@ def test_bad_input_ends_in_one_line(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_clip_is_called_what_it_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert stimuli(monkeypatch, "clip", "--out", tmp_path / "one.avi") == 2
+    assert "--out: expected a file that ends in .mp4, got 'one.avi'" in capsys.readouterr().err
+
+
 def test_a_failed_check_exits_2(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
