@@ -4,9 +4,11 @@ jsPsych, PsychoPy and Gorilla write a row for everything that happened: a fixati
 end of a task. A row that lacks one of the columns asked for is such a row; how many and of what sort is said.
 """
 
+import json
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from analysis.read.files.cells import Cells
 
@@ -47,4 +49,30 @@ def trials_only(cells: Cells, asked: list[str], sorts: Cells | None) -> Cells:
             counts = sorts.rows.iloc[np.flatnonzero(~keep), 0].replace("", "no sort").value_counts()
             said += f" ({', '.join(f'{sort} {count}' for sort, count in counts.items())})"
     rows = cells.rows[keep].reset_index(drop=True)
-    return replace(cells, rows=rows, lines=cells.lines[keep], decisions=(*cells.decisions, said))
+    surveys = [answer for name in asked if (answer := _one_answer(rows, name))]
+    return replace(cells, rows=rows, lines=cells.lines[keep], decisions=(*cells.decisions, said, *surveys))
+
+
+def _one_answer(rows: pd.DataFrame, name: str) -> str:
+    """Put the number in the place of jsPsych's `{"Q0": 5}` in a column of `rows`, and say so; else nothing.
+
+    A survey of several questions has several members: it stays as it is, since none of them is the answer.
+    """
+    texts = [str(text) for text in rows[name].unique() if str(text).lstrip().startswith("{")]
+    numbers = {text: number for text in texts if (number := _only_number(text)) is not None}
+    if not texts or len(numbers) < len(texts):
+        return ""
+    rows[name] = rows[name].astype(str).replace(numbers)
+    shown = f"{texts[0]} read as {numbers[texts[0]]}"
+    return f"'{name}' holds surveys of one question: {shown}; jsPsych numbers their choices from 0"
+
+
+def _only_number(text: str) -> str | None:
+    """The number of a JSON object with one member, as text; None for anything else."""
+    try:
+        answer = json.loads(text)
+    except ValueError:
+        return None
+    values = list(answer.values()) if isinstance(answer, dict) else []
+    numeric = len(values) == 1 and isinstance(values[0], int | float) and not isinstance(values[0], bool)
+    return repr(values[0]) if numeric else None

@@ -81,6 +81,30 @@ def test_what_was_understood_of_an_export_is_said_first(tmp_path) -> None:
     )
 
 
+@pytest.mark.parametrize("ending", ["json", "csv"])
+def test_a_survey_of_one_question_is_its_number(tmp_path, ending) -> None:
+    trials = json.loads(jspsych(tmp_path / "b.json").read_text(encoding="utf-8"))
+    for trial in trials[1::2]:
+        trial |= {"trial_type": "survey-likert", "response": {"Q0": trial["score"]}}
+    path = tmp_path / f"survey.{ending}"
+    if ending == "json":
+        path.write_text(json.dumps(trials), encoding="utf-8")
+    else:
+        texts = [one | {"response": json.dumps(one["response"], separators=(",", ":"))} for one in trials]
+        pd.DataFrame(texts).to_csv(path, index=False)
+    data = read_long_table(path, "id", "response", ["face"])
+    assert data.rows["response"].tolist() == [float(row[2]) for row in ROWS]
+    assert "jsPsych numbers their choices from 0" in data.decisions[1]
+
+
+def test_a_survey_of_several_questions_is_no_number(tmp_path) -> None:
+    path = tmp_path / "two.json"
+    beside = {"trial_type": "survey-likert", "trial_index": 1, "time_elapsed": 9, "id": "a", "face": "calm"}
+    path.write_text(json.dumps([beside | {"response": {"Q0": 1, "Q1": 2}}]), encoding="utf-8")
+    with pytest.raises(InputError, match="'response' should be a number"):
+        read_long_table(path, "id", "response", ["face"])
+
+
 def test_the_last_line_of_gorilla_is_no_trial(tmp_path) -> None:
     path = tmp_path / "gorilla.csv"
     lines = ["Event Index,Participant Private ID,Zone Type,face,Response"]
