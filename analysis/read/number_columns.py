@@ -28,7 +28,11 @@ def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
     categories = list(table.columns[name].cat.categories)
     commas = [text for text in categories if _DECIMAL_COMMA.fullmatch(text)]
     _refuse_two_readings(table, name, categories, commas)
-    values = np.array([_number(table, name, text) for text in [*categories, ""]])
+    values = np.array([_number(text) for text in [*categories, ""]])
+    numeric = np.isfinite(values)
+    _refuse_words(
+        table, name, {t for t, fine in zip(categories, numeric, strict=False) if not fine} - MISSING_MARKS
+    )
     if commas:
         table.decisions.append(f"decimal commas in '{name}' (e.g. '{commas[0]}') read as decimal points")
     parsed: NDArray[np.float64] = values[table.columns[name].cat.codes.to_numpy().astype(np.int64)]
@@ -130,17 +134,21 @@ def _missing_codes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(coded & (beyond | ((values < 0) & (low >= 0))))
 
 
-def _number(table: TextTable, name: str, text: str) -> float:
-    if text in MISSING_MARKS:
-        return np.nan
+def _number(text: str) -> float:
+    """The number; NaN where the text is none, or is not finite."""
     plain = text.replace(",", ".") if _DECIMAL_COMMA.fullmatch(text) else text
     try:
-        value = float(plain)
+        value = np.nan if "_" in plain else float(plain)
     except ValueError:
         value = np.nan
-    if not np.isfinite(value) or "_" in plain:
-        row = int(np.argmax((table.columns[name] == text).to_numpy()))
+    return value if np.isfinite(value) else np.nan
+
+
+def _refuse_words(table: TextTable, name: str, words: set[str]) -> None:
+    """Refuse texts that are no numbers by the first line on which one stands."""
+    if words:
+        row = int(np.argmax(table.columns[name].isin(words).to_numpy()))
         raise InputError(
-            f"{table.source}: '{name}' should be a number, got '{text}' in line {table.line(row)}"
+            f"{table.source}: '{name}' should be a number, got '{table.columns[name].iloc[row]}' in line "
+            f"{table.line(row)}"
         )
-    return value

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Annotated
 
 import typer
+from rich.console import Console
 from rich.table import Column, Table
 
 from server.cli_common import out
@@ -14,6 +15,8 @@ from server.operations.doctor import examine
 from server.operations.rows import Content
 from server.settings import Settings
 
+FILE_WIDTH = 1_000
+"""Characters: wider than any finding."""
 MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "failed": "[red]failed[/]"}
 
 
@@ -28,7 +31,7 @@ def doctor(
     """Check the installation and say what to fix; exit code 1 where something failed.
 
     Nothing is changed. The keys of --json: a list of objects with subject, verdict (ok, warning, failed),
-    found, advice.
+    state, advice.
     Example: server doctor
     """
     services = open_services(Settings())
@@ -43,7 +46,8 @@ def doctor(
         table = Table("", "what", *whole, box=None, pad_edge=False)
         for finding in findings:
             table.add_row(MARKS[finding.verdict], finding.subject, finding.state, finding.advice)
-        out.print(table)
+        # In a file or a pipe a path is whole on its line; a terminal's own width is for eyes.
+        (out if out.is_terminal else Console(width=FILE_WIDTH, highlight=False)).print(table)
     if any(finding.verdict == "failed" for finding in findings):
         raise typer.Exit(1)
 

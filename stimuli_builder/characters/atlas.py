@@ -15,6 +15,7 @@ from experiments.errors import InputError
 from stimuli_builder.characters.colour import srgb_to_linear
 from stimuli_builder.characters.declaration import (
     DECLARATION_FILE,
+    REPAIR,
     Declaration,
     Level,
     LowerLidPose,
@@ -151,7 +152,7 @@ class Atlas:
                 digest.update((self.folder / file).read_bytes())
             except OSError as error:
                 raise InputError(
-                    f"character '{self.name}': {file} is missing from {self.folder}; bake it again"
+                    f"character '{self.name}': {file} is missing from {self.folder}; {REPAIR}"
                 ) from error
         return digest.hexdigest()
 

@@ -10,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from experiments.errors import InputError
 from experiments.wrong_values import wrong_value
 
+REPAIR = "put a whole file in its place, or bake the character again"
+"""What to do about a character's file that is missing or damaged; its pictures may be of anybody's making."""
 DECLARATION_FILE = "character.toml"
 Closure = Annotated[float, Field(ge=0.0, le=1.0)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -159,7 +161,7 @@ def read_declaration(folder: Path) -> Declaration:
         text = file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{folder} is no character: its {DECLARATION_FILE} is no text in UTF-8; bake it again"
+            f"{folder} is no character: its {DECLARATION_FILE} is no text in UTF-8; {REPAIR}"
         ) from error
     except OSError as error:
         raise InputError(

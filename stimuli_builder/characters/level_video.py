@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.characters.declaration import Picture
+from stimuli_builder.characters.declaration import REPAIR, Picture
 from stimuli_builder.characters.writing import write_bytes_declared
 
 QUANTISER = 7
@@ -87,9 +87,9 @@ def video_frames(content: bytes, what: str, file: str) -> Iterator[NDArray[np.ui
                 yield _rgb(frame)
                 shown += 1
     except (av.error.FFmpegError, ValueError, IndexError) as error:
-        raise InputError(f"{what} is damaged: cannot decode {file}; bake it again") from error
+        raise InputError(f"{what} is damaged: cannot decode {file}; {REPAIR}") from error
     if not shown:
-        raise InputError(f"{what} is damaged: {file} holds no frame; bake it again")
+        raise InputError(f"{what} is damaged: {file} holds no frame; {REPAIR}")
 
 
 def _count(content: bytes) -> int:

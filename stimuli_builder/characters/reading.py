@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from experiments.errors import InputError
-from stimuli_builder.characters.declaration import Picture
+from stimuli_builder.characters.declaration import REPAIR, Picture
 
 
 def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: str) -> NDArray[np.uint8]:
@@ -19,7 +19,7 @@ def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: st
     try:
         image = Image.open(BytesIO(content)).convert("RGB")
     except (OSError, UnidentifiedImageError, ValueError) as error:
-        raise InputError(f"{what} is damaged: cannot decode {picture.file}; bake it again") from error
+        raise InputError(f"{what} is damaged: cannot decode {picture.file}; {REPAIR}") from error
     if image.size != tuple(size):
         declared = " x ".join(str(n) for n in size)
         raise InputError(
@@ -34,13 +34,11 @@ def declared_bytes(folder: Path, picture: Picture, what: str) -> bytes:
     try:
         content = (folder / picture.file).read_bytes()
     except FileNotFoundError as error:
-        raise InputError(f"{what} is missing: no {picture.file} in {folder}; bake it again") from error
+        raise InputError(f"{what} is missing: no {picture.file} in {folder}; {REPAIR}") from error
     except OSError as error:
-        raise InputError(f"{what} is damaged: cannot decode {picture.file}; bake it again") from error
+        raise InputError(f"{what} is damaged: cannot decode {picture.file}; {REPAIR}") from error
     if picture.sha256 is not None and hashlib.sha256(content).hexdigest() != picture.sha256:
-        raise InputError(
-            f"{what} is damaged: {picture.file} does not match its declared sha256; bake it again"
-        )
+        raise InputError(f"{what} is damaged: {picture.file} does not match its declared sha256; {REPAIR}")
     return content
 
 

@@ -72,6 +72,7 @@ def test_blank_lines_and_blanks_around_cells_do_not_matter(tmp_path) -> None:
         ("id,x,f\n1,2,a\n", "no column 'y'"),
         ("id,y,f,y\n1,2,a,3\n", "two columns called 'y'"),
         ("id,y,f\n1,four,a\n", "'y' should be a number, got 'four' in line 2"),
+        ("id,y,f\n1,4,a\n2,seven,a\n3,five,a\n", "'y' should be a number, got 'seven' in line 3"),
         ("id,y,f\n1,inf,a\n", "got 'inf' in line 2"),
         ("id,y,f\n1,1_0,a\n", "got '1_0' in line 2"),
         ("id,y,f\n1,2,a\n1,2,\n", "'f' is empty in line 3"),

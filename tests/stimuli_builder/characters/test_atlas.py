@@ -111,8 +111,11 @@ def test_wrong_declaration_is_one_clear_line(tiny_character: Path, old: str, new
             b'name = "old"\nlevels = ["open.png", "shut.png"]\n',
             "label: this key is required and missing; .* another version",
         ),
-        (b'format = 9\nname = "new"\nlabel = "New"\n', "this key is required and missing; .* bake it again"),
-        (b"\xff\xfe", "no text in UTF-8; bake it again"),
+        (
+            b'format = 9\nname = "new"\nlabel = "New"\n',
+            "this key is required and missing; .* bake it again",
+        ),
+        (b"\xff\xfe", "no text in UTF-8; put a whole file in its place"),
         (b"", "this key is required and missing"),
     ],
 )

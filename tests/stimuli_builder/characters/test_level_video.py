@@ -118,7 +118,9 @@ def test_a_damaged_video_is_said_in_one_line(in_video: Path) -> None:
 
 
 def test_bytes_that_are_no_video_are_said_in_one_line() -> None:
-    with pytest.raises(InputError, match=r"levels is damaged: cannot decode x.mkv; bake it again"):
+    with pytest.raises(
+        InputError, match=r"levels is damaged: cannot decode x.mkv; put a whole file in its place"
+    ):
         decode_level_video(b"no video at all", "levels", "x.mkv")
 
 
