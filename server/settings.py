@@ -2,6 +2,7 @@
 
 import os
 import secrets
+from datetime import timedelta
 from email.utils import parseaddr
 from functools import cached_property
 from pathlib import Path
@@ -73,6 +74,11 @@ class Settings(BaseSettings):
         default=24.0, gt=0, description="Hours after which the answers of a preview are deleted."
     )
     session_hours: float = Field(default=12.0, gt=0, description="Hours an experimenter stays signed in.")
+    session_idle_minutes: float = Field(
+        default=120.0,
+        gt=0,
+        description="Minutes without a request after which an experimenter is signed out.",
+    )
     logins_per_minute: int = Field(
         default=30,
         ge=1,
@@ -198,6 +204,11 @@ class Settings(BaseSettings):
     def is_https(self) -> bool:
         """True where participants reach the server by https."""
         return self.public_url.startswith("https://")
+
+    @property
+    def session_idle(self) -> timedelta:
+        """How long a session may be unused."""
+        return timedelta(minutes=self.session_idle_minutes)
 
     @property
     def clip_folder(self) -> Path:

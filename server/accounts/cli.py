@@ -6,7 +6,7 @@ import typer
 from rich.console import Console
 
 from experiments.errors import InputError
-from server.accounts import invitations, service
+from server.accounts import invitations, notices, service
 from server.accounts.passwords import hash_password
 from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, one_of, out
@@ -81,7 +81,8 @@ def reset_password(
         given = password or typer.prompt("Password", hide_input=True, confirmation_prompt=True)
         fresh = hash_password(given, name)
         with services.database.write() as session:
-            logins = service.reset_password(session, name, fresh)
+            account_id, logins = service.reset_password(session, name, fresh)
+        notices.tell(services, account_id, notices.PASSWORD_RESET)
     out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")
     if logins:
         out.print(logins)
@@ -94,6 +95,8 @@ def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the ac
     Its sessions and API tokens end, and the audit log says so. Make sure that it is she who asks.
     Example: server account reset-second-factor ada
     """
-    with migrated_services() as services, services.database.write() as session:
-        service.reset_second_factor(session, name)
+    with migrated_services() as services:
+        with services.database.write() as session:
+            account_id = service.reset_second_factor(session, name)
+        notices.tell(services, account_id, notices.SECOND_FACTOR_REMOVED)
     out.print(f"the second factor of '{name}' is off; its sessions and API tokens have ended")

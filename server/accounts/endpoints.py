@@ -2,11 +2,11 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Cookie, Header, Request, Response
+from fastapi import APIRouter, BackgroundTasks, Cookie, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
-from server.accounts import invitations, second_factor, service, tokens
+from server.accounts import invitations, notices, second_factor, service, tokens
 from server.accounts.identity import (
     COOKIE,
     FreshMyself,
@@ -117,6 +117,7 @@ async def sign_in(
     services: ServicesDep,
     body: SignIn,
     response: Response,
+    after: BackgroundTasks,
     user_agent: UserAgent = "",
     device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
 ) -> Me:
@@ -125,7 +126,19 @@ async def sign_in(
     token = await attempt(services, body, address_of(request), device_cookie, user_agent)
     set_session_cookie(response, services, token)
     _set_device(response, services, body.name)
-    return await run_in_threadpool(_just_signed_in, services, token)
+    me = await run_in_threadpool(_just_signed_in, services, token)
+    notice = _notice(services, body, device_cookie)
+    if me.account is not None and notice is not None:
+        after.add_task(notices.tell, services, me.account.id, notice)
+    return me
+
+
+def _notice(services: Services, body: SignIn, device_cookie: str | None) -> notices.Notice | None:
+    """What of a sign-in its account is told by mail; None of one in a browser as always."""
+    if second_factor.is_recovery_code(body.code or ""):
+        return notices.RECOVERY_CODE_USED
+    known = known_device(services.settings.key, body.name, device_cookie)
+    return None if known else notices.NEW_BROWSER
 
 
 async def attempt(
@@ -226,7 +239,7 @@ def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
                 last_seen_at=row.last_seen_at,
                 expires_at=row.expires_at,
             )
-            for row in tokens.open_sessions(session, me)
+            for row in tokens.open_sessions(session, me, services.settings.session_idle)
         ]
 
 
@@ -237,11 +250,14 @@ def revoke_session(services: ServicesDep, me: Myself, session_id: Number) -> Non
 
 
 @router.put("/password", status_code=204)
-async def change_password(services: ServicesDep, me: Myself, body: ChangePassword) -> None:
+async def change_password(
+    services: ServicesDep, me: Myself, body: ChangePassword, after: BackgroundTasks
+) -> None:
     """Change the password; every other session and every API token ends."""
     await must_fit(services, me, body.password)
     fresh = await services.passwords.run(lambda: hash_password(body.new_password, me.name))
     await run_in_threadpool(service.change_password, services, me, fresh)
+    after.add_task(notices.tell, services, me.account_id, notices.PASSWORD_CHANGED)
 
 
 async def must_fit(services: Services, me: Identity, password: str) -> None:
@@ -280,16 +296,23 @@ def start_second_factor(services: ServicesDep, me: FreshMyself) -> SecondFactorS
 
 
 @router.put("/second-factor")
-def confirm_second_factor(services: ServicesDep, me: FreshMyself, body: ConfirmCode) -> RecoveryCodes:
+def confirm_second_factor(
+    services: ServicesDep, me: FreshMyself, body: ConfirmCode, after: BackgroundTasks
+) -> RecoveryCodes:
     """Turn the second factor on with the app's first code; gives the recovery codes, this once."""
-    return RecoveryCodes(codes=service.confirm_second_factor(services, me, body.code))
+    codes = service.confirm_second_factor(services, me, body.code)
+    after.add_task(notices.tell, services, me.account_id, notices.SECOND_FACTOR_ADDED)
+    return RecoveryCodes(codes=codes)
 
 
 @router.delete("/second-factor", status_code=204)
-async def remove_second_factor(services: ServicesDep, me: Myself, body: ConfirmPassword) -> None:
+async def remove_second_factor(
+    services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
+) -> None:
     """Turn the second factor off; asks for the password, and where the account has none for a code."""
     await must_prove(services, me, body.password)
     await run_in_threadpool(service.remove_second_factor, services, me)
+    after.add_task(notices.tell, services, me.account_id, notices.SECOND_FACTOR_REMOVED)
 
 
 @router.get("/tokens")

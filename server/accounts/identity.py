@@ -13,7 +13,7 @@ from server.accounts import repository
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ApiError
-from server.models import ROLES, Account, Role
+from server.models import ROLES, Account, AdminSession, Role
 from server.tokens import hash_token
 
 Scope = Literal["read", "personal", "write", "export"]
@@ -122,8 +122,8 @@ def identify(request: Request, services: Services) -> Identity:
 def _by_cookie(services: Services, cookie: str) -> Identity:
     with services.database.read() as session:
         signed_in = repository.session_by_token(session, hash_token(cookie))
-        ended = signed_in is not None and (signed_in.revoked_at or signed_in.expires_at <= now())
-        if signed_in is None or ended or signed_in.account.disabled_at:
+        since = now() - services.settings.session_idle
+        if signed_in is None or _has_ended(signed_in, since) or signed_in.account.disabled_at:
             raise NotSignedIn("Your session has ended; please sign in again.")
         account = signed_in.account
         identity = Identity(
@@ -140,6 +140,11 @@ def _by_cookie(services: Services, cookie: str) -> Identity:
             if (row := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
                 row.last_seen_at = now()
     return identity
+
+
+def _has_ended(signed_in: AdminSession, idle_since: datetime) -> bool:
+    """Whether a session was ended, is too old, or was not used since."""
+    return bool(signed_in.revoked_at or signed_in.expires_at <= now() or signed_in.last_seen_at <= idle_since)
 
 
 def _by_token(services: Services, secret: str) -> Identity:

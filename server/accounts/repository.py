@@ -1,5 +1,6 @@
 """Queries of accounts, their sessions, tokens and invitations."""
 
+from datetime import datetime
 from typing import Any, cast
 
 from sqlalchemy import CursorResult, delete, func, select, update
@@ -80,12 +81,13 @@ def sessions(session: Session, account_id: int) -> list[AdminSession]:
     return list(session.scalars(select(AdminSession).where(AdminSession.account_id == account_id)))
 
 
-def open_sessions(session: Session, account_id: int) -> list[AdminSession]:
-    """Sessions of an account that are neither revoked nor expired, the latest first."""
+def open_sessions(session: Session, account_id: int, idle_since: datetime) -> list[AdminSession]:
+    """Sessions of an account that are neither revoked nor expired and were used since, the latest first."""
     query = select(AdminSession).where(
         AdminSession.account_id == account_id,
         AdminSession.revoked_at.is_(None),
         AdminSession.expires_at > now(),
+        AdminSession.last_seen_at > idle_since,
     )
     return list(session.scalars(query.order_by(AdminSession.last_seen_at.desc())))
 

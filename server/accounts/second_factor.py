@@ -58,6 +58,11 @@ def new_recovery_codes() -> list[str]:
     return [f"{secrets.token_hex(4)}-{secrets.token_hex(4)}" for _ in range(RECOVERY_CODES)]
 
 
+def is_recovery_code(code: str) -> bool:
+    """Whether a code has the form of those of the day the phone is lost, not that of an app's."""
+    return "-" in code.strip()
+
+
 def hash_recovery_code(code: str) -> str:
     """What the database keeps of a recovery code."""
     return hash_token(code.strip().casefold())

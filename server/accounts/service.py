@@ -227,12 +227,18 @@ def check_known(session: Session, name: str) -> None:
     _named(session, name)
 
 
-def reset_password(session: Session, name: str, fresh: str) -> str:
-    """From the command line: give an account a new password (its hash); says what became of its logins."""
+def reset_password(session: Session, name: str, fresh: str) -> tuple[int, str]:
+    """From the command line: give an account a new password (its hash).
+
+    Returns
+    -------
+    tuple of int and str
+        The account's number, and what became of its logins.
+    """
     account = _named(session, name)
     logins = renew(session, None, account, fresh)
     record(session, None, "password reset", "account", account.name)
-    return logins
+    return account.id, logins
 
 
 def renew(session: Session, actor: Identity | None, account: Account, fresh: str) -> str:
@@ -263,12 +269,13 @@ def renew(session: Session, actor: Identity | None, account: Account, fresh: str
     return f"Its logins by {issuers} are removed; add your own again under My account."
 
 
-def reset_second_factor(session: Session, name: str) -> None:
-    """From the command line: turn an account's second factor off; sessions and tokens end."""
+def reset_second_factor(session: Session, name: str) -> int:
+    """From the command line: turn an account's second factor off, end its sessions; gives its number."""
     account = _named(session, name)
     _without_second_factor(session, account)
     end_everything(session, account.id)
     record(session, None, "second factor reset", "account", account.name)
+    return account.id
 
 
 def _named(session: Session, name: str) -> Account:
@@ -312,7 +319,8 @@ def remove_second_factor(services: Services, identity: Identity) -> None:
     """Turn the second factor off again; the password was asked for."""
     with services.database.write() as session:
         _without_second_factor(session, account_of(session, identity))
-        for row in repository.open_sessions(session, identity.account_id):
+        used_since = now() - services.settings.session_idle
+        for row in repository.open_sessions(session, identity.account_id, used_since):
             row.second_factor = False
         record(session, identity, "second factor removed", "account", identity.name)
 

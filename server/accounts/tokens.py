@@ -14,9 +14,9 @@ from server.models import AdminSession, ApiToken
 from server.tokens import hash_token, new_token
 
 
-def open_sessions(session: Session, owner: Identity) -> list[AdminSession]:
-    """One's own sessions that are neither revoked nor expired."""
-    return repository.open_sessions(session, owner.account_id)
+def open_sessions(session: Session, owner: Identity, idle: timedelta) -> list[AdminSession]:
+    """One's own sessions that are neither revoked nor expired, nor unused for longer than `idle`."""
+    return repository.open_sessions(session, owner.account_id, now() - idle)
 
 
 def revoke_session(database: Database, owner: Identity, session_id: int | None) -> None:

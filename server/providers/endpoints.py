@@ -2,10 +2,11 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Cookie, Form, Header, Query, Request, Response
+from fastapi import APIRouter, BackgroundTasks, Cookie, Form, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import RedirectResponse
 
+from server.accounts import notices
 from server.accounts.endpoints import address_of, must_prove, set_session_cookie
 from server.accounts.identity import FreshMyself, Myself, check_origin
 from server.context import Services, ServicesDep
@@ -102,6 +103,7 @@ async def come_back(
     request: Request,
     services: ServicesDep,
     provider: ProviderId,
+    after: BackgroundTasks,
     state: Told = "",
     code: Told = "",
     iss: Annotated[str | None, Query(max_length=300)] = None,
@@ -130,7 +132,7 @@ async def come_back(
         await run_in_threadpool(service.failed, services, provider, refusal)
         return RedirectResponse(f"/admin{page}?refused={refusal.code}", 303)
     response = RedirectResponse(f"/admin{finished.page}", 303)
-    _go_on(response, services, finished)
+    _go_on(response, services, finished, after)
     return response
 
 
@@ -140,6 +142,7 @@ async def finish_with_code(
     services: ServicesDep,
     body: SecondFactorCode,
     response: Response,
+    after: BackgroundTasks,
     user_agent: UserAgent = "",
     browser: LoginCookie = "",
 ) -> BeginSignIn:
@@ -147,7 +150,7 @@ async def finish_with_code(
     check_origin(request, services)
     _enter(services, request, "code after a provider")
     finished = await run_in_threadpool(service.finish_with_code, services, browser, body.code, user_agent)
-    _go_on(response, services, finished)
+    _go_on(response, services, finished, after)
     return BeginSignIn(next=finished.page)
 
 
@@ -172,7 +175,11 @@ async def end_by_provider(
         client.handled(ended)
 
 
-def _go_on(response: Response, services: Services, finished: service.Finished) -> None:
+def _go_on(
+    response: Response, services: Services, finished: service.Finished, after: BackgroundTasks
+) -> None:
+    if finished.told is not None:
+        after.add_task(notices.tell, services, finished.told.account_id, finished.told.notice)
     if finished.asks_code is not None:
         _set_login_cookie(response, services, finished.asks_code)
         return
@@ -189,6 +196,7 @@ def list_logins(services: ServicesDep, me: Myself) -> list[LoginOut]:
 
 
 @router.delete("/logins/{login_id}", status_code=204)
-def remove_login(services: ServicesDep, me: FreshMyself, login_id: Number) -> None:
+def remove_login(services: ServicesDep, me: FreshMyself, login_id: Number, after: BackgroundTasks) -> None:
     """Take a login off one's own account."""
     logins.remove_login(services, me, login_id)
+    after.add_task(notices.tell, services, me.account_id, notices.LOGIN_REMOVED)

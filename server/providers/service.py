@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from server.accounts import repository as accounts
 from server.accounts.audit import NOBODY, record
 from server.accounts.invitations import check_invitation, find_invitation
+from server.accounts.notices import LOGIN_ADDED, RECOVERY_CODE_USED, Told
+from server.accounts.second_factor import is_recovery_code
 from server.accounts.service import begin_session, identity_of, record_failure
 from server.accounts.service import second_factor_failure as code_failure
 from server.clock import now
@@ -28,11 +30,18 @@ from server.tokens import hash_token, new_token
 
 @dataclass(frozen=True)
 class Finished:
-    """Where the browser goes on, with the session's cookie or the one that asks for a second factor."""
+    """Where the browser goes on, with the session's cookie or the one that asks for a second factor.
+
+    Attributes
+    ----------
+    told : Told or None
+        What its account is told by mail.
+    """
 
     page: str
     session: str | None = None
     asks_code: str | None = None
+    told: Told | None = None
 
 
 def begin_invited(services: Services, provider_id: str, token: str) -> Begun:
@@ -49,7 +58,7 @@ def finish(
     """Let in whom the provider recognised, or give the account that asked for it a login."""
     if attempt.purpose == "link":
         link(services, provider_id, attempt, whom)
-        return Finished("/account")
+        return Finished("/account", told=Told(attempt.account_id or 0, LOGIN_ADDED))
     provider = provider_of(services, provider_id)
     with services.database.write() as session:
         held = held_workspaces(session, provider)
@@ -100,7 +109,8 @@ def finish_with_code(services: Services, browser: str, code: str, user_agent: st
             record(
                 session, identity_of(account), "signed in", "account", account.name, provider=attempt.provider
             )
-            return Finished(attempt.next_page, session=token)
+            told = Told(account.id, RECOVERY_CODE_USED) if is_recovery_code(code) else None
+            return Finished(attempt.next_page, session=token, told=told)
         services.sign_ins.codes.failed(name)
         record_failure(services, session, account)
     raise failure or NotRecognised("This sign-in was finished before; please begin it again.")

@@ -9,6 +9,9 @@ from typing import Any
 
 from aiosmtpd.controller import Controller
 
+ADDRESS = "ada@lab.example"
+"""Of the account whose letters are read."""
+
 
 class Letterbox:
     """What came, in order."""

@@ -87,6 +87,23 @@ def test_streams_of_an_account_are_bounded(
     assert viewer.get(stream).text.count("event: monitor") == 1
 
 
+def test_streams_of_all_accounts_together_are_bounded(
+    client: TestClient, services: Services, study: StudyInDatabase
+) -> None:
+    viewer = signed_in(client, services, "viewer")
+    object.__setattr__(services, "streams", OpenStreams(2, overall=3))
+    services.settings.monitor_stream_minutes = 0
+    account = viewer.get("/session").json()["account"]["id"]
+    others = [services.streams.one(account + number) for number in (1, 1, 2)]
+    with others[0], others[1], others[2]:
+        refused = viewer.get("/studies/short/monitor/stream")
+        assert (refused.status_code, refused.json()["error"]["code"]) == (429, "too_many_requests")
+        assert "all are taken" in refused.json()["error"]["message"]
+        with services.streams.one(account) as at_once:
+            assert not at_once
+    assert viewer.get("/studies/short/monitor/stream").text.count("event: monitor") == 1
+
+
 def test_heads_that_are_slow_to_read_are_refused(client: TestClient) -> None:
     for method in ("GET", "POST"):
         long = client.request(method, "/api/run?" + "a=1&" * 2049)

@@ -1,12 +1,14 @@
 """A login is added by the account's own person, and a reset leaves none of a stranger's."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pyotp
 import pytest
 from fastapi.testclient import TestClient
 
 from server.accounts import service as accounts
+from server.accounts.notices import LOGIN_ADDED
 from server.accounts.passwords import hash_password
 from server.accounts.throttle import BackOff
 from server.context import Services
@@ -14,7 +16,8 @@ from server.models import Account, AccountLogin, AuditEntry, LoginAttempt
 from server.providers.declaration import Provider
 from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, signed_in, wrong_code
-from tests.helpers.providers import RunningProvider, Visitor, provider_for
+from tests.helpers.mail import ADDRESS, smtp_server
+from tests.helpers.providers import SECRET, RunningProvider, Visitor, provider_for
 
 PUBLIC_URL = "http://localhost:8000"
 FRESH = "an entirely new passphrase"
@@ -27,8 +30,12 @@ def running() -> Iterator[RunningProvider]:
 
 
 @pytest.fixture
-def settings(settings: Settings, running: RunningProvider) -> Settings:
-    uni = Provider(label="The University", issuer=running.issuer, client_id="palpebra")
+def settings(settings: Settings, running: RunningProvider, tmp_path: Path) -> Settings:
+    secret = tmp_path / "client secret"
+    secret.write_text(SECRET)
+    uni = Provider(
+        label="The University", issuer=running.issuer, client_id="palpebra", client_secret_file=secret
+    )
     return settings.model_copy(update={"oidc": {"uni": uni}, "public_url": PUBLIC_URL})
 
 
@@ -94,10 +101,24 @@ def test_a_new_password_ends_a_login_under_way(
     assert logins(services) == 0
 
 
+def test_a_letter_tells_of_a_login_that_was_added(ada: Admin, services: Services) -> None:
+    with services.database.write() as session:
+        session.query(Account).one().email = ADDRESS
+    with smtp_server() as (box, port):
+        for name, value in {"host": "127.0.0.1", "port": port, "security": "none"}.items():
+            setattr(services.settings, f"smtp_{name}", value)
+        services.settings.mail_from = "palpebra@lab.example"
+        visitor = Visitor(ada.client)  # type: ignore[arg-type]
+        url = ada.send("POST", "/logins/uni", {"proof": PASSWORD}).json()["url"]
+        assert "refused=" not in visitor.come_back(visitor.authorise(url, **{"as": "eve"}))
+    assert logins(services) == 1
+    assert [(letter["To"], letter["Subject"]) for letter in box.letters] == [(ADDRESS, LOGIN_ADDED.subject)]
+
+
 def test_a_reset_removes_the_logins_and_says_which(ada: Admin, services: Services) -> None:
     with_login(services)
     with services.database.write() as session:
-        said = accounts.reset_password(session, "ada", hash_password(FRESH, "ada"))
+        _, said = accounts.reset_password(session, "ada", hash_password(FRESH, "ada"))
     assert "https://uni.example are removed" in said
     assert logins(services) == 0
     with services.database.read() as session:
@@ -109,6 +130,6 @@ def test_a_reset_of_an_account_without_password_names_its_logins(ada: Admin, ser
     with_login(services)
     without_password(services)
     with services.database.write() as session:
-        said = accounts.reset_password(session, "ada", hash_password(FRESH, "ada"))
+        _, said = accounts.reset_password(session, "ada", hash_password(FRESH, "ada"))
     assert "signed in to by https://uni.example as before" in said
     assert logins(services) == 1
