@@ -120,7 +120,8 @@ def _p95(values: Sequence[float], marks: Sequence[int]) -> tuple[float, float]:
     return percentile(quiet, 0.95), percentile(attacked, 0.95)
 
 
-async def _run_of_attacker(server: LoadServer) -> str:
+async def run_of_attacker(server: LoadServer) -> str:
+    """Begin a run; gives its token."""
     connection = Connection(server.port)
     body = {"language": "en", "client_id": str(uuid.uuid4())}
     _, answer = await connection.call("POST", f"/api/links/{server.link}/runs", body)
@@ -133,7 +134,7 @@ async def attack_all(
 ) -> list[Line]:
     """Every attack after the other, the raters going on all the while."""
     owner = api_token(server.services, "read", "personal", "write", "export", name="owner")
-    target = attacks.Target(server.port, server.link, owner, await _run_of_attacker(server))
+    target = attacks.Target(server.port, server.link, owner, await run_of_attacker(server))
     people: list[LoadRater] = await begin(server, raters, tally, 10)
     await prepare(people)
     lines: list[Line] = []
