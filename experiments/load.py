@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from experiments.definition import Experiment
+from experiments.definition.experiment import STORED
 from experiments.errors import InputError, did_you_mean
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
@@ -17,7 +18,7 @@ from experiments.toml_lines import line_of
 from experiments.wrong_values import is_follower, wrong_value
 
 FOLDER = Path(__file__).parent
-_LOCATION = re.compile(r"^([a-z_]+(?:\.[a-z_]+)*): (.*)$")
+_LOCATION = re.compile(r"^([a-z_]+(?:\.(?:[a-z_]+|\d+))*): (.*)$")
 SHIPPED = ("exp1", "exp2", "exp3")
 DEMOS = (
     *("pairs-demo", "sliders-demo", "dcr-demo", "threshold-demo", "plane-demo", "checks-demo", "faces-demo"),
@@ -99,7 +100,7 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error
     try:
         # TOML tells texts, numbers and truth values apart: none is taken for another.
-        return Experiment.model_validate(_with_tuples(data), strict=not has_data)
+        return Experiment.model_validate(_with_tuples(data), strict=not has_data, context={STORED: has_data})
     except ValidationError as error:
         # A misspelt key is also a missing one: name the misspelling first.
         causes = (detail for detail in error.errors() if not is_follower(detail))
@@ -136,7 +137,8 @@ def _problem(detail: Any, text: str) -> Problem:
         word = str(location[-1])
         message = f"unknown key '{word}'{did_you_mean(word, _keys_at(detail['loc'][:-1]))}"
     elif not location and (named := _LOCATION.match(message)):
-        location, message = tuple(named[1].split(".")), named[2]
+        parts = named[1].split(".")
+        location, message = tuple(int(part) - 1 if part.isdecimal() else part for part in parts), named[2]
     path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
     return Problem(line_of(text, location), path, message)
 

@@ -35,7 +35,7 @@ class Display(Declaration):
     minimum_height_px: Annotated[int, Field(ge=0)] = 500
     """Smallest window height, in CSS pixels, in which a run may begin."""
     allow_touch: bool = True
-    """False turns away devices that have a touch screen and no mouse: phones and tablets."""
+    """Lets in devices that have a touch screen and no mouse, phones and tablets. Off: turns them away."""
     sync_patch: bool = False
     """Draws a square into the clip's lower left corner that codes the frame's number, for a photodiode or a
     phone's film (`stimuli scope`). For measuring a set-up, not for participants."""

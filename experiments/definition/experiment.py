@@ -17,6 +17,7 @@ from experiments.definition.evidence import Evidence
 from experiments.definition.factors import Exemplars, Factor, names_listed
 from experiments.definition.forms import Form
 from experiments.definition.groups import Groups
+from experiments.definition.languages import fault as language_fault
 from experiments.definition.names import refuse_repeats, refuse_reserved
 from experiments.definition.retention import Retention
 from experiments.definition.session import Session
@@ -36,7 +37,7 @@ from experiments.trials.union import AnyTrial
 from experiments.wrong_values import wrong_value
 
 STORED = "stored"
-"""Context of the validation of a declaration that a database holds: names taken since then stay allowed."""
+"""Context of the validation of a declaration that has data: what is newly refused stays allowed."""
 
 
 class Experiment(Declaration):
@@ -154,6 +155,8 @@ class Experiment(Declaration):
         for language in self.languages:
             if language not in self.texts:
                 raise ValueError(f"texts.{language} is missing: languages lists '{language}'")
+        if not (info.context or {}).get(STORED) and (fault := language_fault(self, self.languages)):
+            raise ValueError(fault)
         return self
 
     @model_validator(mode="after")

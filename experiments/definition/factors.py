@@ -51,10 +51,12 @@ class Factor(Declaration):
     label: str
     """What tables, figures and reports call the factor."""
     between: bool = False
-    """True shows each participant one level: groups take turns, and the analysis compares participants."""
+    """On: each participant sees one level, groups take turns, and the analysis compares participants. Off:
+    everybody sees every level."""
     random: bool = False
-    """True for levels that stand for more like them, such as faces or voices: the analysis of variance
-    averages over them, and the mixed models have them as random items, so that results hold for others."""
+    """On: the levels stand for more like them, such as faces or voices: the analysis of variance averages
+    over them, and the mixed models have them as random items, so that results hold for others. Off: the
+    levels are compared with one another."""
     per_participant: Annotated[int, Field(ge=1, le=1000)] | None = None
     """How many of a random factor's levels a participant sees, each level equally often over participants,
     give or take one; left out, all of them."""

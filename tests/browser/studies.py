@@ -135,3 +135,9 @@ PLAIN = without(
     ("break_seconds_min = 1", "break_seconds_min = 0"),
 )
 """Without the screens that measure the screen: consent, forms, trials."""
+ARABIC = (
+    PLAIN.replace('languages = ["en", "de"]', 'languages = ["ar"]')
+    .replace("[texts.en]", "[texts.ar]")
+    .replace("{ en = ", "{ ar = ")
+)
+"""Run from right to left; the page's words are Arabic, those of the study stay English."""

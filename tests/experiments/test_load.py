@@ -1,3 +1,5 @@
+import json
+
 import pytest
 
 from experiments.errors import InputError
@@ -11,6 +13,8 @@ from experiments.load import (
 )
 from experiments.rules import ScreenFormAnswer
 from experiments.schema.canonical import definition_sha256
+from experiments.schema.stored import load_stored
+from experiments.schema.upgrades import FORMAT
 from experiments.trials.clip_rating.declaration import clip_rating_of
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")
@@ -150,3 +154,24 @@ def test_demos_are_found_by_the_names_of_their_file_and_of_the_experiment(name: 
     assert load_experiment(by_name.name) == by_name == load_experiment(str(FOLDER / f"{file}.toml"))
     with pytest.raises(InputError, match=r"no experiment 'pairs_dmo'; did you mean 'pairs-demo'\?"):
         load_experiment("pairs_dmo")
+
+
+def test_a_text_without_the_first_language_is_refused() -> None:
+    """A question declared in German alone was accepted; participants in English saw it in no language."""
+    text = EXP1.replace('languages = ["en", "de"]', 'languages = ["en"]')
+    text = text.replace('en = "How natural was this blink?", ', "")
+    with pytest.raises(DefinitionError) as caught:
+        parse_experiment(text, "mine.toml")
+    assert str(caught.value) == (
+        "mine.toml: line 85: trial.scale.question: expected a text in en, the first of languages, got one "
+        "in de alone, and languages does not list de; add en to the text, or correct languages"
+    )
+    # What was collected by it is analysed, and what a database holds is read.
+    experiment = parse_experiment(text, has_data=True)
+    assert load_stored(json.loads(experiment.model_dump_json()), FORMAT) == experiment
+
+
+def test_texts_without_the_first_language_are_counted() -> None:
+    text = EXP1.replace('languages = ["en", "de"]', 'languages = ["fr"]').replace("[texts.de]", "[texts.fr]")
+    with pytest.raises(DefinitionError, match=r"got one in en, de alone, .* \(\d+ more lack it\)"):
+        parse_experiment(text)

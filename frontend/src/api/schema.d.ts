@@ -3758,7 +3758,7 @@ export interface components {
             minimum_height_px: number;
             /**
              * Allow Touch
-             * @description False turns away devices that have a touch screen and no mouse: phones and tablets.
+             * @description Lets in devices that have a touch screen and no mouse, phones and tablets. Off: turns them away.
              * @default true
              */
             allow_touch: boolean;
@@ -4462,14 +4462,16 @@ export interface components {
             label: string;
             /**
              * Between
-             * @description True shows each participant one level: groups take turns, and the analysis compares participants.
+             * @description On: each participant sees one level, groups take turns, and the analysis compares participants. Off:
+             *     everybody sees every level.
              * @default false
              */
             between: boolean;
             /**
              * Random
-             * @description True for levels that stand for more like them, such as faces or voices: the analysis of variance
-             *     averages over them, and the mixed models have them as random items, so that results hold for others.
+             * @description On: the levels stand for more like them, such as faces or voices: the analysis of variance averages
+             *     over them, and the mixed models have them as random items, so that results hold for others. Off: the
+             *     levels are compared with one another.
              * @default false
              */
             random: boolean;

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from tests.browser.server_process import ServerProcess
-from tests.browser.studies import PLAIN, STUDY, without
+from tests.browser.studies import ARABIC, PLAIN, STUDY, without
 from tests.browser.visit import Visit, axe_violations
 from tests.helpers.databases import run_server_command
 
@@ -132,10 +132,7 @@ def test_confirming_changing_and_commenting(server: ServerProcess, tmp_path: Pat
 def test_right_to_left_turns_the_page_and_the_scale(
     server: ServerProcess, tmp_path: Path, page: Page
 ) -> None:
-    arabic = PLAIN.replace('languages = ["en", "de"]', 'languages = ["ar"]').replace(
-        "[texts.en]", "[texts.ar]"
-    )
-    study = server.add_study(tmp_path / "clips", arabic)
+    study = server.add_study(tmp_path / "clips", ARABIC)
     server.start()
     Visit(page, server.address).open(study.link_token)
     assert page.evaluate("document.documentElement.dir") == "rtl"

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.browser.server_process import ServerProcess
-from tests.browser.studies import PLAIN, STUDY
+from tests.browser.studies import ARABIC, PLAIN, STUDY
 from tests.browser.visit import Visit, axe_violations, fit_card
 from tests.helpers.studies import StudyInDatabase
 
@@ -18,8 +18,6 @@ MEASURED = (
     "SELECT px_per_mm, repeats, spread_percent, ruler_check, distance_method, distance_typed_mm, occasion "
     "FROM calibrations"
 )
-# The Arabic words below are what the page says.
-ARABIC = PLAIN.replace('languages = ["en", "de"]', 'languages = ["ar"]').replace("[texts.en]", "[texts.ar]")
 
 
 @pytest.fixture(scope="module")
