@@ -142,7 +142,9 @@ async def attack_all(
         pipe.send((names[0], 0.0))  # it has imported everything once it answers
         await asyncio.to_thread(pipe.recv)
         ends = time.monotonic() + len(names) * (2 * seconds + SETTLE_S) + 60
-        rating = [asyncio.create_task(one.rate_until(ends, EVERY_S)) for one in people]
+        # Slower where their trials would run out before the last attack.
+        pace = max(EVERY_S, 1.1 * (ends - time.monotonic()) / len(people[0].trials))
+        rating = [asyncio.create_task(one.rate_until(ends, pace)) for one in people]
         await asyncio.sleep(2 * EVERY_S)
         for name in names:
             lines.append(await measured(name, seconds, server, tally, pipe))
@@ -161,7 +163,10 @@ def main() -> int:
     )
     parser.add_argument("--seconds", type=float, default=12, help="length of each attack (12)")
     parser.add_argument(
-        "--raters", type=int, default=40, help="honest raters, a clip and a rating each 2 s (40)"
+        "--raters",
+        type=int,
+        default=40,
+        help="honest raters, a clip and a rating each 2 s, or slower in a long run (40)",
     )
     parser.add_argument("--only", nargs="*", choices=tuple(attacks.ATTACKS), default=tuple(attacks.ATTACKS))
     asked = parser.parse_args()

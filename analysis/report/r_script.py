@@ -41,7 +41,7 @@ def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
         ],
         contrasts_printed=_contrasts(analysis, names),
         pillai=_pillai(analysis, names),
-        simple=[_levels_held(analysis, names, simple) for simple in _exact_simple(analysis)],
+        simple=[_levels_held(analysis, names, simple) for simple in analysis.simple_effects],
         simple_printed=_simple(analysis, names),
         **sizes(analysis, names),
     )
@@ -164,6 +164,7 @@ def _adjusted(analysis: Analysis, names: dict[str, str]) -> str:
         [
             _in_r(margins[pair.effect], names),
             *map(r_number, (pair.p, pair.p_bonferroni, pair.p_holm, pair.p_sidak, pair.p_fdr)),
+            *map(r_number, (pair.t, pair.df, len(_cells(analysis, margins[pair.effect])), pair.p_tukey)),
         ]
         for pair in analysis.pairs
     ]
@@ -187,15 +188,6 @@ def _pillai(analysis: Analysis, names: dict[str, str]) -> str:
     return as_csv(rows).strip()
 
 
-def _exact_simple(analysis: Analysis) -> list[SimpleEffect]:
-    """Simple effects with an exact F, which are printed by it."""
-    return [
-        simple
-        for simple in analysis.simple_effects
-        if simple.test.multivariate is not None and simple.test.multivariate.exact
-    ]
-
-
 def _levels_held(analysis: Analysis, names: dict[str, str], simple: SimpleEffect) -> str:
     """The levels at which a simple effect is tested, as codes."""
     levels = dict(_factors(analysis))
@@ -204,11 +196,15 @@ def _levels_held(analysis: Analysis, names: dict[str, str], simple: SimpleEffect
 
 
 def _simple(analysis: Analysis, names: dict[str, str]) -> str:
+    """Each as it is printed: the exact F, or that of too few participants with Greenhouse-Geisser's df."""
     rows = []
-    for simple in _exact_simple(analysis):
-        test = simple.test.multivariate
-        if test is not None:
-            numbers = (test.f_value, test.df_effect, test.df_error, test.p_value)
-            within = "TRUE" if simple.of in analysis.anova.factors else "FALSE"
-            rows.append([names[simple.of], *map(r_number, numbers), within])
+    for simple in analysis.simple_effects:
+        exact, test = simple.test.multivariate, simple.test.univariate
+        if exact is not None:
+            numbers = (exact.f_value, exact.df_effect, exact.df_error, exact.p_value)
+        else:
+            numbers = (test.f_value, test.df_effect_gg, test.df_error_gg, test.p_gg)
+        within = simple.of in analysis.anova.factors
+        how = ("exact" if exact is not None else "corrected") if within else "between"
+        rows.append([names[simple.of], *map(r_number, numbers), how])
     return as_csv(rows).strip()

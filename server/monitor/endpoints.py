@@ -60,7 +60,7 @@ async def _waited(services: Services) -> bool:
 
 
 @router.get("/monitor/stream", response_class=StreamingResponse)
-def stream_monitor(
+async def stream_monitor(
     request: Request, services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> StreamingResponse:
     """Server-sent events: the whole monitor first, then every two seconds what has changed.
@@ -69,7 +69,8 @@ def stream_monitor(
     when the session ends or the server does; the browser then connects again by itself.
     """
     services.streams.check(identity.account_id)
-    first = _snapshot(services, study, identity, origin)
+    with services.streams.one(identity.account_id):  # of hundreds asked for at once, most cost no look
+        first = await run_in_threadpool(_snapshot, services, study, identity, origin)
 
     async def changing() -> AsyncIterator[MonitorSnapshot]:
         yield first

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -127,7 +128,8 @@ ALTERED = {
     "margin,cell,mean,se,low,high": {"phase:hour": ("mean", "low"), "treatment": ("high",)},
     "margin,first,second,difference,se,df,t,p,low,high": {"hour": ("low",), "gender": ("t",)},
     "factor,name,estimate,se,t,p,low,high": {"hour": ("p",)},
-    "of,F,df,df_error,p,within": {"phase": ("df",)},
+    "of,F,df,df_error,p,test": {"phase": ("df",)},
+    "margin,p,bonferroni,holm,sidak,fdr,t,df,means,tukey": {"phase": ("tukey",)},
 }
 """By the head of a table of `verify.R`: of which rows the first has another number, and which."""
 
@@ -161,6 +163,7 @@ def test_r_finds_each_altered_number_and_no_other(tmp_path) -> None:
         "pairs ci hour",
         "contrast hour",
         "simple df",
+        "tukey phase",
     }
 
 
@@ -177,6 +180,26 @@ def test_r_agrees_with_pairs_of_two_factors_and_a_cell_in_which_nobody_differs(t
     (said,) = run_together([tmp_path / "verify.R"])
     assert "\npairs    A:B " in said
     assert "Every number agrees with R." in said
+
+
+def test_r_agrees_with_simple_effects_of_too_few_participants_for_an_exact_f(tmp_path) -> None:
+    needed("afex", "car", "emmeans")
+    rng = np.random.default_rng(11)
+    y = rng.normal(size=(4, 2, 6)) + 5 * np.arange(2)[:, None] * np.arange(6)
+    lines = [f"p{i},a{a},b{b},{y[i, a, b]}" for i, a, b in np.ndindex(y.shape)]
+    path = tmp_path / "few.csv"
+    path.write_text("\n".join(["id,A,B,y", *lines]))
+    rows = read_long_table(path, "id", "y", ["A", "B"]).rows
+    about = {"name": "few", "title": "few", "source": "few.csv", "rating": "y"}
+    analysis = analyse_cells(cell_table(rows, "id", "y", ["A", "B"]), **about)
+    kinds = {simple.of: simple.test.multivariate is None for simple in analysis.simple_effects}
+    assert kinds == {"A": False, "B": True}
+    for name, content in r_files(analysis).items():
+        (tmp_path / name).write_bytes(content)
+    (said,) = run_together([tmp_path / "verify.R"])
+    assert "\nsimple   p " in said
+    assert "\ntukey    B " in said
+    assert "Every number agrees with R." in said, said
 
 
 def test_r_finds_a_number_that_it_has_not_and_a_row_too_few(tmp_path) -> None:

@@ -95,7 +95,7 @@ def test_pairs(case) -> None:
             near(sign * pair.difference, theirs["difference"], f"{margin['factors']} {a} {b}")
             for key in ("se", "df", "p", "p_sidak", "p_fdr"):
                 relative(getattr(pair, key), theirs[key], f"{margin['factors']} {a} {b} {key}")
-            # R's ptukey is off by up to 2.1e-7 here; scipy's studentized_range agrees with ours to 1e-11
+            # R's ptukey is off by up to 2.1e-7 here; scipy's studentized_range agrees with ours
             assert pair.p_tukey == pytest.approx(theirs["p_tukey"], rel=1e-6, abs=3e-7)
 
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import integrate, stats
+from scipy.special import ndtr
 from statsmodels.stats.multitest import multipletests
 
 from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, sidak, tukey
@@ -10,6 +11,7 @@ from analysis.within.anova import within_anova
 from analysis.within.contrast_tests import contrasts_of, equivalence, polynomial_weights, trends
 from analysis.within.pairwise import one_factor_pairs, pairs_of
 from analysis.within.simple_effects import main_p, simple_effect, simple_effects
+from analysis.within.studentized_range import range_tail
 from experiments.errors import InputError
 
 RNG = np.random.default_rng(5)
@@ -36,8 +38,36 @@ def test_tukey_agrees_with_the_studentized_range(k, df) -> None:
     assert tukey(t, k, df) == pytest.approx(stats.studentized_range.sf(np.sqrt(2) * t, k, df), abs=1e-9)
 
 
-def test_tukey_of_two_means_is_the_t_test() -> None:
-    assert tukey(np.array([2.1]), 2, 17) == pytest.approx(2 * stats.t.sf(2.1, 17), rel=1e-9)
+@pytest.mark.parametrize("df", [1, 3, 17, 400])
+def test_tukey_of_two_means_is_the_t_test(df) -> None:
+    t = np.array([0.01, 0.5, 2.1, 8, 25])
+    assert tukey(t, 2, df) == pytest.approx(2 * stats.t.sf(t, df), rel=1e-10, abs=1e-60)
+
+
+@pytest.mark.parametrize("k", [3, 6, 60])
+def test_tukey_with_a_known_error_is_the_range_of_normal_values(k) -> None:
+    """Its lower tail by scipy's quadrature of the density of the range, where both have digits."""
+    w = np.array([0.5, 2.0, 4.0, 6.0])
+    below = [
+        integrate.quad(lambda z, one=one: k * stats.norm.pdf(z) * (ndtr(z) - ndtr(z - one)) ** (k - 1), -9,
+                       15, epsabs=1e-13, limit=200)[0]
+        for one in w
+    ]  # fmt: skip
+    assert range_tail(w, k) == pytest.approx(1 - np.array(below), abs=1e-10)
+    assert tukey(w / np.sqrt(2), k, 10**7) == pytest.approx(range_tail(w, k), rel=1e-5)
+
+
+def test_tukey_of_no_number_is_none() -> None:
+    assert np.isnan(tukey(np.array([np.nan, 1.0]), 3, 5)).tolist() == [True, False]
+
+
+def test_tukey_where_ptukey_has_a_third_too_little() -> None:
+    """q = 35.4 of six means on 3 df: R's own tail of a known error, integrated over the error by R 4.2.2.
+
+    `integrate(function(u) ptukey(25 * sqrt(2 * qchisq(u, 3) / 3), 6, Inf, lower.tail = FALSE), 0, 1)`, in
+    log s with relative tolerance 1e-9: 0.00068249594; `ptukey` itself 0.00087705.
+    """
+    assert tukey(np.array([25.0]), 6, 3) == pytest.approx([0.00068249594], rel=1e-7)
 
 
 def test_simple_effects_within_are_one_way_anovas_of_the_slice() -> None:
