@@ -18,6 +18,7 @@ from server.door import Door
 from server.errors import install_error_handlers
 from server.evidence.later import digests_judged_later
 from server.export import endpoints as export
+from server.lane import ExperimentersLane
 from server.library import endpoints as library
 from server.library import strips
 from server.methods import endpoints as methods
@@ -132,6 +133,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     for router in _routers():
         app.include_router(router)
     install_error_handlers(app)
+    app.add_middleware(ExperimentersLane)  # inside the door: a body that comes slowly holds no place
     app.add_middleware(Door, settings=services.settings)
     app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)

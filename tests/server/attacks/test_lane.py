@@ -1,0 +1,83 @@
+"""Many requests of experimenters at once wait for one another; raters wait for none of them."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import pytest
+
+from server.lane import ExperimentersLane
+
+PAGE = "/api/admin/studies"
+
+
+class Pages:
+    """An application whose answers begin when the test says so."""
+
+    def __init__(self) -> None:
+        self.begun: list[str] = []
+        self.begins, self.ends = asyncio.Event(), asyncio.Event()
+        self.breaks = False
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        self.begun.append(scope["path"])
+        await self.begins.wait()
+        if self.breaks:
+            raise OSError("the client went away")
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await self.ends.wait()
+
+
+async def _nothing(*_: Any) -> Any:
+    return {}
+
+
+def _asked(lane: ExperimentersLane, *paths: str) -> list[asyncio.Task[None]]:
+    scopes = [{"type": "http", "method": "GET", "path": path} for path in paths]
+    return [asyncio.ensure_future(lane(scope, _nothing, _nothing)) for scope in scopes]
+
+
+async def _settled() -> None:
+    for _ in range(20):
+        await asyncio.sleep(0)
+
+
+@pytest.fixture
+def loop() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as runner:
+        yield runner
+
+
+def test_two_are_served_and_the_third_waits_until_an_answer_begins(loop: asyncio.Runner) -> None:
+    async def go() -> None:
+        pages = Pages()
+        lane = ExperimentersLane(pages, at_once=2)
+        tasks = _asked(lane, PAGE, PAGE, PAGE, "/api/run", "/clips/a.mp4", "/api/admin/session")
+        await _settled()
+        assert pages.begun == [PAGE, PAGE, "/api/run", "/clips/a.mp4", "/api/admin/session"]
+        pages.begins.set()  # the answers begin and stream on
+        await _settled()
+        assert pages.begun.count(PAGE) == 3
+        pages.ends.set()
+        await asyncio.gather(*tasks)
+
+    loop.run(go())
+
+
+def test_a_request_that_breaks_or_is_given_up_leaves_its_place(loop: asyncio.Runner) -> None:
+    async def go() -> None:
+        pages = Pages()
+        pages.breaks = True
+        lane = ExperimentersLane(pages, at_once=1)
+        first, second = _asked(lane, PAGE, PAGE)
+        await _settled()
+        second.cancel()  # while it waits
+        pages.begins.set()
+        with suppress(OSError, asyncio.CancelledError):
+            await asyncio.gather(first, second)
+        pages.breaks = False
+        pages.ends.set()
+        await asyncio.wait_for(_asked(lane, PAGE)[0], 5)
+
+    loop.run(go())
