@@ -200,10 +200,9 @@ def _simple(analysis: Analysis, names: dict[str, str]) -> str:
     rows = []
     for simple in analysis.simple_effects:
         exact, test = simple.test.multivariate, simple.test.univariate
+        numbers = (test.f_value, test.df_effect_gg, test.df_error_gg, test.p_gg)
         if exact is not None:
             numbers = (exact.f_value, exact.df_effect, exact.df_error, exact.p_value)
-        else:
-            numbers = (test.f_value, test.df_effect_gg, test.df_error_gg, test.p_gg)
         within = simple.of in analysis.anova.factors
         how = ("exact" if exact is not None else "corrected") if within else "between"
         rows.append([names[simple.of], *map(r_number, numbers), how])
