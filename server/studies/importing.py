@@ -24,6 +24,12 @@ from server.studies.series import series_for
 from server.workspaces.repository import default_workspace
 
 
+class NameTaken(Conflict):
+    """Another study has this name."""
+
+    code = "name_taken"
+
+
 def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
     """InputError unless the manifest holds each clip of the design exactly once."""
     declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
@@ -83,9 +89,9 @@ def create_study(
     identity: Identity | None,
     workspace: Workspace | None = None,
 ) -> Study:
-    """A new draft, in the default workspace where none is given; Conflict where the name is taken."""
+    """A new draft, in the default workspace where none is given; NameTaken where another has the name."""
     if repository.study_called(session, name) is not None:
-        raise Conflict(f"There is already a study called '{name}' on this server; choose another name.")
+        raise NameTaken(f"There is already a study called '{name}' on this server; choose another name.")
     study = Study(
         name=name,
         title=experiment.title,

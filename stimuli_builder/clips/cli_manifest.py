@@ -44,6 +44,7 @@ def manifest_command(
     """Write the manifest of somebody's own clips."""
     from experiments.load import load_experiment
     from experiments.own_clips import levels_from_names, levels_from_table
+    from stimuli_builder.clips.own_levels import understood
     from stimuli_builder.clips.own_manifest import clip_names, write_own_manifest
 
     if (pattern is None) == (table is None):
@@ -55,6 +56,7 @@ def manifest_command(
         if not table.is_file():
             raise InputError(f"no file {table}; expected a CSV with a column 'file' and one a factor")
         placed = levels_from_table(table.read_text(encoding="utf-8-sig"), names)
+    print(*understood(placed, pattern), sep="\n", flush=True)
     declared = load_experiment(experiment) if experiment else None
     with _looking_into(len(placed)) as report:
         manifest, target = write_own_manifest(folder, placed, declared, out, fps, report)

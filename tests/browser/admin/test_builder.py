@@ -55,6 +55,18 @@ def test_the_text_changes_the_forms(dashboard: Dashboard) -> None:
     expect(page.get_by_role("textbox", name="Title", exact=True)).to_be_visible()
 
 
+def test_a_scale_whose_points_are_all_labelled_is_drawn(dashboard: Dashboard) -> None:
+    page = opened(dashboard, "trial")
+    page.get_by_role("switch", name="TOML beside").click()
+    editor = page.get_by_label("Definition", exact=True)
+    text = re.sub(r"^(low|high|minimum|maximum|labels) = .*\n", "", editor.input_value(), flags=re.MULTILINE)
+    labels = 'maximum = 2\nlabels = [{ en = "annoying" }, { en = "imperceptible" }]\n'
+    editor.fill(text.replace("[trial.scale]\n", f"[trial.scale]\n{labels}"))
+    preview = page.get_by_role("group", name="Preview of the trial")
+    expect(preview.get_by_text("1 annoying")).to_be_visible()
+    expect(preview.get_by_text("2 imperceptible")).to_be_visible()
+
+
 def test_steps_are_undone_and_done_again(dashboard: Dashboard) -> None:
     page = opened(dashboard, "study")
     title = page.get_by_role("textbox", name="Title", exact=True)

@@ -1,5 +1,6 @@
 """A new user's way without TOML: twelve clips of one's own to a live link with questionnaire and practice."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,13 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     hand.fill(page.get_by_label("Pattern", exact=True), "{robot}_{speed}_{exemplar}.mp4")
     hand.fill(page.get_by_label("Title of the study"), "Robots")
     hand.fill(page.get_by_label("Question", exact=True), "How alive is it?")
+    name = page.get_by_label("Short name")
+    name.fill("short")
+    page.get_by_role("button", name="Create", exact=True).click()
+    expect(name).to_have_accessible_description(re.compile("There is already a study called 'short'"))
+    expect(name).to_be_focused()
+    name.fill("robots")
+    expect(name).to_have_accessible_description(re.compile(r"addresses and files\.$"))
     hand.press("Create")
     page.get_by_text("robots, version 1").wait_for()
 

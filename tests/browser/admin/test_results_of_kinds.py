@@ -9,6 +9,7 @@ from playwright.sync_api import expect
 from typer.testing import CliRunner
 
 from analysis.cli import app
+from experiments.counted import counted
 from experiments.load import load_experiment, locate
 from server.app import create_app
 from server.simulation.person import Person, Rater
@@ -70,8 +71,8 @@ def busy_server(built_admin: None, tmp_path_factory: pytest.TempPathFactory) -> 
 def test_results_say_whose_answers_there_are_and_show_them_by_label(dashboard: Dashboard, demo: str) -> None:
     dashboard.complaints.clear()
     page = dashboard.open(f"/studies/{load_experiment(demo).name}/results")
-    number = PEOPLE[demo]
-    expect(page.get_by_text(f"the only runs are {number} of simulated people")).to_be_visible()
+    runs = counted(PEOPLE[demo], "run")
+    expect(page.get_by_text(f"the only answers are those of {runs} of simulated people")).to_be_visible()
     page.get_by_role("button", name="Show simulated").click()
     expect(page.get_by_text("nobody gave these answers")).to_be_visible()
     expect(page.get_by_text(LABELS[demo]).first).to_be_visible()

@@ -102,6 +102,47 @@ def test_what_does_not_fit_is_said_in_one_line(
     assert not (clips / "manifest.json").exists()
 
 
+def empty_videos(folder: Path, *names: str) -> Path:
+    folder.mkdir()
+    for name in names:
+        (folder / name).touch()
+    return folder
+
+
+def test_a_stray_level_is_named_beside_what_was_understood(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    names = [f"{speed}_{number}.mp4" for speed in ("slow", "fast") for number in (1, 2, 3, 4)]
+    names[3] = "slwo_4.mp4"
+    folder = empty_videos(tmp_path / "clips", *names)
+    assert stimuli(monkeypatch, "manifest", folder, "--pattern", "{speed}_{exemplar}.mp4") != 0
+    told = capsys.readouterr()
+    assert told.out.splitlines() == [
+        "levels of speed, with their clips: fast (4), slow (3), slwo (1)",
+        "'slwo' of speed (slwo_4.mp4) looks like 'slow': correct the name if it is meant",
+    ]
+    assert "every cell needs the same number of clips: fast has 4, slwo has 1" in told.err
+
+
+def test_a_forgotten_exemplar_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
+) -> None:
+    for name in ("10_ä_1", "10_ä_2", "2_ä_1", "2_ä_2"):
+        (clips / f"{name}.mp4").rename(clips / f"{name.replace('10', 'fast').replace('2_ä', 'slow_ä')}.mp4")
+    assert stimuli(monkeypatch, "manifest", clips, "--pattern", "{speed}.mp4") == 0
+    assert capsys.readouterr().out.splitlines()[:2] == [
+        "levels of speed, with their clips: fast_ä_1 (1), fast_ä_2 (1), slow_ä_1 (1), slow_ä_2 (1)",
+        "levels of speed end in numbers (fast_ä_1); if they number the clips, give '{speed}_{exemplar}.mp4'",
+    ]
+
+
+def test_numbers_are_levels(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
+) -> None:
+    assert stimuli(monkeypatch, "manifest", clips, "--pattern", "{speed}_ä_{exemplar}.mp4") == 0
+    assert capsys.readouterr().out.splitlines()[:-1] == ["levels of speed, with their clips: 2 (2), 10 (2)"]
+
+
 def test_levels_that_cannot_be_rendered_are_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
 ) -> None:

@@ -62,11 +62,24 @@ function OneScale({ scale, language }: { scale: Data; language: string }) {
   const minimum = typeof scale["minimum"] === "number" ? scale["minimum"] : low;
   const maximum = typeof scale["maximum"] === "number" ? scale["maximum"] : high;
   const hasEnds = isTable(scale["low"]) || isTable(scale["high"]);
+  const labels = Array.isArray(scale["labels"]) ? (scale["labels"] as unknown[]) : [];
   const points = Math.min(11, Math.max(0, maximum - minimum + 1));
   return (
-    <Stack gap={6} miw={260} maw={480} w={isSlider ? "100%" : "auto"}>
+    <Stack gap={6} miw={260} maw={480} w={isSlider || labels.length > 0 ? "100%" : "auto"}>
       <Text ta="center">{textAt(scale["question"], [language]) || "–"}</Text>
       {hasEnds && isSlider && <SliderPreview minimum={minimum} maximum={maximum} />}
+      {labels.length > 0 && (
+        <Group gap={4} align="stretch" wrap="nowrap" grow>
+          {labels.slice(0, points).map((label, index) => (
+            <span key={index} className="preview-key wrap-anywhere">
+              {minimum + index}{" "}
+              <Text span display="block" size="xs">
+                {textAt(label, [language])}
+              </Text>
+            </span>
+          ))}
+        </Group>
+      )}
       {hasEnds && !isSlider && (
         <Group gap={4} justify="center" wrap="nowrap">
           {Array.from({ length: points }, (_, index) => (

@@ -7,6 +7,7 @@ import { onDemand } from "../ui/onDemand";
 import { sizeRemark } from "./sizes";
 import type { Upload } from "./useUpload";
 
+const MAX_PAIRS = 8;
 const RATES = ["24", "25", "30", "50", "60"];
 const ENDINGS = ".mp4,.m4v,.mov,.webm,.mkv,.avi,.mpg,.mpeg,.m2v,.ts,.mts,.m2ts,.wmv,.flv,.gif,.apng,.ogv,.3gp,.mxf,.y4m";
 const FileTable = onDemand(async () => (await import("./FileTable")).FileTable);
@@ -110,7 +111,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
   const refused = files.filter(({ state }) => state === "refused").length;
   const changed = files.filter(({ source }) => source != null).length;
   const size = sizeRemark(files);
-  const twice = files.find(({ same_as }) => same_as != null);
+  const twice = files.filter(({ same_as }) => same_as != null);
   return (
     <Stack gap="xs">
       <Group justify="space-between">
@@ -137,9 +138,15 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
           {upload.notReplaced.message}
         </Alert>
       )}
-      {twice !== undefined && (
+      {twice.length > 0 && (
         <Alert color="yellow">
-          {twice.name} holds the same bytes as {twice.same_as}. If they stand for different levels, one of them is the wrong file.
+          The same bytes:{" "}
+          {twice
+            .slice(0, MAX_PAIRS)
+            .map(({ name, same_as }) => `${name} as ${same_as}`)
+            .join(", ")}
+          {twice.length > MAX_PAIRS && ` and ${count(twice.length - MAX_PAIRS)} more`}. Where they stand for different levels, one is the
+          wrong file.
         </Alert>
       )}
       {size !== null && <Alert color="yellow">{size}</Alert>}

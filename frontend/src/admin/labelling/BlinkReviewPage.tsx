@@ -41,6 +41,7 @@ export function BlinkReviewPage() {
           {review.lost[0]?.column}); they are kept when you save.
         </Text>
       )}
+      {review.next !== null && <Text role="status">{review.next}</Text>}
       {review.values !== null && <Reviewing review={review} values={review.values} />}
     </Stack>
   );

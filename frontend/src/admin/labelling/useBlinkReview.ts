@@ -112,6 +112,7 @@ export function useBlinkReview() {
     window,
     setWindow,
     problem: problem ?? wrong,
+    next: nextStep(series, table),
     lost,
     unsaved: decisions !== saved,
     canUndo: history.past.length > 0,
@@ -141,6 +142,13 @@ export function useBlinkReview() {
 
 function firstWindow(last: number, fps: number): Window {
   return { from: 0, to: Math.max(1, Math.min(last, FIRST_WINDOW_S * fps)) };
+}
+
+/** What is still to be opened before anything is drawn; null where nothing is, or where nothing is open at all. */
+function nextStep(series: Table | null, table: BlinkTable | null): string | null {
+  if (series !== null && table === null) return `${series.name} is open. Next, open its blinks: the CSV that “stimuli blinks” wrote of it.`;
+  if (series === null && table !== null) return "The blinks are open. Next, open the series or track that they were found in.";
+  return null;
 }
 
 interface Read {

@@ -45,11 +45,14 @@ export function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: num
         ))}
         <Text size="sm" c="dimmed" mt={4}>
           {doubtful.length === 0
-            ? "No run has more than a tenth of its clips not shown well."
-            : `${doubtful.length} ${doubtful.length === 1 ? "run has" : "runs have"} more than a tenth of the clips not shown well: ${doubtful
+            ? "No run has more than a tenth of its clips flagged or failed."
+            : `${doubtful.length} ${doubtful.length === 1 ? "run has" : "runs have"} more than a tenth of the clips flagged or failed: ${doubtful
                 .slice(0, 3)
                 .map((run) => run.participant)
                 .join(", ")}${doubtful.length > 3 ? " …" : ""}`}
+        </Text>
+        <Text size="sm" c="dimmed">
+          Flagged or failed: pictures of the clip were left out or came late, or the page was left meanwhile. A failed clip is shown again.
         </Text>
       </Stack>
     </Card>

@@ -11,14 +11,16 @@ interface Props {
 
 const OF: Record<DataOrigin, string> = { participant: "participants", pilot: "the pilot", simulated: "simulated people" };
 
+const counted = (runs: number) => `${runs.toLocaleString()} ${runs === 1 ? "run" : "runs"}`;
+
 export function NoAnswers({ origin, runs, choose }: Props) {
   const others = ORIGINS.filter(({ value }) => value !== origin && (runs[value] ?? 0) > 0);
-  const listed = others.map(({ value }) => `${(runs[value] ?? 0).toLocaleString()} of ${OF[value]}`).join(" and ");
+  const listed = others.map(({ value }) => `${counted(runs[value] ?? 0)} of ${OF[value]}`).join(" and ");
   return (
     <Group>
       <Text c="dimmed">
         No answers of {OF[origin]} in this data series yet
-        {others.length > 0 && `; the only runs are ${listed}`}.
+        {others.length > 0 && `; the only answers are those of ${listed}`}.
       </Text>
       {others.map(({ value, label }) => (
         <Button key={value} variant="default" size="xs" onClick={() => choose(value)}>

@@ -1,21 +1,34 @@
 import { Stack, Tabs, TextInput, Title } from "@mantine/core";
-import { useState } from "react";
+import { useRef, useState } from "react";
 import { FromDefinition } from "./FromDefinition";
 import { FromOwnClips } from "./FromOwnClips";
 import { FromShipped } from "./FromShipped";
 
 export function CreatePage() {
   const [name, setName] = useState("");
+  const [taken, setTaken] = useState<string | null>(null);
+  const field = useRef<HTMLInputElement>(null);
   const wrong = name !== "" && !/^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$/.test(name);
+  const given = {
+    name: wrong ? "" : name,
+    onTaken: (message: string) => {
+      setTaken(message);
+      field.current?.focus();
+    },
+  };
   return (
     <Stack maw={900}>
       <Title order={1}>New study</Title>
       <TextInput
         label="Short name"
         description="Letters, digits, - and _: it names the study in addresses and files."
+        ref={field}
         value={name}
-        error={wrong ? "Expected letters, digits, - and _ only, at most 60." : null}
-        onChange={(event) => setName(event.currentTarget.value)}
+        error={wrong ? "Expected letters, digits, - and _ only, at most 60." : taken}
+        onChange={(event) => {
+          setName(event.currentTarget.value);
+          setTaken(null);
+        }}
         maw={400}
       />
       <Tabs defaultValue="shipped">
@@ -25,13 +38,13 @@ export function CreatePage() {
           <Tabs.Tab value="definition">From a definition (TOML)</Tabs.Tab>
         </Tabs.List>
         <Tabs.Panel value="shipped" pt="md">
-          <FromShipped name={wrong ? "" : name} />
+          <FromShipped {...given} />
         </Tabs.Panel>
         <Tabs.Panel value="clips" pt="md">
-          <FromOwnClips name={wrong ? "" : name} />
+          <FromOwnClips {...given} />
         </Tabs.Panel>
         <Tabs.Panel value="definition" pt="md">
-          <FromDefinition name={wrong ? "" : name} />
+          <FromDefinition {...given} />
         </Tabs.Panel>
       </Tabs>
     </Stack>

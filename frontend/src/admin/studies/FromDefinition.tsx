@@ -8,13 +8,13 @@ import { DefinitionEditor, useCheck } from "./DefinitionEditor";
 import { StillNeeded } from "./StillNeeded";
 import { useCreate } from "./useCreate";
 
-export function FromDefinition({ name }: { name: string }) {
+export function FromDefinition({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const [toml, setToml] = useState("");
   const sent = useUpload("new definition");
   const upload = sent.received;
   const [shipped, setShipped] = useState<string | null>(null);
   const experiments = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
-  const create = useCreate(sent.forget);
+  const create = useCreate(onTaken, sent.forget);
   const [pattern, setPattern] = useState("");
   const levels = upload?.has_manifest === true ? null : { pattern };
   const usable = useCheck(toml)?.design != null;

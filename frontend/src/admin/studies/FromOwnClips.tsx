@@ -12,14 +12,14 @@ import { useCreate } from "./useCreate";
 
 const MAX_ROWS = 100;
 
-export function FromOwnClips({ name }: { name: string }) {
+export function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const upload = useUpload("new study");
   const { received } = upload;
   return (
     <Stack>
       <UploadClips upload={upload} />
       {received !== null && received.files.length > 0 && (
-        <Levels key={received.id} name={name} upload={received} onCreated={upload.forget} />
+        <Levels key={received.id} name={name} upload={received} onTaken={onTaken} onCreated={upload.forget} />
       )}
     </Stack>
   );
@@ -30,10 +30,11 @@ const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.
 interface LevelsProps {
   name: string;
   upload: Schemas["UploadOut"];
+  onTaken: (message: string) => void;
   onCreated: () => void;
 }
 
-function Levels({ name, upload, onCreated }: LevelsProps) {
+function Levels({ name, upload, onTaken, onCreated }: LevelsProps) {
   const [by, setBy] = useState("pattern");
   const [pattern, setPattern] = useState(upload.suggested_pattern ?? "");
   const [csv, setCsv] = useState(`file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`);
@@ -41,7 +42,7 @@ function Levels({ name, upload, onCreated }: LevelsProps) {
   const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
   const [names, setNames] = useState<Record<string, string>>({});
   const files = upload.files.map((file) => file.name);
-  const create = useCreate(onCreated);
+  const create = useCreate(onTaken, onCreated);
   const needed = [name === "" && "a short name (above)", asked.title.trim() === "" && "a title of the study"];
   const field = (key: keyof typeof asked, label: string) => (
     <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />

@@ -4,9 +4,9 @@ import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { useCreate } from "./useCreate";
 
-export function FromShipped({ name }: { name: string }) {
+export function FromShipped({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const shipped = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
-  const create = useCreate();
+  const create = useCreate(onTaken);
   return (
     <Answer of={shipped}>
       {(experiments) => (

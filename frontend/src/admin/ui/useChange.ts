@@ -10,9 +10,11 @@ interface Options<T> {
   then?: (result: T) => void;
   /** Done before what it touches is loaded again. */
   before?: () => void;
+  /** Tells a refusal in the page itself and says so; any other is told in the corner. */
+  refused?: (error: Error) => boolean;
 }
 
-export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touches, done, then, before }: Options<T>) {
+export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touches, done, then, before, refused }: Options<T>) {
   const queries = useQueryClient();
   return useMutation<T, Error, Input>({
     mutationFn: change,
@@ -23,6 +25,8 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
       if (message) notify({ message, color: "teal" });
       then?.(result);
     },
-    onError: (error) => notify({ title: "That did not work", message: error.message, color: "red" }),
+    onError: (error) => {
+      if (!refused?.(error)) notify({ title: "That did not work", message: error.message, color: "red" });
+    },
   });
 }
