@@ -92,12 +92,14 @@ def sentences(lag: LagResult | None) -> tuple[str, ...]:
         return ("Clips without blinks, or one person: no lag can be told.",)
     if lag.p >= SIGNIFICANCE:
         return (
-            f"Ratings did not follow blinks: the greatest correlation of their change with blinks, r = "
-            f"{fixed(lag.r, 3)} at {fixed(lag.lag_s)} s, is no greater than chance ({apa_p(lag.p)}).",
+            f"Ratings did not follow blinks: the greatest correlation of their change with blinks, "
+            f"{fixed(lag.r, 3)} at {fixed(lag.lag_s)} s, is no greater than among random shifts of them "
+            f"({apa_p(lag.p)}).",
         )
     return (
         f"Ratings changed {fixed(lag.lag_s)} s after blinks, 95% CI [{fixed(lag.lag_low_s)}, "
-        f"{fixed(lag.lag_high_s)}], r = {fixed(lag.r, 3)}, {apa_p(lag.p)}.",
+        f"{fixed(lag.lag_high_s)}]; their change then correlates {fixed(lag.r, 3)} with blinks, more than "
+        f"among random shifts of them ({apa_p(lag.p)}).",
     )
 
 

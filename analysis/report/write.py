@@ -97,10 +97,13 @@ def _latex(contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
 def self_check(said: tuple[str, ...]) -> str:
     """What `check-paper` finds in the report's own sentences, in words."""
     result = check_text(plain("\n\n".join(said)))
+    if not result.statistics:
+        return "Checked by analysis check-paper: no number here can be recomputed from those beside it."
+    alone = len(result.unread)
+    more = f"; {alone} more cannot be recomputed from what stands beside them" if alone else ""
     return (
         f"Checked by analysis check-paper: {len(result.statistics)} statistics read in these sentences, "
-        f"{result.n_checked} recomputed from their own df, {result.n_wrong} do not fit, "
-        f"{len(result.unread)} could not be read."
+        f"{result.n_checked} recomputed from their own df, {result.n_wrong} do not fit{more}."
     )
 
 
