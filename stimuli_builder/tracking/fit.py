@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.tracking import kernels
+from stimuli_builder.tracking.kernel_arrays import Buffers, MeshArrays, ModelArrays
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.video import Picture
 
@@ -51,8 +52,8 @@ class Algebra:
         Movement of the vertices per parameter, the 4 of the similarity last.
     scales, centre : float64 array
         The similarity directions' norms (4,) and the centroid they turn about (2,).
-    hessian_forms : float64 array (pairs, K, K)
-        H(c) = sum over pairs i <= j of c_i c_j forms, with c_0 = 1.
+    hessian_forms : float64 array (pairs, K (K + 1) / 2)
+        Lower triangle, row by row, of H(c) = sum over pairs i <= j of c_i c_j forms, with c_0 = 1.
     """
 
     directions: Values
@@ -91,10 +92,26 @@ def work_out(model: CoupledModel) -> Algebra:
     count, size, pixels = parts.shape
     rows = parts.reshape(count * size, pixels)
     products = ((rows * model.weights) @ rows.T).reshape(count, size, count, size).transpose(0, 2, 1, 3)
+    lower = np.tril_indices(size)
     forms = [
-        products[i, j] + (products[j, i] if i < j else 0.0) for i in range(count) for j in range(i, count)
+        (products[i, j] + (products[j, i] if i < j else 0.0))[lower]
+        for i in range(count)
+        for j in range(i, count)
     ]
     return Algebra(directions, scales, centre, np.ascontiguousarray(forms))
+
+
+def _diagonal(form: Values) -> Values:
+    """Diagonal of a lower triangle laid out row by row."""
+    size = int(np.sqrt(2 * len(form)))
+    return form[np.cumsum(np.arange(1, size + 1)) - 1]
+
+
+def _shares(weights: NDArray[np.float32], ends: NDArray[np.int64]) -> NDArray[np.float32]:
+    """1 / (weight times the sum of its eye's weights) of each pixel (N,)."""
+    starts = np.r_[0, ends[:-1]]
+    sums = np.repeat(np.add.reduceat(weights.astype(np.float64), starts), ends - starts)
+    return np.asarray(1 / (weights * sums), np.float32)
 
 
 class Fitter:
@@ -112,19 +129,20 @@ class Fitter:
         self.stop_px, self.max_iterations = stop_px, max_iterations
         algebra = work_out(model)
         mesh, pixels = model.mesh, model.mesh.pixel_count
-        diagonal = np.diagonal(algebra.hessian_forms[0])[: len(model.sd)]
+        diagonal = _diagonal(algebra.hessian_forms[0])[: len(model.sd)]
         prior_of_c = RIDGE * diagonal + prior / np.maximum(model.sd, 1e-9) ** 2
-        self._mesh = kernels.MeshArrays(
-            mesh.vertices, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, mesh.eye_of,
+        ends = mesh.ends
+        self._mesh = MeshArrays(
+            mesh.vertices, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, ends,
             *mesh.neighbours(),
         )  # fmt: skip
-        self._arrays = kernels.ModelArrays(
-            model.shape_modes, model.appearance, model.weights, algebra.hessian_forms, algebra.directions,
-            prior_of_c, LIMIT_SD * model.sd, algebra.scales, algebra.centre,
+        self._arrays = ModelArrays(
+            model.shape_modes, model.appearance, model.weights, _shares(model.weights, ends),
+            algebra.hessian_forms, algebra.directions, prior_of_c, LIMIT_SD * model.sd,
+            algebra.scales, algebra.centre,
         )  # fmt: skip
-        sampled, error, gx, gy = np.empty((4, pixels), np.float32)
         vertices = np.empty(mesh.vertices.shape, np.float32)
-        self._buffers = kernels.Buffers(sampled, error, gx, gy, vertices, np.empty(model.eyes))
+        self._buffers = Buffers(*np.empty((5, pixels), np.float32), vertices, np.empty(model.eyes))
 
     def fit(self, picture: Picture, c: Values, pose: Values, max_iterations: int | None = None) -> Fit:
         """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""

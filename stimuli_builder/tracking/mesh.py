@@ -54,6 +54,12 @@ class BaseMesh:
         return int(self.eye_of.max()) + 1
 
     @property
+    def ends(self) -> NDArray[np.int64]:
+        """One past the last pixel of each eye, int64 (eyes,)."""
+        last = np.searchsorted(self.eye_of, np.arange(self.eyes), side="right")
+        return np.asarray(self.starts[last])
+
+    @property
     def flat_index(self) -> NDArray[np.int64]:
         """Index of every pixel in the base frame laid out row by row."""
         return (self.y.astype(np.int64) * self.shape[1] + self.x.astype(np.int64)).astype(np.int64)

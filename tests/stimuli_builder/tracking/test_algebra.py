@@ -92,7 +92,9 @@ def test_right_side_equals_the_direct_sum(model, recording):
     kernels.differentiate(look, *mesh.neighbours(), gx, gy)
     sums, fast = np.empty(mesh.vertices.shape, np.float32), np.empty(len(c) + 4)
     kernels.accumulate(error, gx, gy, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, sums)
-    kernels.right_side(c, model.appearance, algebra.directions, error, sums, fast)
+    fast[:] = 0
+    kernels.project(model.appearance, error, 0, mesh.pixel_count, fast)
+    kernels.subtract_warp(algebra.directions, sums, fast)
     direct = steepest_descent(model, c) @ error
     assert np.allclose(fast, direct, atol=2e-4 * np.abs(direct).max())
 
