@@ -1,14 +1,16 @@
 """How far off a fitted frame may be: stated from frames left out of training, the picture and a detector."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stimuli_builder.compiled import compiled
 from stimuli_builder.tracking.accuracy import HeldOut
 from stimuli_builder.tracking.fit import Fit
 from stimuli_builder.tracking.model import CoupledModel, believing
-from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, eye_axis, widths
+from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, LOWER_LID, UPPER_LID, Points, widths
 
 Values = NDArray[np.float64]
 
@@ -21,6 +23,9 @@ UNUSUAL_SD = 2.5
 JUMP_SHARE = 0.35
 """A canthus does not move by more of the eye's width from one frame to the next."""
 STEEPEST = 2.0
+UPPER_CURVE = (0, 1, 2, 3, 4, 5)
+LOWER_CURVE = (5, 6, 7, 8, 0)
+"""Points of an eye that its lids' curves go through, canthi included."""
 
 
 def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values) -> CoupledModel:
@@ -98,34 +103,53 @@ def doubt(
     return ""
 
 
+@compiled
 def jump_px(points: Points, before: Points) -> float:
     """Greatest move of a canthus since the frame before, in pixels."""
-    moves = (points - before).reshape(-1, EYE_POINTS, 2)[:, CANTHI]
-    return float(np.hypot(moves[..., 0], moves[..., 1]).max())
+    furthest = 0.0
+    for start in range(0, len(points), EYE_POINTS):
+        for canthus in CANTHI:
+            move = points[start + canthus] - before[start + canthus]
+            furthest = max(furthest, math.hypot(move[0], move[1]))
+    return furthest
 
 
+@compiled
 def lid_difference(points: Points, other: Points) -> float:
     """Mean distance of the lid points from another's lid curves, the worse eye's, as part of its width.
 
     Detectors place points differently along a lid, so only the distance from the curve counts.
     """
-    return float(lid_offsets(points, other).mean(1).max())
+    offsets = lid_offsets(points, other)
+    worst = 0.0
+    for eye in range(len(offsets)):
+        worst = max(worst, offsets[eye].mean())
+    return worst
 
 
+@compiled
 def lid_offsets(points: Points, other: Points) -> Values:
     """Distance of each lid point from another's lid curve, as part of the other eye's width (eyes, 7)."""
-    offsets = []
-    for start in range(0, len(points), EYE_POINTS):
-        one, two = points[start : start + EYE_POINTS], other[start : start + EYE_POINTS]
-        away = np.concatenate([from_curve(one[1:5], two[:6]), from_curve(one[6:9], two[[5, 6, 7, 8, 0]])])
-        offsets.append(away / max(eye_axis(two)[2], 1e-6))
-    return np.array(offsets)
+    offsets = np.empty((len(points) // EYE_POINTS, len(UPPER_LID) + len(LOWER_LID)))
+    for eye in range(len(offsets)):
+        start = EYE_POINTS * eye
+        span = other[start + CANTHI[1]] - other[start + CANTHI[0]]
+        width = max(math.hypot(span[0], span[1]), 1e-6)
+        for number, point in enumerate(UPPER_LID):
+            offsets[eye, number] = from_curve(points[start + point], other, start, UPPER_CURVE) / width
+        for number, point in enumerate(LOWER_LID):
+            away = from_curve(points[start + point], other, start, LOWER_CURVE) / width
+            offsets[eye, len(UPPER_LID) + number] = away
+    return offsets
 
 
-def from_curve(points: Points, curve: Points) -> Values:
-    """Distance of each point (n, 2) from a polyline (k, 2)."""
-    start, step = curve[:-1], np.diff(curve, axis=0)
-    length = np.maximum((step**2).sum(1), 1e-12)
-    share = np.clip(((points[:, None] - start) * step).sum(-1) / length, 0, 1)
-    nearest = start + share[..., None] * step
-    return np.asarray(np.sqrt(((points[:, None] - nearest) ** 2).sum(-1)).min(1))
+@compiled
+def from_curve(point: Points, points: Points, start: int, curve: tuple[int, ...]) -> float:
+    """Distance of a point (2,) from the polyline through points[start + n], n in `curve`."""
+    nearest = np.inf
+    for n in range(len(curve) - 1):
+        a, b = points[start + curve[n]], points[start + curve[n + 1]]
+        dx, dy, px, py = b[0] - a[0], b[1] - a[1], point[0] - a[0], point[1] - a[1]
+        share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+        nearest = min(nearest, math.hypot(px - share * dx, py - share * dy))
+    return nearest

@@ -142,7 +142,8 @@ class Fitter:
             algebra.scales, algebra.centre,
         )  # fmt: skip
         vertices = np.empty(mesh.vertices.shape, np.float32)
-        self._buffers = Buffers(*np.empty((5, pixels), np.float32), vertices, np.empty(model.eyes))
+        sampled, look, error, gx, gy = np.empty((5, pixels), np.float32)
+        self._buffers = Buffers(sampled, look, error, gx, gy, vertices, np.empty(model.eyes))
 
     def fit(self, picture: Picture, c: Values, pose: Values, max_iterations: int | None = None) -> Fit:
         """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""

@@ -4,7 +4,6 @@ float32 over pixels, float64 over parameters. Everything that calls each other s
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
-# ruff: noqa: D103
 
 import numpy as np
 

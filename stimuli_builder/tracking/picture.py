@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 
+from stimuli_builder.compiled import compiled
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.video import Picture
 
@@ -24,3 +25,27 @@ def reduced_points(points: Points, factor: int) -> Points:
 def restored_points(points: Points, factor: int) -> Points:
     """Undo `reduced_points`."""
     return np.asarray((points + 0.5) * factor - 0.5)
+
+
+@compiled
+def same_picture(one: Picture, other: Picture) -> bool:
+    """Whether two grey pictures of one size are equal, told at the first row that differs."""
+    for row in range(one.shape[0]):
+        differs = False
+        for column in range(one.shape[1]):
+            differs |= one[row, column] != other[row, column]
+        if differs:
+            return False
+    return True
+
+
+@compiled
+def shows_something(picture: Picture, grey_levels: int, step: int) -> bool:
+    """Whether the grey levels of every step-th row and column span so many, told as soon as they do."""
+    low, high = picture[0, 0], picture[0, 0]
+    for row in range(0, picture.shape[0], step):
+        for column in range(0, picture.shape[1], step):
+            low, high = min(low, picture[row, column]), max(high, picture[row, column])
+        if high >= low + grey_levels:
+            return True
+    return False

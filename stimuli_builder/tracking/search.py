@@ -79,12 +79,10 @@ def _worst(fit: Fit) -> float:
 
 def inside(fit: Fit, picture: Picture) -> bool:
     """Whether every landmark lies in the picture."""
-    eyes = len(fit.residuals)
-    points = fit.vertices[: EYE_POINTS * eyes]
+    points = fit.vertices[: EYE_POINTS * len(fit.residuals)]
     height, width = picture.shape
-    return bool(
-        (points > -0.5).all() and (points[:, 0] < width - 0.5).all() and (points[:, 1] < height - 0.5).all()
-    )
+    (left, top), (right, bottom) = points.min(0).tolist(), points.max(0).tolist()
+    return bool(left > -0.5 and top > -0.5 and right < width - 0.5 and bottom < height - 0.5)
 
 
 def _spread_closures(fitter: Fitter) -> list[Values]:

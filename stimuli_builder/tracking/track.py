@@ -1,5 +1,6 @@
 """Tracking a video: every frame ends fitted, or with a status and a reason, never with a wrong number."""
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -15,7 +16,13 @@ from experiments.errors import InputError
 from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
 from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.model import CoupledModel
-from stimuli_builder.tracking.picture import reduced, reduced_points, restored_points
+from stimuli_builder.tracking.picture import (
+    reduced,
+    reduced_points,
+    restored_points,
+    same_picture,
+    shows_something,
+)
 from stimuli_builder.tracking.search import Finder, inside
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
@@ -106,7 +113,8 @@ class Tracker:
         self._loss = ""
         low, high = SCALE_RANGE
         sizes = np.hypot(model.poses[:, 0], model.poses[:, 1])
-        self._sizes = (low * sizes.min(), high * sizes.max())
+        self._sizes = (float(low * sizes.min()), float(high * sizes.max()))
+        self._to_parameters = _to_parameters(model)
 
     def step(self, picture: Picture, hint: Points | None = None) -> TrackedFrame:
         """Fit the next frame, searching for the eyes where they are not where they were.
@@ -122,7 +130,7 @@ class Tracker:
             self._lost_frames += 1
             self._loss = blank
             return TrackedFrame("lost", blank, None, None, None, 0)
-        frozen = self._picture is not None and np.array_equal(picture, self._picture)
+        frozen = self._picture is not None and same_picture(picture, self._picture)
         self._picture = picture
         if self._last is not None and not self._lost_frames:
             fit = self._fitter.fit(picture, self._last.c, self._last.pose)
@@ -141,9 +149,7 @@ class Tracker:
 
     def _blank(self, picture: Picture) -> str:
         """Why a picture cannot show an eye, or an empty string."""
-        if int(picture[::4, ::4].max()) - int(picture[::4, ::4].min()) < BLANK_RANGE:
-            return "a black or empty frame"
-        return ""
+        return "" if shows_something(picture, BLANK_RANGE, 4) else "a black or empty frame"
 
     def _from(self, picture: Picture, hint: Points) -> Fit:
         """Fit from a detector's points."""
@@ -151,12 +157,8 @@ class Tracker:
         mean = self.model.mesh.vertices
         pose = similarity_between(mean, shape)
         away = (unmoved(shape, pose) - mean).ravel()
-        modes = self.model.shape_modes.reshape(len(self.model.sd), -1)
-        ridge = 1e-3 * np.diag(
-            (modes**2).sum(1).mean() / np.maximum(self.model.sd, 1e-9) ** 2 * self.model.sd.max() ** 2
-        )
-        c = np.linalg.solve(modes @ modes.T + ridge, modes @ away)
-        return self._fitter.fit(picture, np.clip(c, -3 * self.model.sd, 3 * self.model.sd), pose)
+        limit = 3 * self.model.sd
+        return self._fitter.fit(picture, np.clip(self._to_parameters @ away, -limit, limit), pose)
 
     def _with_hint(self, picture: Picture, fit: Fit, fault: str, hint: Points | None) -> tuple[Fit, str]:
         """The fit, or one started from the detector where that is nearer to it and no worse a picture."""
@@ -233,7 +235,16 @@ class Tracker:
 
 
 def _overall(fit: Fit) -> float:
-    return float(np.sqrt((fit.residuals**2).mean()))
+    squares = [residual * residual for residual in fit.residuals.tolist()]
+    return math.sqrt(sum(squares) / len(squares))
+
+
+def _to_parameters(model: CoupledModel) -> NDArray[np.float64]:
+    """Matrix (l, 2 V) from movements of the vertices to coupled parameters, least squares kept small."""
+    modes = model.shape_modes.reshape(len(model.sd), -1)
+    size = (modes**2).sum(1).mean() * model.sd.max() ** 2
+    ridge = 1e-3 * np.diag(size / np.maximum(model.sd, 1e-9) ** 2)
+    return np.asarray(np.linalg.solve(modes @ modes.T + ridge, modes))
 
 
 def track_video(
