@@ -46,11 +46,11 @@ def step_times(model: CoupledModel, picture: np.ndarray) -> tuple[float, float]:
     small = reduced(picture, model.reduction)
     fitter = Fitter(model, stop_px=0.0)
     c, pose = model.examples[0], model.poses[0]
-    ours = best_of(40, 7, lambda: fitter.fit(small, c, pose, most=10)) / 10
+    ours = best_of(40, 7, lambda: fitter.fit(small, c, pose, max_iterations=10)) / 10
     algebra, (gx, gy) = work_out(model), model.mesh.gradient(model.appearance.astype(np.float64))
     parts = linear_parts(model, gx, gy, algebra.directions).astype(np.float32)
     weights = np.r_[1.0, c].astype(np.float32)
-    vertices = fitter.fit(small, c, pose, most=1).vertices.astype(np.float64)
+    vertices = fitter.fit(small, c, pose, max_iterations=1).vertices.astype(np.float64)
 
     def direct() -> None:
         descent = np.tensordot(weights, parts, axes=1)
