@@ -3,10 +3,10 @@
     PYTHONPATH=. python tests/bench/bench_track_speed.py [FOLDER] [REVISION, df3da2d] [rounds, 5]
 
 FOLDER (../shared/data/face_video) holds the recordings. A model and detections of each are made once, without
-labels; both revisions track with them, a detection at every frame or every 10th. Fit only is processor time of
-one thread; end to end is wall-clock time with decoding and writing, and processor time of all threads; the
-best round counts. `differ` is the furthest a point lies from where the earlier revision put it, and the number
-of frames whose status is another. Needs the detector's environment, made at first use.
+labels; both revisions track with them, a detection at every frame or every 10th. Fit only is processor time
+of one thread; end to end is wall-clock time with decoding and writing, and processor time of all threads; the
+best round counts. `differ` is the furthest a point lies from where the earlier revision put it, and how many
+frames have another status. Needs the detector's environment, made at first use.
 """
 
 import json
