@@ -320,11 +320,11 @@ def hessian(forms, c, out):
     """Lower triangle of the Hessian (K, K) at c, from forms float64 (pairs, K (K + 1) / 2)."""
     flat = np.empty(forms.shape[1])
     quadratic(forms, c, flat)
-    place = 0
+    entry = 0
     for row in range(out.shape[0]):
         for column in range(row + 1):
-            out[row, column] = flat[place]
-            place += 1
+            out[row, column] = flat[entry]
+            entry += 1
 
 
 @compiled
