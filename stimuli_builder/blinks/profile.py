@@ -6,7 +6,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
 
@@ -159,6 +158,9 @@ def phase_spline(samples: Array, length_frames: int) -> Array:
     A monotone cubic spline (PCHIP) passes through every sample and never overshoots, so a closing
     phase stays one.
     """
+    # Here, for it takes a third of a second: workers that render need only the types of this file.
+    from scipy.interpolate import PchipInterpolator
+
     spline = PchipInterpolator(np.linspace(0.0, 1.0, samples.size), samples)
     return np.asarray(spline(np.linspace(0.0, 1.0, length_frames + 1)), dtype=np.float64)
 

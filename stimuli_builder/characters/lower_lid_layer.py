@@ -1,6 +1,7 @@
 """The lower lid of a baked character: poses of the open eye, laid under the upper lid of any closure."""
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -63,13 +64,23 @@ class LowerLidLayer:
         image = np.zeros((self._lower.crop[3], self._lower.crop[2], 3), np.float32)
         for index in np.flatnonzero(weights):
             image += weights[index] * srgb_to_linear(self._level_srgb(int(index)))[self.window]
-        open_eye = srgb_to_linear(self._level_srgb(0))[self.window]
-        sigma = SHADE_BLUR_MM * character.declaration.px_per_mm
-        ratio = _blur(image, sigma) / np.maximum(_blur(open_eye, sigma), 1e-3)
+        open_eye, open_blurred = self._open_eye
+        ratio = _blur(image, self._sigma) / np.maximum(open_blurred, 1e-3)
         # Never take more light from a pixel than it has: lashes over the lid would turn into red flecks.
         left = (image + DARKEST) / (open_eye + DARKEST)
         bounded = np.minimum(np.clip(ratio, *SHADE_LIMITS), left.min(axis=2, keepdims=True))
         return np.asarray(bounded, dtype=np.float32)
+
+    @cached_property
+    def _open_eye(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(h, w, 3) linear light of the open eye, and the same blurred: for the shade at every matte."""
+        open_eye = srgb_to_linear(self._level_srgb(0))[self.window]
+        return open_eye, _blur(open_eye, self._sigma)
+
+    @property
+    def _sigma(self) -> float:
+        """Width of the shade's blur in px."""
+        return SHADE_BLUR_MM * self._character.declaration.px_per_mm
 
     def each_change(self) -> Iterator[NDArray[np.float32]]:
         """(h, w, 3) change of each pose against the resting one; slides of the lowest lift first."""

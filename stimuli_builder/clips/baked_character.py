@@ -15,12 +15,15 @@ from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.characters.lower_lid_layer import LevelCodes
 from stimuli_builder.clips.characters import Geometry
+from stimuli_builder.clips.kernels import FULL_SCALE
 from stimuli_builder.clips.levels import LevelSet, Light, Window, quantised, window_inside
 from stimuli_builder.clips.lower_lid import LowerLid
 
 MARGIN_PX = 4
 LIGHT_OF_CODE = quantised(LINEAR_OF_CODE)
 """16-bit linear light of every sRGB code value."""
+CODE_OF_LIGHT = np.searchsorted(LIGHT_OF_CODE, np.arange(FULL_SCALE + 1)).astype(np.uint8)
+"""The code value of every 16-bit linear light that `LIGHT_OF_CODE` holds."""
 
 
 class BakedCharacter:
@@ -118,7 +121,8 @@ def _read_at_own_size(character: Atlas, _: tuple[int, int], shown: slice, window
     base[rows, columns] = crops[0]
 
     def level_srgb(index: int) -> NDArray[np.uint8]:
-        return np.asarray(np.searchsorted(LIGHT_OF_CODE, crops[index]), np.uint8)
+        codes: NDArray[np.uint8] = CODE_OF_LIGHT[crops[index]]
+        return codes
 
     return _Content(np.ascontiguousarray(base[shown]), levels, level_srgb)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.clips.barcode import draw_barcode
 from stimuli_builder.clips.curves import ClipCurve
-from stimuli_builder.clips.kernels import GAMMA, blend, to_yuv
+from stimuli_builder.clips.kernels import GAMMA, blend, split_planes, to_yuv
 from stimuli_builder.clips.levels import LevelSet
 from stimuli_builder.clips.motion_blur import frame_windows
 
@@ -25,9 +25,7 @@ class FramePainter:
 
     def __init__(self, character: LevelSet) -> None:
         self.character = character
-        width, height = character.size_px
-        self._base = np.empty((height * 3 // 2, width), np.uint8)
-        to_yuv(character.base.astype(np.float32), GAMMA, *_split(self._base, width, height))
+        self._base = character.base_planes
 
     def frames(self, curve: ClipCurve, fps: float, blur: bool, barcode: bool = False) -> Iterator[Planes]:
         """Yield each frame as a (height * 3 / 2, width) array of 4:2:0 planes, fresh each time."""
@@ -48,7 +46,7 @@ class FramePainter:
                 painted.pop(next(iter(painted)))
             planes = picture.copy()
             if barcode:
-                draw_barcode(*_split(planes, width, height), number)
+                draw_barcode(*split_planes(planes, width, height), number)
             yield planes
 
     def light(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Light:
@@ -67,7 +65,7 @@ class FramePainter:
         planes = self._base.copy()
         if not np.any(curve.motion(samples)):
             return planes
-        luma, blue, red = _split(planes, width, height)
+        luma, blue, red = split_planes(planes, width, height)
         rows, columns = window.slices
         half_rows = slice(window.y // 2, (window.y + window.height) // 2)
         half_columns = slice(window.x // 2, (window.x + window.width) // 2)
@@ -117,12 +115,3 @@ def same_picture(curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[
     if np.all(motion == motion[:, :1]):
         return motion[:, 0].tobytes()
     return motion.tobytes() + np.round(weights, 12).tobytes()
-
-
-def _split(planes: Planes, width: int, height: int) -> tuple[Planes, Planes, Planes]:
-    """Luma, blue-difference and red-difference views of one (height * 3 / 2, width) array."""
-    quarter = height // 2 * (width // 2)
-    chroma = planes.reshape(-1)[height * width :]
-    blue = chroma[:quarter].reshape(height // 2, width // 2)
-    red = chroma[quarter:].reshape(height // 2, width // 2)
-    return planes[:height], blue, red

@@ -1,4 +1,4 @@
-"""The two hot loops: adding weighted levels, and linear light to BT.709 4:2:0."""
+"""The hot loops: adding weighted levels, and linear light to BT.709 4:2:0 planes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from stimuli_builder.compiled import compiled
 
 FULL_SCALE = 65535
+Planes = NDArray[np.uint8]
 _BLOCK = 4096
 
 
@@ -107,3 +108,12 @@ def to_yuv(
                 ) / 8
                 blue[y // 2, i] = np.uint8(np.float32(128.5) + mean_blue)
                 red[y // 2, i] = np.uint8(np.float32(128.5) + mean_red)
+
+
+def split_planes(planes: Planes, width: int, height: int) -> tuple[Planes, Planes, Planes]:
+    """Luma, blue-difference and red-difference views of one (height * 3 / 2, width) array."""
+    quarter = height // 2 * (width // 2)
+    chroma = planes.reshape(-1)[height * width :]
+    blue = chroma[:quarter].reshape(height // 2, width // 2)
+    red = chroma[quarter:].reshape(height // 2, width // 2)
+    return planes[:height], blue, red

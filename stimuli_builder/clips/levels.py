@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.characters.interpolation import level_weights
-from stimuli_builder.clips.kernels import FULL_SCALE
+from stimuli_builder.clips.kernels import FULL_SCALE, GAMMA, Planes, split_planes, to_yuv
 from stimuli_builder.clips.lower_lid import LowerLid
 
 Light = NDArray[np.uint16]
@@ -61,6 +61,14 @@ class LevelSet:
         if self.read_lower is None:
             raise InputError(f"character '{self.name}' has no lower-lid layer: use lower_lid = 'none'")
         return self.read_lower()
+
+    @cached_property
+    def base_planes(self) -> Planes:
+        """(height * 3 / 2, width) 4:2:0 planes of `base`, converted once for all clips."""
+        width, height = self.size_px
+        planes = np.empty((height * 3 // 2, width), np.uint8)
+        to_yuv(self.base.astype(np.float32), GAMMA, *split_planes(planes, width, height))
+        return planes
 
     @property
     def size_px(self) -> tuple[int, int]:

@@ -4,15 +4,17 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor
+from concurrent.futures import wait as wait_for
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing.connection import wait
 from threading import Thread
 from typing import Any
 
 from experiments.errors import InputError
 from stimuli_builder.clips.jobs import ClipJob, render
+from stimuli_builder.clips.queues import JobQueues
 
 ROUNDS = 4
 """How often a pool that lost a worker is started again before the build gives up."""
@@ -26,7 +28,7 @@ def available_cores() -> int:
 def run_jobs(jobs: Sequence[ClipJob], workers: int, dask: str | None = None) -> Iterator[tuple[int, bytes]]:
     """Yield (index, bytes of the clip) as jobs finish, in any order.
 
-    Jobs of one character follow one another, so that a worker decodes each character once. A worker that
+    Jobs of one character follow one another on one worker, so that few workers read it. A worker that
     dies (memory, kill) costs its current clips alone: they are rendered again.
 
     Parameters
@@ -54,7 +56,7 @@ def _on_pool(jobs: Sequence[ClipJob], order: list[int], workers: int) -> Iterato
     left = list(order)
     for _ in range(ROUNDS):
         try:
-            for index, content in _one_pool(jobs, left, min(workers, len(left))):
+            for index, content in _one_round(jobs, left, min(workers, len(left))):
                 left.remove(index)
                 yield index, content
             return
@@ -66,14 +68,36 @@ def _on_pool(jobs: Sequence[ClipJob], order: list[int], workers: int) -> Iterato
     )
 
 
-def _one_pool(jobs: Sequence[ClipJob], left: list[int], workers: int) -> Iterator[tuple[int, bytes]]:
+def _one_round(jobs: Sequence[ClipJob], left: list[int], workers: int) -> Iterator[tuple[int, bytes]]:
+    queues = JobQueues(left, [_levels_of(job) for job in jobs], workers)
+    with ExitStack() as stack:
+        pools = [stack.enter_context(_pool_of_one()) for _ in range(workers)]
+        running: dict[Future[bytes], tuple[int, int]] = {}
+
+        def hand_out(worker: int) -> None:
+            index = queues.take(worker)
+            if index is not None:
+                running[pools[worker].submit(render, jobs[index])] = worker, index
+
+        # Two each: a worker goes on while its last clip is fetched and written.
+        for worker in [*range(workers)] * 2:
+            hand_out(worker)
+        while running:
+            for future in wait_for(running, return_when=FIRST_COMPLETED).done:
+                worker, index = running.pop(future)
+                content = future.result()
+                hand_out(worker)
+                yield index, content
+
+
+@contextmanager
+def _pool_of_one() -> Iterator[ProcessPoolExecutor]:
+    """A pool whose one worker is known, so that it is given what it has the levels of."""
     # A fresh interpreter: forking a process that already runs threads can lock up.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_follow_parent)
+    pool = ProcessPoolExecutor(1, mp_context=context, initializer=_follow_parent)
     try:
-        futures: dict[Future[bytes], int] = {pool.submit(render, jobs[index]): index for index in left}
-        for future in as_completed(list(futures)):
-            yield futures.pop(future), future.result()
+        yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

@@ -152,3 +152,13 @@ def test_a_size_that_cannot_show_the_blink_is_refused(
     character = find_character(str(write_example_character(tmp_path_factory.mktemp("bad") / "tiny")))
     with pytest.raises(InputError, match=line):
         character.levels(size)
+
+
+def test_the_resting_picture_is_converted_once_and_no_clip_changes_it(tiny: LevelSet) -> None:
+    painter = FramePainter(tiny)
+    before = tiny.base_planes.copy()
+    for frame in painter.frames(curve_of(0, 1, 0), 30, False, barcode=True):
+        frame[:] = 0
+    np.testing.assert_array_equal(tiny.base_planes, before)
+    (resting,) = FramePainter(tiny).frames(curve_of(0), 30, False)
+    np.testing.assert_array_equal(resting, before)
