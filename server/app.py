@@ -27,6 +27,7 @@ from server.monitor import endpoints as monitor
 from server.operations import endpoints as operations
 from server.operations.drill_schedule import weekly_drill
 from server.operations.observer import Observer
+from server.operations.snapshot_schedule import snapshots_taken
 from server.participants import endpoints as participants
 from server.participants import rating_endpoints as trials
 from server.participants import view_endpoints as views
@@ -108,6 +109,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
         served.state.services.stopping.listen()
         async with (
             weekly_drill(services.settings),
+            snapshots_taken(services.settings),
             hourly_retention(services.database, services.settings),
             digests_judged_later(services.database, services.intake),
             results_counted_ahead(services.database, services.results),

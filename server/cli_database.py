@@ -11,6 +11,7 @@ from server.cli_common import migrated_services, out
 from server.db import open_database
 from server.identities.repository import rewrap_all
 from server.migrate import current_revision, newest_revision
+from server.operations import cli_snapshots
 from server.operations.cli import copy
 from server.runs.erasure import replay
 from server.settings import Settings
@@ -23,6 +24,7 @@ def register(parent: typer.Typer) -> None:
     """Add `server database` to the command line."""
     parent.add_typer(app, name="database")
     app.command("copy")(copy)
+    cli_snapshots.register(app)
 
 
 @app.command("upgrade")

@@ -146,6 +146,11 @@ class Settings(BaseSettings):
         description="Folder of the backups, or s3://BUCKET/PREFIX: the newest one's age is told, and it is "
         "brought back weekly.",
     )
+    snapshot_minutes: float = Field(
+        default=0.0,
+        ge=0,
+        description="Minutes between two snapshots of a SQLite database into data_folder/snapshots; 0: none.",
+    )
     backup_keys: Path | None = Field(
         default=None,
         description="Key file of backups that are not encrypted, for `server backup`, `restore` and `drill`; "

@@ -7,34 +7,21 @@ import stat
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import islice
-from typing import Literal
 from urllib.parse import urlsplit
 
 from experiments.counted import counted
-from experiments.errors import InputError
 from server.context import Services
 from server.identities.repository import readable
 from server.migrate import current_revision, newest_revision
 from server.operations import repository
+from server.operations.backup_checks import backups, snapshots
+from server.operations.findings import Finding
 from server.operations.modes import open_to_others
-from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, watched_backups
 from server.tallies.recount import Recount
 
-Verdict = Literal["ok", "warning", "failed"]
 LEAST_FREE_BYTES = 2 * 1024**3
 OLDEST_PYTHON, OLDEST_SQLITE, OLDEST_POSTGRES = (3, 11), (3, 38, 0), 130000
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One line of the doctor: what was looked at, how it is, what was found, what to do."""
-
-    subject: str
-    verdict: Verdict
-    state: str
-    advice: str = ""
 
 
 def python(_services: Services) -> Iterator[Finding]:
@@ -219,46 +206,6 @@ def people(services: Services) -> Iterator[Finding]:
     yield Finding("studies", "ok" if studies else "warning", str(studies), advice)
 
 
-def backups(services: Services) -> Iterator[Finding]:
-    """Backups are made, and one was brought back."""
-    try:
-        watched = watched_backups(services.settings)
-    except InputError as error:
-        yield Finding("backups", "failed", str(error), "see why their store cannot be reached")
-        return
-    if watched is None:
-        yield Finding("backups", "ok", "not watched: PALPEBRA_BACKUP_FOLDER is not set")
-        return
-    if watched.age_s is None:
-        yield Finding("backups", "warning", "there is none", "run: server backup, each day")
-        return
-    said = f"the newest is {watched.age_s / 3600:.0f} h old"
-    fine = watched.age_s <= OLD_AFTER_S
-    yield Finding(
-        "backups", "ok" if fine else "warning", said, "" if fine else "see why no newer one is made"
-    )
-    yield _drilled(watched)
-
-
-def _drilled(watched: WatchedBackups) -> Finding:
-    drill = watched.drill
-    if drill is None and watched.drilled_elsewhere:
-        return Finding(
-            "restore drill",
-            "warning",
-            "not here",
-            "run where the private key is: server drill --identity FILE",
-        )
-    if drill is None:
-        return Finding("restore drill", "warning", "none was made", "run: server drill")
-    if not drill.passed:
-        advice = "make a backup anew and run: server drill"
-        return Finding("restore drill", "failed", f"{drill.backup}: {drill.said}", advice)
-    return Finding(
-        "restore drill", "ok", f"{drill.backup} came back whole on {drill.at:%Y-%m-%d}, {drill.rows} rows"
-    )
-
-
 CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     python,
     data_folder,
@@ -272,5 +219,6 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     public_address,
     people,
     backups,
+    snapshots,
 )
 """In the order in which one would put things right."""

@@ -3,7 +3,8 @@
 from sqlalchemy.exc import SQLAlchemyError
 
 from server.context import Services
-from server.operations.checks import CHECKS, Finding
+from server.operations.checks import CHECKS
+from server.operations.findings import Finding
 
 
 def examine(services: Services) -> list[Finding]:

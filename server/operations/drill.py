@@ -21,9 +21,10 @@ from server.clock import now
 from server.context import Services, open_services
 from server.operations.backup import TABLES, Description
 from server.operations.backup_stores import backup_store
-from server.operations.checks import Finding, counts, database, identities
+from server.operations.checks import counts, database, identities
 from server.operations.encryption import ENDING, identity_in
 from server.operations.erasures import ledger
+from server.operations.findings import Finding
 from server.operations.keys_apart import beside
 from server.operations.locking import locked
 from server.operations.off_host import KeptBackup, brought_here

@@ -17,6 +17,7 @@ from experiments.errors import InputError
 from server.clock import now
 from server.db import Database
 from server.operations.repository import run_counts
+from server.operations.snapshots import snapshots_of
 from server.operations.watched_backups import watched_backups
 from server.settings import Settings
 
@@ -65,6 +66,7 @@ class StoredCounts(Collector):
         build.add_metric((version("palpebra"),), 1)
         yield build
         yield from _backups(self.settings)
+        yield from _snapshots(self.settings)
 
 
 def _backups(settings: Settings) -> Iterable[GaugeMetricFamily]:
@@ -85,6 +87,15 @@ def _backups(settings: Settings) -> Iterable[GaugeMetricFamily]:
         yield GaugeMetricFamily("palpebra_restore_drill_passed", "1 where the last drill passed.", passed)
         age_s = (now() - ended).total_seconds()
         yield GaugeMetricFamily("palpebra_restore_drill_age_seconds", "Time since the last drill.", age_s)
+
+
+def _snapshots(settings: Settings) -> Iterable[GaugeMetricFamily]:
+    """Age of the newest snapshot, where the settings ask for them."""
+    taken = snapshots_of(settings) if settings.snapshot_minutes else []
+    if taken:
+        age_s = (now() - taken[-1].taken_at).total_seconds()
+        yield GaugeMetricFamily("palpebra_snapshots", "Snapshots of the database there are.", len(taken))
+        yield GaugeMetricFamily("palpebra_snapshot_age_seconds", "Age of the newest snapshot.", age_s)
 
 
 def exposition(database: Database, settings: Settings) -> bytes:

@@ -2,8 +2,9 @@ import json
 from pathlib import Path
 
 from server.context import Services, open_services
-from server.operations.checks import CHECKS, Finding
+from server.operations.checks import CHECKS
 from server.operations.doctor import examine
+from server.operations.findings import Finding
 from server.operations.modes import close_to_others
 from server.settings import Settings
 from tests.helpers.databases import run_server_command

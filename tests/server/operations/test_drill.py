@@ -18,8 +18,8 @@ from sqlalchemy.exc import OperationalError
 from server.context import Services
 from server.operations import drill_schedule
 from server.operations.backup import back_up
+from server.operations.backup_checks import backups
 from server.operations.backup_stores import backup_store
-from server.operations.checks import backups
 from server.operations.drill import DrillUnderWayError, drill, drill_when_due, is_due, sweep
 from server.operations.metrics import exposition
 from server.operations.watched_backups import DrillResult, last_drill, newest_backup

@@ -17,8 +17,8 @@ from server.clock import now
 from server.context import Services, open_services
 from server.operations import watched_backups as watching
 from server.operations.backup import back_up
+from server.operations.backup_checks import backups
 from server.operations.backup_stores import BackupStore, backup_store, backups_in
-from server.operations.checks import backups
 from server.operations.drill import drill, drill_when_due
 from server.operations.encryption import decrypt, encrypted, identity_in, make_identity, recipient_of
 from server.operations.metrics import exposition
