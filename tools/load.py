@@ -27,7 +27,7 @@ from tools.load_measures import Row
 from tools.load_otree import peer
 from tools.load_scenarios import burst, export, starts, steady, under_fire
 
-EXPORTED_ROWS, EXPORTED_PER_S = 1_000_000, 50_000
+EXPORTED_ROWS, EXPORTED_PER_S = 1_000_000, 60_000
 MARKS = {True: "yes", False: "NO", None: ""}
 
 
@@ -35,8 +35,8 @@ def scenarios(share: float, seconds: float, workers: int) -> dict[str, Callable[
     """By name; `share` of the raters and rows."""
     begin_at_once = int(1000 * share)
     return {
-        "sqlite": lambda: steady("sqlite", int(300 * share), seconds, 1, 100, 250),
-        "postgres": lambda: steady("postgres", int(1000 * share), seconds, workers, 100, math.inf),
+        "sqlite": lambda: steady("sqlite", int(300 * share), seconds, 1, 40, math.inf),
+        "postgres": lambda: steady("postgres", int(1000 * share), seconds, workers, 60, math.inf),
         "starts": lambda: starts("sqlite", int(300 * share), int(300 * share), seconds / 2, 1, 150),
         "burst": lambda: burst("sqlite", begin_at_once, 1) + burst("postgres", begin_at_once, workers),
         "many": lambda: steady("postgres", int(5000 * share), seconds, workers, math.inf, math.inf),

@@ -15,7 +15,7 @@ from server.identities.sealing import KnownAs, Sealed, unseal
 from server.models import FormAnswer, IdentityKey, Link, Rating, RecruiterIdentity, Study, StudyRun
 
 RUNS_AT_ONCE = 100
-RUNS_OF_ROWS_AT_ONCE = 20
+RUNS_OF_ROWS_AT_ONCE, ROWS_AT_ONCE = 20, 8_000
 IDENTITIES_AT_ONCE = 500
 
 
@@ -89,17 +89,18 @@ def rows_in_view(session: Session, study: Study, extract: Extract, view: View) -
 def view_rows(session: Session, study: Study, extract: Extract, view: View) -> Iterator[Sequence[Any]]:
     """Rows of the view (values in the order of its names) by start of the run, then trial and play.
 
-    Booleans are 0 and 1. The rows of `RUNS_OF_ROWS_AT_ONCE` runs are in memory at a time, and are sorted
-    here: asked to sort them, PostgreSQL may read every run's trials for each run (1,800 rows a second of a
+    Booleans are 0 and 1. The rows of some runs are in memory at a time, about `ROWS_AT_ONCE` of at most
+    `RUNS_OF_ROWS_AT_ONCE` runs, judged by the runs before, and are sorted here: asked to sort them, PostgreSQL may read every run's trials for each run (1,800 rows a second of a
     million).
     """
-    connection, latest = session.connection(), 0
+    connection, latest, at_once = session.connection(), 0, 1
     of_runs, order = _rows_of_runs(view), _order(view)
-    while runs := _runs_after(session, study, extract, latest):
+    while runs := _runs_after(session, study, extract, latest, at_once):
         latest = runs[-1].id
         number = {run.public_id: index for index, run in enumerate(runs)}
         rows = _plain_rows(connection.execute(of_runs, {"runs": list(number)}))
         yield from sorted(rows, key=partial(order, number))
+        at_once = min(RUNS_OF_ROWS_AT_ONCE, max(1, ROWS_AT_ONCE * len(runs) // max(1, len(rows))))
 
 
 @cache
@@ -128,9 +129,9 @@ def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
     return rows
 
 
-def _runs_after(session: Session, study: Study, extract: Extract, latest: int) -> Sequence[Any]:
+def _runs_after(session: Session, study: Study, extract: Extract, latest: int, at_once: int) -> Sequence[Any]:
     query = select(StudyRun.id, StudyRun.public_id).where(extract.of(study), StudyRun.id > latest)
-    return session.execute(query.order_by(StudyRun.id).limit(RUNS_OF_ROWS_AT_ONCE)).all()
+    return session.execute(query.order_by(StudyRun.id).limit(at_once)).all()
 
 
 def known_person_count(session: Session, study: Study) -> int:
