@@ -90,8 +90,8 @@ def view_rows(session: Session, study: Study, extract: Extract, view: View) -> I
     """Rows of the view (values in the order of its names) by start of the run, then trial and play.
 
     Booleans are 0 and 1. The rows of some runs are in memory at a time, about `ROWS_AT_ONCE` of at most
-    `RUNS_OF_ROWS_AT_ONCE` runs, judged by the runs before, and are sorted here: asked to sort them, PostgreSQL may read every run's trials for each run (1,800 rows a second of a
-    million).
+    `RUNS_OF_ROWS_AT_ONCE` runs, judged by the runs before, and are sorted here: asked to sort them,
+    PostgreSQL may read every run's trials for each run (1,800 rows a second of a million).
     """
     connection, latest, at_once = session.connection(), 0, 1
     of_runs, order = _rows_of_runs(view), _order(view)
