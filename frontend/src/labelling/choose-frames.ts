@@ -1,6 +1,6 @@
 /** Which frames to label: few, and as unlike one another as the recording allows. */
 
-import type { Grey } from "./grey";
+import { blockMeans, type Grey } from "./grey";
 
 export const FRAMES_TO_LABEL = 20;
 const FEW = 120;
@@ -8,9 +8,9 @@ const MANY = 1_200;
 /** A closed lid stays for three frames or more at 30 a second. */
 const STEP_FRAMES = 3;
 /** Pictures before and after that a blink is unlike: 0.4 s at 30 frames a second. */
-const ASIDE = 4;
+export const ASIDE = 4;
 const BLOCK_PX = 4;
-const BRIEF_CHANGES = 8;
+export const BRIEF_CHANGES = 8;
 
 /** Frame numbers spread evenly over a video, first and last among them: every third, but 120 to 1,200 where it has as many. */
 export function candidateFrames(frameCount: number): number[] {
@@ -19,21 +19,8 @@ export function candidateFrames(frameCount: number): number[] {
   return Array.from({ length: count }, (_, index) => Math.round((index * (frameCount - 1)) / (count - 1)));
 }
 
-/** Means of the squares of a picture, row by row; what is left over at its right and below is not looked at. */
-function blockMeans({ width, height, values }: Grey): Float64Array {
-  const [across, down] = [Math.floor(width / BLOCK_PX), Math.floor(height / BLOCK_PX)];
-  const means = new Float64Array(across * down);
-  for (let y = 0; y < down * BLOCK_PX; y += 1) {
-    for (let x = 0; x < across * BLOCK_PX; x += 1) {
-      const block = Math.floor(y / BLOCK_PX) * across + Math.floor(x / BLOCK_PX);
-      means[block] = (means[block] ?? 0) + (values[y * width + x] ?? 0) / BLOCK_PX ** 2;
-    }
-  }
-  return means;
-}
-
 /** The most that any square is brighter, or darker, than both a little before and a little after. */
-function briefness(before: Float64Array, now: Float64Array, after: Float64Array): number {
+function briefness(before: Float32Array, now: Float32Array, after: Float32Array): number {
   let most = 0;
   for (let block = 0; block < now.length; block += 1) {
     const [since, until] = [(now[block] ?? 0) - (before[block] ?? 0), (now[block] ?? 0) - (after[block] ?? 0)];
@@ -49,7 +36,7 @@ function briefness(before: Float64Array, now: Float64Array, after: Float64Array)
  */
 export function briefChanges(pictures: readonly Grey[], count = BRIEF_CHANGES): number[] {
   if (pictures.length <= FEW) return [];
-  const means = pictures.map(blockMeans);
+  const means = pictures.map((picture) => blockMeans(picture, BLOCK_PX).values);
   const marked = means.map((now, index) => {
     const [before, after] = [means[index - ASIDE], means[index + ASIDE]];
     return before && after ? briefness(before, now, after) : 0;

@@ -26,6 +26,37 @@ export function greyOfCanvas(canvas: HTMLCanvasElement | OffscreenCanvas): Grey 
   return greyOf(context.getImageData(0, 0, canvas.width, canvas.height));
 }
 
+/** Means of squares, row by row. */
+export interface BlockMeans {
+  readonly across: number;
+  readonly down: number;
+  readonly values: Float32Array;
+}
+
+/** Means of the squares of a picture; what is left over at its right and below is not looked at. */
+export function blockMeans({ width, height, values }: Grey, block: number): BlockMeans {
+  const [across, down] = [Math.floor(width / block), Math.floor(height / block)];
+  const means = new Float32Array(across * down);
+  for (let y = 0; y < down * block; y += 1) {
+    const row = Math.floor(y / block) * across;
+    for (let x = 0; x < across * block; x += 1) {
+      const place = row + Math.floor(x / block);
+      means[place] = (means[place] ?? 0) + (values[y * width + x] ?? 0);
+    }
+  }
+  for (let place = 0; place < means.length; place += 1) means[place] = (means[place] ?? 0) / block ** 2;
+  return { across, down, values: means };
+}
+
+const THUMBNAIL_PX = 64;
+
+/** The picture about 64 pixels wide, of means of whole squares. */
+export function thumbnailOf(picture: Grey): Grey {
+  const block = Math.max(1, Math.round(picture.width / THUMBNAIL_PX));
+  const { across, down, values } = blockMeans(picture, block);
+  return { width: across, height: down, values: Uint8ClampedArray.from(values) };
+}
+
 /** Luminance between pixels; the border's beyond it. */
 export function sample({ width, height, values }: Grey, x: number, y: number): number {
   const cx = Math.min(width - 1, Math.max(0, x));

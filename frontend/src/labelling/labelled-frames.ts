@@ -1,6 +1,7 @@
 /** Labelled frames of one video: which to label, and whether labels fit the video. */
 
-import { briefChanges, farthestPictures, FRAMES_TO_LABEL } from "./choose-frames";
+import { ASIDE, BRIEF_CHANGES, briefChanges, farthestPictures, FRAMES_TO_LABEL } from "./choose-frames";
+import { type EyesOfVideo, eyesFor } from "./eyes";
 import type { Grey } from "./grey";
 import { checkShape, type LabelFile, LabelProblem } from "./label-file";
 import type { Shape } from "./points";
@@ -16,21 +17,30 @@ export type Frames = ReadonlyMap<number, LabelledFrame>;
 export interface Looked {
   readonly candidates: readonly number[];
   readonly pictures: readonly Grey[];
+  readonly eyes: EyesOfVideo;
 }
 
 export function acceptedOf(frames: Frames): [number, Shape][] {
   return [...frames].filter(([, { accepted }]) => accepted).map(([number, { shape }]) => [number, shape]);
 }
 
-/** About 20 frames: those labelled, brief changes such as blinks, and ones as unlike these as there are. */
-export function chooseFrames({ candidates, pictures }: Looked, labelled: readonly number[]): number[] {
+/** Places of blinks: those of the eyes found, then other brief changes, up to eight. */
+function briefPlaces({ pictures, eyes }: Looked, count: 1 | 2): number[] {
+  const blinks = (eyesFor(eyes, count)?.blinks ?? []).slice(0, BRIEF_CHANGES);
+  const others = briefChanges(pictures).filter((place) => blinks.every((blink) => Math.abs(blink - place) > ASIDE));
+  return [...blinks, ...others].slice(0, BRIEF_CHANGES);
+}
+
+/** About 20 frames: those labelled, blinks and other brief changes, and ones as unlike these as there are. */
+export function chooseFrames(looked: Looked, labelled: readonly number[], eyes: 1 | 2): number[] {
+  const { candidates, pictures } = looked;
   const taken = labelled.map((number) =>
     candidates.reduce(
       (best, candidate, index) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? index : best),
       0,
     ),
   );
-  const brief = briefChanges(pictures).slice(0, Math.max(0, FRAMES_TO_LABEL - taken.length));
+  const brief = briefPlaces(looked, eyes).slice(0, Math.max(0, FRAMES_TO_LABEL - taken.length));
   // The first picture is an open eye as a rule: without it and labels, only blinks would be known.
   const begun = brief.length > 0 && taken.length === 0 ? [0, ...brief] : [...taken, ...brief];
   const indices = farthestPictures(pictures, FRAMES_TO_LABEL, begun).filter((index) => !taken.includes(index));

@@ -22,6 +22,18 @@ const OPEN_EYE: Shape = [
   [0.25, 0.1],
 ];
 
+/** One eye, its canthi at x 0 and 1, in widths of the eye; the upper lid brought down to the lower one by a share. */
+export function templateEye(closed = 0): Shape {
+  const lower: Shape = [at(OPEN_EYE, 0), ...OPEN_EYE.slice(5).reverse()].sort((a, b) => a[0] - b[0]);
+  return OPEN_EYE.map(([x, y], index) => {
+    if (index === 0 || index >= 5) return [x, y];
+    const next = lower.findIndex(([place]) => place > x);
+    const [from, to] = [at(lower, next - 1), at(lower, next)];
+    const below = from[1] + ((to[1] - from[1]) * (x - from[0])) / (to[0] - from[0]);
+    return [x, y + closed * (below - y)];
+  });
+}
+
 /** A first shape in the middle of the picture: one eye, or two beside each other. */
 export function templateShape(eyes: 1 | 2, [width, height]: Size): Shape {
   if (eyes === 1) return OPEN_EYE.map(([x, y]) => [width * (0.2 + 0.6 * x), height / 2 + 0.6 * width * y]);
@@ -81,7 +93,8 @@ export function nearestPoint(points: readonly Point[], [x, y]: Point, reach: num
   return nearest;
 }
 
-function inside([x, y]: Point, [width, height]: Size): Point {
+/** A point held inside the picture. */
+export function inside([x, y]: Point, [width, height]: Size): Point {
   return [Math.min(width - 0.5, Math.max(-0.5, x)), Math.min(height - 0.5, Math.max(-0.5, y))];
 }
 

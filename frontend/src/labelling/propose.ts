@@ -1,6 +1,7 @@
 /** The start shape of a new frame, found from frames labelled before by correlating patches of the pictures. */
 
-import { correlation, type Grey, sample } from "./grey";
+import type { Grey } from "./grey";
+import { cut, type Directions, PLANE, searchFinely } from "./patches";
 import { at, eyeCount, eyeOf, eyeWidth, type Point, type Shape } from "./points";
 
 export const FRAMES_BEFORE_PROPOSALS = 5;
@@ -15,76 +16,6 @@ const POINT_LEAST = 0.6;
 export interface Labelled {
   readonly picture: Grey;
   readonly shape: Shape;
-}
-
-interface Patch {
-  readonly columns: number;
-  readonly rows: number;
-  readonly step: number;
-}
-
-interface Match {
-  readonly dx: number;
-  readonly dy: number;
-  readonly likeness: number;
-}
-
-function cut(picture: Grey, [x, y]: Point, { columns, rows, step }: Patch): Float64Array {
-  const values = new Float64Array(columns * rows);
-  for (let cell = 0; cell < values.length; cell += 1) {
-    const [column, row] = [cell % columns, Math.floor(cell / columns)];
-    values[cell] = sample(picture, x + (column - (columns - 1) / 2) * step, y + (row - (rows - 1) / 2) * step);
-  }
-  return values;
-}
-
-/** Directions of a search: both axes of the picture, or one line. */
-type Directions = readonly [Point] | readonly [Point, Point];
-
-const PLANE: Directions = [
-  [1, 0],
-  [0, 1],
-];
-
-/** The place within `reach` steps of `from` that looks most like `template`. */
-function search(
-  picture: Grey,
-  template: Float64Array,
-  from: Point,
-  patch: Patch,
-  reach: number,
-  step: number,
-  [first, second]: Directions,
-): Match {
-  // Where nothing looks more like it, as in an even surface, it stays.
-  let best: Match = { dx: 0, dy: 0, likeness: correlation(template, cut(picture, from, patch)) };
-  const across = second === undefined ? 0 : reach;
-  for (let row = -across; row <= across; row += 1) {
-    for (let column = -reach; column <= reach; column += 1) {
-      const dx = step * (column * first[0] + row * (second?.[0] ?? 0));
-      const dy = step * (column * first[1] + row * (second?.[1] ?? 0));
-      const likeness = correlation(template, cut(picture, [from[0] + dx, from[1] + dy], patch));
-      if (likeness > best.likeness) best = { dx, dy, likeness };
-    }
-  }
-  return best;
-}
-
-/** Coarse to fine: steps of the patch, then half as much down to a fifth of a pixel. */
-function searchFinely(
-  picture: Grey,
-  template: Float64Array,
-  from: Point,
-  patch: Patch,
-  reach: number,
-  directions: Directions = PLANE,
-): Match {
-  let best = search(picture, template, from, patch, reach, patch.step, directions);
-  for (let step = patch.step / 2; step > 0.2; step /= 2) {
-    const next = search(picture, template, [from[0] + best.dx, from[1] + best.dy], patch, 1, step, directions);
-    best = { dx: best.dx + next.dx, dy: best.dy + next.dy, likeness: next.likeness };
-  }
-  return best;
 }
 
 function centreOf(eye: Shape): Point {

@@ -1,7 +1,9 @@
 /** The shape a new frame begins with: the template, the nearest labelled frame's, or a proposal from all of them. */
 
+import { eyesFor, placesOn, shapeOn } from "./eyes";
 import { type Grey, greyOfCanvas } from "./grey";
-import { type Shape, templateShape } from "./points";
+import { inside, type Shape, type Size, templateShape } from "./points";
+import type { Looked } from "./labelled-frames";
 import { FRAMES_BEFORE_PROPOSALS, proposeShape } from "./propose";
 import type { OpenedVideo } from "./video";
 
@@ -10,11 +12,11 @@ const MAX_SOURCES = 24;
 export interface Start {
   readonly number: number;
   readonly shape: Shape;
-  readonly from: "template" | "nearest" | "proposal";
+  readonly from: "template" | "eyes" | "nearest" | "proposal";
 }
 
 export async function startShape(
-  video: OpenedVideo,
+  { video, looked }: { readonly video: OpenedVideo; readonly looked: Looked },
   { number, canvas }: { number: number; canvas: HTMLCanvasElement },
   accepted: readonly [number, Shape][],
   eyes: 1 | 2,
@@ -22,7 +24,7 @@ export async function startShape(
 ): Promise<Start> {
   const nearest = [...accepted].sort(([a], [b]) => Math.abs(a - number) - Math.abs(b - number));
   const first = nearest[0];
-  if (first === undefined) return { number, shape: templateShape(eyes, video.size), from: "template" };
+  if (first === undefined) return firstShape(number, looked, eyes, video.size);
   if (nearest.length < FRAMES_BEFORE_PROPOSALS) return { number, shape: first[1], from: "nearest" };
   const sources = [];
   for (const [source, shape] of nearest.slice(0, MAX_SOURCES)) {
@@ -31,4 +33,16 @@ export async function startShape(
     sources.push({ picture, shape });
   }
   return { number, shape: proposeShape(greyOfCanvas(canvas), sources), from: "proposal" };
+}
+
+/** Without a labelled frame: laid on the eyes found, as closed as they are there, or at a fixed place. */
+function firstShape(number: number, { candidates, eyes: known }: Looked, eyes: 1 | 2, size: Size): Start {
+  const found = eyesFor(known, eyes);
+  if (found === null) return { number, shape: templateShape(eyes, size), from: "template" };
+  const index = candidates.reduce(
+    (best, candidate, place) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best),
+    0,
+  );
+  const shape = shapeOn(placesOn(found, index, known.size, size), found.closed[index] ?? 0);
+  return { number, shape: shape.map((point) => inside(point, size)), from: "eyes" };
 }

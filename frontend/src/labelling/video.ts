@@ -4,7 +4,8 @@ import { BlobSource, CanvasSink, EncodedPacketSink, Input, MATROSKA, MP4, QTFF, 
 import { type Grey, greyOfCanvas } from "./grey";
 import type { Size } from "./points";
 
-const THUMBNAIL_PX = 64;
+/** Width of the small pictures: eyes 30 px wide of 640 are 15 there, enough to follow. */
+const SMALL_PX = 320;
 
 /** The video cannot be used; the message says why. */
 class VideoProblem extends Error {
@@ -16,9 +17,11 @@ export interface OpenedVideo {
   readonly name: string;
   readonly size: Size;
   readonly frameCount: number;
+  /** From the first frame to the last. */
+  readonly seconds: number;
   frame(number: number): Promise<HTMLCanvasElement>;
   /** Small grey pictures of some frames, numbers ascending. */
-  thumbnails(numbers: readonly number[], done: (count: number) => void): Promise<Grey[]>;
+  smallPictures(numbers: readonly number[], done: (count: number) => void): Promise<Grey[]>;
   close(): void;
 }
 
@@ -51,8 +54,8 @@ async function opened(name: string, input: Input): Promise<OpenedVideo> {
   const [width, height] = turned ? [lines, coded] : [coded, lines];
   const whole = new CanvasSink(track, { width, height, fit: "fill" });
   const small = new CanvasSink(track, {
-    width: THUMBNAIL_PX,
-    height: Math.max(1, Math.round((THUMBNAIL_PX * height) / width)),
+    width: Math.min(SMALL_PX, width),
+    height: Math.max(1, Math.round((Math.min(SMALL_PX, width) * height) / width)),
     fit: "fill",
     poolSize: 2,
   });
@@ -60,8 +63,9 @@ async function opened(name: string, input: Input): Promise<OpenedVideo> {
     name,
     size: [width, height],
     frameCount: times.length,
+    seconds: (times[times.length - 1] ?? 0) - (times[0] ?? 0),
     frame: async (number) => copied(await oneFrame(whole, times, number), width, height),
-    thumbnails: (numbers, done) =>
+    smallPictures: (numbers, done) =>
       greyFrames(
         small,
         numbers.map((number) => within(times, number)),

@@ -43,7 +43,7 @@ function begunWith(work: Work, frames: Frames, eyes: EyeCount): Work {
 }
 
 export function withVideo(work: Work, video: OpenedVideo, looked: Looked): Work {
-  const chosen = chooseFrames(looked, []);
+  const chosen = chooseFrames(looked, [], work.eyes);
   return { ...begunWith(work, NO_FRAMES, work.eyes), opened: { video, looked }, chosen, current: chosen[0] ?? 0, problem: null };
 }
 
@@ -54,7 +54,7 @@ export function withLabels(work: Work, name: string, labels: LabelFile): Work {
   const { eyes, midUpper, midLower, rest } = labels;
   const numbers = [...labels.frames.keys()];
   const frames: Frames = new Map([...labels.frames].map(([number, shape]) => [number, { shape, accepted: true }]));
-  const chosen = chooseFrames(work.opened.looked, numbers);
+  const chosen = chooseFrames(work.opened.looked, numbers, eyes);
   return {
     ...begunWith(work, frames, eyes),
     markers: { midUpper, midLower, rest },
@@ -64,9 +64,12 @@ export function withLabels(work: Work, name: string, labels: LabelFile): Work {
   };
 }
 
-/** Another number of eyes: the points begin anew. */
+/** Another number of eyes: the points begin anew, and so do the frames, for other blinks may be known. */
 export function withEyes(work: Work, eyes: EyeCount): Work {
-  return begunWith(work, NO_FRAMES, eyes);
+  const next = begunWith(work, NO_FRAMES, eyes);
+  if (work.opened === null) return next;
+  const chosen = chooseFrames(work.opened.looked, [], eyes);
+  return { ...next, chosen, current: chosen[0] ?? 0 };
 }
 
 function withCurrent(work: Work, frame: LabelledFrame, step: string | null): Work {

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { briefChanges, candidateFrames, farthestPictures } from "../../src/labelling/choose-frames";
+import { NO_EYES } from "../../src/labelling/eyes";
 import type { Grey } from "../../src/labelling/grey";
 import { begun, changed, redone, undone } from "../../src/labelling/history";
 import { checkShape, labelsText, parseLabels } from "../../src/labelling/label-file";
@@ -61,10 +62,10 @@ describe("frames to label", () => {
     });
     const candidates = candidateFrames(3 * (length - 1) + 1);
     expect(candidates).toHaveLength(length);
-    const chosen = chooseFrames({ candidates, pictures }, []);
+    const chosen = chooseFrames({ candidates, pictures, eyes: NO_EYES }, [], 2);
     expect(chosen).toEqual(expect.arrayContaining([0, 270, 900, 1_350, 1_710]));
     expect(chosen.length).toBeLessThanOrEqual(20);
-    const relabelled = chooseFrames({ candidates, pictures }, [4]);
+    const relabelled = chooseFrames({ candidates, pictures, eyes: NO_EYES }, [4], 2);
     expect(relabelled).toEqual(expect.arrayContaining([4, 270, 900, 1_350, 1_710]));
     expect(briefChanges(pictures.slice(0, 120))).toEqual([]);
   });
@@ -101,8 +102,8 @@ describe("undo", () => {
 
 describe("the work on a video", () => {
   const unread = () => Promise.reject(new Error("no pixels here"));
-  const video = { name: "a.mp4", size: SIZE, frameCount: 30, frame: unread, thumbnails: unread, close: () => undefined };
-  const looked = { candidates: [0, 10, 20], pictures: [10, 100, 200].map(flat) };
+  const video = { name: "a.mp4", size: SIZE, frameCount: 30, seconds: 1, frame: unread, smallPictures: unread, close: () => undefined };
+  const looked = { candidates: [0, 10, 20], pictures: [10, 100, 200].map(flat), eyes: NO_EYES };
   const opened = withVideo(NO_WORK, video, looked);
   const shape = templateShape(2, SIZE);
   const accepted = (work: Work): number[] => [...work.history.now].filter(([, frame]) => frame.accepted).map(([number]) => number);

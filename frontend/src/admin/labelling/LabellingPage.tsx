@@ -18,6 +18,7 @@ type Labelling = ReturnType<typeof useLabelling>;
 const STARTS = {
   template:
     "A shape to begin with: drag each point to its place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
+  eyes: "Laid on the eyes found by their blinks: drag each point to its place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
   nearest: `The points of the nearest labelled frame. From ${FRAMES_BEFORE_PROPOSALS} accepted frames on, they are proposed.`,
   proposal: "Proposed from the labelled frames: correct what is off, then accept.",
 } as const;
@@ -41,7 +42,9 @@ export function LabellingPage() {
           Save labels
         </Button>
       </Group>
-      <div role="status">{work.busy !== null && <Text>{work.busy} …</Text>}</div>
+      <div role="status">
+        {work.busy === null ? work.notice !== null && <Text size="sm">{work.notice}</Text> : <Text>{work.busy} …</Text>}
+      </div>
       {work.problem !== null && (
         <Alert color="red" variant="light" role="alert" title="Look again">
           {work.problem}

@@ -3,6 +3,7 @@
 import { useCallback, useState } from "react";
 import { labelsText, parseLabels } from "../../labelling/label-file";
 import { acceptedOf } from "../../labelling/labelled-frames";
+import { noticeOf } from "../../labelling/eyes";
 import { openForLabelling } from "../../labelling/open";
 import type { Point, Shape } from "../../labelling/points";
 import {
@@ -41,6 +42,7 @@ export function useLabelling() {
     picture: picture?.canvas ?? null,
     shape,
     startedFrom: start?.from ?? null,
+    notice: work.opened === null ? null : noticeOf(work.opened.looked.eyes, work.eyes),
     ...openings(work, setWork, setBusy, tell),
     ...edits(work, shape, setWork),
   };

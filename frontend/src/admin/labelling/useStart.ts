@@ -19,19 +19,19 @@ export function useStart({ opened, eyes, history, current }: Work, picture: Pict
   const video = opened?.video ?? null;
   const labelled = history.now.has(current);
   // The frames count as they are when a new frame is opened: a start shape does not change under the hand.
-  const propose = useEffectEvent((from: OpenedVideo, shown: Picture) =>
-    startShape(from, shown, acceptedOf(history.now), eyes, greysOf(from)),
+  const propose = useEffectEvent((from: NonNullable<Work["opened"]>, shown: Picture) =>
+    startShape(from, shown, acceptedOf(history.now), eyes, greysOf(from.video)),
   );
   useEffect(() => {
-    if (video === null || picture === null || labelled) return;
+    if (opened === null || video === null || picture === null || labelled) return;
     let live = true;
-    propose(video, picture)
+    propose(opened, picture)
       .then((proposal) => live && setStart({ ...proposal, video, eyes }))
       .catch((error: unknown) => live && tell(message(error)));
     return () => {
       live = false;
     };
-  }, [video, picture, labelled, eyes, tell]);
+  }, [opened, video, picture, labelled, eyes, tell]);
   const fits = start !== null && start.video === video && start.eyes === eyes && start.number === current;
   return fits && !labelled ? start : null;
 }

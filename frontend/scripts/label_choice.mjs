@@ -1,0 +1,31 @@
+// What the labelling page finds in a recording: `node label_choice.mjs FRAMES.grey '{"frames": 1800, "fps": 30, ...}'`.
+// The file holds every frame's luminance, as small as the page makes it; tests/bench/bench_label_choice.py writes it.
+import { closeSync, openSync, readSync } from "node:fs";
+import { runnerImport } from "vite";
+
+const [path, text] = process.argv.slice(2);
+const facts = JSON.parse(text);
+const load = async (name) => (await runnerImport(new URL(`../src/labelling/${name}.ts`, import.meta.url).pathname)).module;
+const { candidateFrames } = await load("choose-frames");
+const [width, height] = facts.looked;
+const file = openSync(path);
+const pictures = candidateFrames(facts.frames).map((number) => {
+  const values = new Uint8ClampedArray(width * height);
+  readSync(file, values, 0, values.length, number * values.length);
+  return { width, height, values };
+});
+closeSync(file);
+
+const { seeEyes } = await load("see-eyes");
+const { eyesFor, placesOn } = await load("eyes");
+const { thumbnailOf } = await load("grey");
+const { chooseFrames } = await load("labelled-frames");
+const candidates = candidateFrames(facts.frames);
+const begun = process.cpuUsage();
+const eyes = seeEyes(pictures, (facts.frames - 1) / facts.fps / (candidates.length - 1), () => undefined);
+const seconds = process.cpuUsage(begun).user / 1e6;
+const found = eyesFor(eyes, facts.eyes);
+const places = found === null ? [] : candidates.map((_, index) => placesOn(found, index, eyes.size, facts.size));
+const chosen = chooseFrames({ candidates, pictures: pictures.map(thumbnailOf), eyes }, [], facts.eyes);
+const withEyes = { two: eyes.two !== null, one: eyes.one !== null };
+console.log(JSON.stringify({ chosen, candidates, places, found: withEyes, seconds }));

@@ -1,0 +1,24 @@
+/** Beside the page: looks for eyes, which takes seconds, while the page stays usable. */
+
+import type { EyesOfVideo } from "./eyes";
+import type { Grey } from "./grey";
+import { seeEyes } from "./see-eyes";
+
+export interface ToEyes {
+  readonly pictures: readonly Grey[];
+  readonly seconds: number;
+}
+
+export type FromEyes = { readonly percent: number } | { readonly found: EyesOfVideo };
+
+const tell = (message: FromEyes): void => self.postMessage(message);
+
+self.onmessage = ({ data }: MessageEvent<ToEyes>) => {
+  let told = -1;
+  const found = seeEyes(data.pictures, data.seconds, (share) => {
+    const percent = Math.floor(100 * share);
+    if (percent > told) tell({ percent });
+    told = Math.max(told, percent);
+  });
+  tell({ found });
+};
