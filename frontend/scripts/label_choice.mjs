@@ -17,15 +17,16 @@ const pictures = candidateFrames(facts.frames).map((number) => {
 closeSync(file);
 
 const { seeEyes } = await load("see-eyes");
-const { eyesFor, placesOn } = await load("eyes");
+const { eyesFor, NO_EYES, placesOn } = await load("eyes");
 const { thumbnailOf } = await load("grey");
 const { chooseFrames } = await load("labelled-frames");
 const candidates = candidateFrames(facts.frames);
 const begun = process.cpuUsage();
 const eyes = seeEyes(pictures, (facts.frames - 1) / facts.fps / (candidates.length - 1), () => undefined);
 const seconds = process.cpuUsage(begun).user / 1e6;
-const found = eyesFor(eyes, facts.eyes);
-const places = found === null ? [] : candidates.map((_, index) => placesOn(found, index, eyes.size, facts.size));
-const chosen = chooseFrames({ candidates, pictures: pictures.map(thumbnailOf), eyes }, [], facts.eyes);
-const withEyes = { two: eyes.two !== null, one: eyes.one !== null };
-console.log(JSON.stringify({ chosen, candidates, places, found: withEyes, seconds }));
+const blinking = eyesFor(eyes, facts.eyes);
+const places = blinking === null ? [] : candidates.map((_, index) => placesOn(blinking, index, eyes.size, facts.size));
+const small = pictures.map(thumbnailOf);
+const chosen = chooseFrames({ candidates, pictures: small, eyes }, [], facts.eyes);
+const before = chooseFrames({ candidates, pictures: small, eyes: NO_EYES }, [], facts.eyes);
+console.log(JSON.stringify({ chosen, before, candidates, places, seconds }));

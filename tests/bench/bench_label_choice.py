@@ -12,7 +12,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -21,49 +24,101 @@ from tests.bench.label_choice_recordings import CLOSE_UP, FACE, FPS, Recording, 
 
 ROOT = Path(__file__).parents[2]
 LOOKED_PX = 320
-Maker = Callable[[], Recording]
+SEEDS = {"develop": (range(1, 4), range(1, 4)), "held-out": (range(101, 111), range(101, 108))}
 
 
-def sets(which: str, clips: Path) -> Iterator[tuple[str, list[Maker]]]:
-    """Named sets of recordings; seeds of the two parts never meet."""
-    first, few, many = (1, 4, 4) if which == "develop" else (101, 10, 7)
+@dataclass(frozen=True)
+class Set:
+    """Recordings of one kind, and how many eyes the page is told to look for."""
+
+    name: str
+    eyes: int
+    makers: list[Callable[[], Recording]]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the page's modules say: frames chosen now and without eyes, and the eyes on each candidate frame."""
+
+    chosen: list[int]
+    before: list[int]
+    candidates: list[int]
+    places: list[dict[str, Any]]
+    seconds: float
+
+
+def sets(which: str, clips: Path) -> Iterator[Set]:
+    """The seeds of development and those held out never meet; the real clips are the same two people."""
+    real, drawn = SEEDS[which]
     if clips.exists():
-        seeds = range(first, first + few)
-        yield "whole face, eyes 30 px", [lambda seed=seed: walked(clips, FACE, seed) for seed in seeds]
-        yield "close-up of one eye", [lambda seed=seed: walked(clips, CLOSE_UP, seed) for seed in seeds]
-        yield "whole face, no blink", [lambda seed=seed: walked(clips, FACE, seed, False) for seed in seeds]
-    yield "actor, eyes 30 px", [lambda seed=seed: actor(seed, 0.4) for seed in range(first, first + many)]
-    yield "actor, eyes 76 px", [lambda seed=seed: actor(seed, 1.0) for seed in range(first, first + many)]
+        faces = [partial(walked, clips, FACE, seed) for seed in real]
+        near = [partial(walked, clips, CLOSE_UP, seed) for seed in real]
+        yield Set("whole face, eyes 30 px wide", 2, faces)
+        yield Set("close-up, one eye chosen", 1, near)
+        yield Set("close-up, two eyes chosen", 2, near)
+        yield Set("whole face, no blink", 2, [partial(walked, clips, FACE, seed, False) for seed in real])
+    yield Set("actor, eyes 30 px wide", 2, [partial(actor, seed, 0.4) for seed in drawn])
+    yield Set("actor, eyes 76 px wide", 2, [partial(actor, seed, 1.0) for seed in drawn])
 
 
-def chosen_by_page(recording: Recording, folder: Path) -> dict[str, list[float]]:
-    """The page's answer: frames chosen, and the corners of the eyes on each, in pixels of the recording."""
+def answer_of(recording: Recording, eyes: int, folder: Path) -> Answer:
+    """The answer for one recording, its frames made as small as the page makes them."""
     count, height, width = recording.pictures.shape
     small = (LOOKED_PX, max(1, round(LOOKED_PX * height / width)))
     raw = folder / "frames.grey"
     with raw.open("wb") as stream:
         for picture in recording.pictures:
             stream.write(cv2.resize(picture, small, interpolation=cv2.INTER_AREA).tobytes())
-    facts = {"frames": count, "fps": FPS, "looked": small, "size": [width, height]}
+    facts = {"frames": count, "fps": FPS, "looked": small, "size": [width, height], "eyes": eyes}
     command = ["node", "scripts/label_choice.mjs", str(raw), json.dumps(facts)]
     done = subprocess.run(command, cwd=ROOT / "frontend", capture_output=True, text=True, check=True)
-    return json.loads(done.stdout.splitlines()[-1])
+    return Answer(**json.loads(done.stdout.splitlines()[-1]))
 
 
-def measured(recording: Recording, folder: Path) -> str:
-    answer = chosen_by_page(recording, folder)
-    chosen = np.array(answer["chosen"], dtype=int)
-    hits = sum(any(first <= frame <= last for frame in chosen) for first, last in recording.blinks)
-    return f"{hits}/{len(recording.blinks)} {answer}"
+def hits(frames: list[int], recording: Recording) -> int:
+    """Blinks of which a frame with the lids half closed or more is among those given."""
+    return sum(any(first <= frame <= last for frame in frames) for first, last in recording.blinks)
+
+
+def errors(answer: Answer, recording: Recording) -> list[float]:
+    """Distance of each eye's middle from the truth on every candidate frame, in widths of the eye."""
+    found = []
+    for number, eyes in zip(answer.candidates, answer.places, strict=False):
+        for eye, centre in enumerate(eyes["centres"]):
+            first, last = recording.canthi[number, 2 * eye : 2 * eye + 2]
+            found.append(float(np.hypot(*(centre - (first + last) / 2)) / np.hypot(*(last - first))))
+    return found
+
+
+def measure(kind: Set, folder: Path) -> str:
+    """One line of the table."""
+    blinks = now = before = seen = 0
+    distances: list[float] = []
+    seconds: list[float] = []
+    for make in kind.makers:
+        recording = make()
+        answer = answer_of(recording, kind.eyes, folder)
+        blinks += len(recording.blinks)
+        now += hits(answer.chosen, recording)
+        before += hits(answer.before, recording)
+        seen += bool(answer.places)
+        seconds.append(answer.seconds)
+        if answer.places and recording.canthi.shape[1] == 2 * kind.eyes:
+            distances += errors(answer, recording)
+    off = np.percentile(distances, [50, 95, 100]).round(2).tolist() if distances else "-"
+    return (
+        f"{kind.name}: blinks {before} -> {now} of {blinks}; eyes found in {seen} of {len(kind.makers)}; "
+        f"off by (median, 95%, worst; eye widths) {off}; {max(seconds):.1f} s of processor"
+    )
 
 
 def main(which: str, clips: Path) -> None:
+    """Measure every set and print a line for each."""
     with tempfile.TemporaryDirectory() as folder:
-        for name, makers in sets(which, clips):
-            print(name)
-            for make in makers:
-                print("  ", measured(make(), Path(folder)))
+        for kind in sets(which, clips):
+            print(measure(kind, Path(folder)), flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]) if len(sys.argv) > 2 else ROOT.parent / "shared/data/face_video")
+    given = sys.argv[2] if len(sys.argv) > 2 else ROOT.parent / "shared" / "data" / "face_video"
+    main(sys.argv[1], Path(given))

@@ -70,7 +70,9 @@ def _walk(clip: Clip, count: int, rng: np.random.Generator, with_blinks: bool) -
     last = count - 1
     place, way, crossing = float(rng.uniform(0, clip.closed[0][0] - 9)), 1.0, False
     for number in range(int(SECONDS * FPS)):
-        inside = next((span for span in clip.closed if span[0] - 6 <= place + way * clip.step <= span[1] + 10), None)
+        inside = next(
+            (span for span in clip.closed if span[0] - 6 <= place + way * clip.step <= span[1] + 10), None
+        )
         if inside is None:
             crossing = False
         elif not crossing and due and number >= due[0]:
@@ -89,12 +91,17 @@ def walked(folder: Path, clip: Clip, seed: int, with_blinks: bool = True) -> Rec
     frames = luminance(folder / f"{clip.name}.mp4")
     labels = json.loads((folder / f"{clip.name}.points.json").read_text())["frames"]
     known = np.array(sorted(int(number) for number in labels))
-    corners = np.array([[labels[str(number)][point] for point in clip.canthi] for number in known], dtype=float)
+    corners = np.array(
+        [[labels[str(number)][point] for point in clip.canthi] for number in known], dtype=float
+    )
     course = list(_walk(clip, len(frames), np.random.default_rng([seed, 24]), with_blinks))
     indices = np.array([index for index, _ in course])
     closed = [any(first <= index <= last for first, last in clip.closed) for index in indices]
     canthi = np.stack(
-        [[np.interp(indices, known, corners[:, point, axis]) for axis in (0, 1)] for point in range(corners.shape[1])]
+        [
+            [np.interp(indices, known, corners[:, point, axis]) for axis in (0, 1)]
+            for point in range(corners.shape[1])
+        ]
     ).transpose(2, 0, 1)
     rng = np.random.default_rng([seed, 25])
     noise = rng.normal(0, 1.0, size=(8, *frames.shape[1:]))

@@ -21,8 +21,8 @@ export interface Spot {
 
 /** By how much every square is brighter, or darker, than both before and after; 0 where it is between them. */
 export function briefChange(before: BlockMeans, now: BlockMeans, after: BlockMeans): BlockMeans {
-  const values = now.values.map((value, place) => {
-    const [since, until] = [value - (before.values[place] ?? 0), value - (after.values[place] ?? 0)];
+  const values = now.values.map((value, cell) => {
+    const [since, until] = [value - (before.values[cell] ?? 0), value - (after.values[cell] ?? 0)];
     return since * until > 0 ? Math.min(Math.abs(since), Math.abs(until)) : 0;
   });
   return { across: now.across, down: now.down, values };
@@ -77,7 +77,7 @@ function strongest(strengths: Float32Array, { across, down }: BlockMeans, width:
   const spots: Spot[] = [];
   while (spots.length < SPOTS) {
     let best = 0;
-    for (let place = 1; place < strengths.length; place += 1) if ((strengths[place] ?? 0) > (strengths[best] ?? 0)) best = place;
+    for (let cell = 1; cell < strengths.length; cell += 1) if ((strengths[cell] ?? 0) > (strengths[best] ?? 0)) best = cell;
     const [strength, left, top] = [strengths[best] ?? 0, best % across, Math.floor(best / across)];
     if (!(strength > 0)) break;
     spots.push({ x: left + width / 2, y: top + height / 2, strength });

@@ -9,16 +9,16 @@ export interface ToEyes {
   readonly seconds: number;
 }
 
-export type FromEyes = { readonly percent: number } | { readonly found: EyesOfVideo };
+export type FromEyes = { readonly percent: number } | { readonly eyes: EyesOfVideo };
 
 const tell = (message: FromEyes): void => self.postMessage(message);
 
 self.onmessage = ({ data }: MessageEvent<ToEyes>) => {
   let told = -1;
-  const found = seeEyes(data.pictures, data.seconds, (share) => {
+  const eyes = seeEyes(data.pictures, data.seconds, (share) => {
     const percent = Math.floor(100 * share);
     if (percent > told) tell({ percent });
     told = Math.max(told, percent);
   });
-  tell({ found });
+  tell({ eyes });
 };

@@ -35,7 +35,7 @@ export const NO_EYES: EyesOfVideo = { size: [1, 1], two: null, one: null, proble
 /** Width of an eye by the distance of both: 30 mm of 63 mm in adults, of which a shape's corners leave some to either side. */
 export const WIDTH_OF_DISTANCE = 0.42;
 /** Lids of a shape are never laid quite closed: their points would lie on one another. */
-const MOST_CLOSED = 0.85;
+const MAX_CLOSED = 0.85;
 
 /** The eyes for one or two of them; of two eyes the image-left one where one is asked for. */
 export function eyesFor({ one, two }: EyesOfVideo, eyes: 1 | 2): FoundEyes | null {
@@ -45,10 +45,10 @@ export function eyesFor({ one, two }: EyesOfVideo, eyes: 1 | 2): FoundEyes | nul
 }
 
 /** Where the eyes are on a picture, in pixels of the video. */
-export function placesOn(found: FoundEyes, index: number, [looked]: Size, [wide]: Size): EyePlaces {
+export function placesOn(eyesFound: FoundEyes, index: number, [looked]: Size, [wide]: Size): EyePlaces {
   const scale = wide / looked;
-  const centres = (found.centres[index] ?? []).map(([x, y]): Point => [(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5]);
-  return { centres, width: found.width * scale };
+  const centres = (eyesFound.centres[index] ?? []).map(([x, y]): Point => [(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5]);
+  return { centres, width: eyesFound.width * scale };
 }
 
 /** An open shape on the eyes, turned as they are, its lids closed by a share. */
@@ -56,7 +56,7 @@ export function shapeOn({ centres, width }: EyePlaces, closed: number): Shape {
   const [first, last] = [centres[0] ?? [0, 0], centres[centres.length - 1] ?? [0, 0]];
   const distance = Math.hypot(last[0] - first[0], last[1] - first[1]);
   const [cosine, sine] = distance > 0 ? [(last[0] - first[0]) / distance, (last[1] - first[1]) / distance] : [1, 0];
-  const eye = templateEye(MOST_CLOSED * Math.min(1, Math.max(0, closed)));
+  const eye = templateEye(MAX_CLOSED * Math.min(1, Math.max(0, closed)));
   return centres.flatMap(([x, y], number) =>
     eye.map(([along, down]): Point => {
       const [u, v] = [(number === 0 ? along - 0.5 : 0.5 - along) * width, down * width];
@@ -67,10 +67,10 @@ export function shapeOn({ centres, width }: EyePlaces, closed: number): Shape {
 
 /** What was found for a choice of the page, in a sentence, and where the first shape lies then. */
 export function noticeOf(known: EyesOfVideo, eyes: 1 | 2): string {
-  const found = eyesFor(known, eyes);
+  const eyesFound = eyesFor(known, eyes);
   const middle = "The first shape lies in the middle of the picture: drag it to its place.";
-  if (found !== null) {
-    const many = found.blinks.length === 1 ? "a blink" : `${found.blinks.length} blinks`;
+  if (eyesFound !== null) {
+    const many = eyesFound.blinks.length === 1 ? "a blink" : `${eyesFound.blinks.length} blinks`;
     return `${eyes === 2 ? "Two eyes" : "An eye"} found by ${many}; the first shape lies there, and the frames include blinks.`;
   }
   if (known.problem !== null) return `Eyes could not be looked for (${known.problem}). ${middle}`;

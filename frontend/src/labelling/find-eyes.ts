@@ -11,7 +11,7 @@ const PAIR_WIDTHS = [2, 3, 4, 6, 8, 11];
 const LONE_WIDTHS = [16, 22, 30, 40, 52];
 /** Distance of two eyes in widths of the spots, which are narrower than the eyes. */
 const DISTANCES = [1.5, 3.6] as const;
-const MOST_TILT = 0.35;
+const MAX_TILT = 0.35;
 /** The weaker spot of two has at least this share of the stronger one's change. */
 const LEAST_BALANCE = 0.35;
 /** Grey levels by the share of all change nearby; noise of sensors stays below. */
@@ -97,7 +97,7 @@ function pairsOf(spots: readonly Spot[], width: number, sums: Sums, index: numbe
   return spots.flatMap((left) =>
     spots.flatMap((right) => {
       const [dx, dy] = [right.x - left.x, right.y - left.y];
-      if (dx < DISTANCES[0] * width || dx > DISTANCES[1] * width || Math.abs(dy) > MOST_TILT * dx) return [];
+      if (dx < DISTANCES[0] * width || dx > DISTANCES[1] * width || Math.abs(dy) > MAX_TILT * dx) return [];
       const [weaker, stronger] = [Math.min(left.strength, right.strength), Math.max(left.strength, right.strength)];
       if (weaker < LEAST_BALANCE * stronger) return [];
       const extent = Math.hypot(dx, dy);

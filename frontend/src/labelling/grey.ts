@@ -40,11 +40,11 @@ export function blockMeans({ width, height, values }: Grey, block: number): Bloc
   for (let y = 0; y < down * block; y += 1) {
     const row = Math.floor(y / block) * across;
     for (let x = 0; x < across * block; x += 1) {
-      const place = row + Math.floor(x / block);
-      means[place] = (means[place] ?? 0) + (values[y * width + x] ?? 0);
+      const cell = row + Math.floor(x / block);
+      means[cell] = (means[cell] ?? 0) + (values[y * width + x] ?? 0);
     }
   }
-  for (let place = 0; place < means.length; place += 1) means[place] = (means[place] ?? 0) / block ** 2;
+  for (let cell = 0; cell < means.length; cell += 1) means[cell] = (means[cell] ?? 0) / block ** 2;
   return { across, down, values: means };
 }
 
@@ -55,18 +55,6 @@ export function thumbnailOf(picture: Grey): Grey {
   const block = Math.max(1, Math.round(picture.width / THUMBNAIL_PX));
   const { across, down, values } = blockMeans(picture, block);
   return { width: across, height: down, values: Uint8ClampedArray.from(values) };
-}
-
-/** Luminance between pixels; the border's beyond it. */
-export function sample({ width, height, values }: Grey, x: number, y: number): number {
-  const cx = Math.min(width - 1, Math.max(0, x));
-  const cy = Math.min(height - 1, Math.max(0, y));
-  const [left, top] = [Math.floor(cx), Math.floor(cy)];
-  const [right, below] = [Math.min(width - 1, left + 1), Math.min(height - 1, top + 1)];
-  const [fx, fy] = [cx - left, cy - top];
-  const upper = (values[top * width + left] ?? 0) * (1 - fx) + (values[top * width + right] ?? 0) * fx;
-  const lower = (values[below * width + left] ?? 0) * (1 - fx) + (values[below * width + right] ?? 0) * fx;
-  return upper * (1 - fy) + lower * fy;
 }
 
 /** Normalised cross-correlation of two samples of equal length: 1 alike up to light and contrast, 0 unrelated. */

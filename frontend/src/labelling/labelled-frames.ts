@@ -27,7 +27,7 @@ export function acceptedOf(frames: Frames): [number, Shape][] {
 /** Places of blinks: those of the eyes found, then other brief changes, up to eight. */
 function briefPlaces({ pictures, eyes }: Looked, count: 1 | 2): number[] {
   const blinks = (eyesFor(eyes, count)?.blinks ?? []).slice(0, BRIEF_CHANGES);
-  const others = briefChanges(pictures).filter((place) => blinks.every((blink) => Math.abs(blink - place) > ASIDE));
+  const others = briefChanges(pictures).filter((change) => blinks.every((blink) => Math.abs(blink - change) > ASIDE));
   return [...blinks, ...others].slice(0, BRIEF_CHANGES);
 }
 

@@ -54,7 +54,7 @@ function changesOf(looks: readonly Float64Array[], aside: number): Float64Array[
   });
 }
 
-export function median(values: number[]): number {
+function median(values: number[]): number {
   const sorted = values.sort((a, b) => a - b);
   const half = Math.floor(sorted.length / 2);
   return sorted.length % 2 === 1 ? (sorted[half] ?? 0) : ((sorted[half - 1] ?? 0) + (sorted[half] ?? 0)) / 2;

@@ -35,7 +35,7 @@ function eyesOf(task: ToEyes, tell: (percent: number) => void): Promise<EyesOfVi
     worker.onerror = (event) => resolve({ ...NO_EYES, problem: event.message || "their worker stopped" });
     worker.onmessage = ({ data }: MessageEvent<FromEyes>) => {
       if ("percent" in data) tell(data.percent);
-      else resolve(data.found);
+      else resolve(data.eyes);
     };
     // The pictures are not needed here any more: handed over, they are not copied.
     worker.postMessage(task, [...new Set(task.pictures.map(({ values }) => values.buffer))]);

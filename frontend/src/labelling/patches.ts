@@ -22,16 +22,16 @@ export function cut(picture: Grey, [x, y]: Point, { columns, rows, step }: Patch
   const lefts = new Int32Array(columns);
   const shares = new Float64Array(columns);
   for (let column = 0; column < columns; column += 1) {
-    const place = Math.min(width - 1, Math.max(0, x + (column - (columns - 1) / 2) * step));
+    const at = Math.min(width - 1, Math.max(0, x + (column - (columns - 1) / 2) * step));
     // At the border the last two columns are mixed, all of it from the last.
-    const left = Math.max(0, Math.min(width - 2, Math.floor(place)));
-    [lefts[column], shares[column]] = [left, place - left];
+    const left = Math.max(0, Math.min(width - 2, Math.floor(at)));
+    [lefts[column], shares[column]] = [left, at - left];
   }
   const beside = width > 1 ? 1 : 0;
   for (let row = 0; row < rows; row += 1) {
-    const place = Math.min(picture.height - 1, Math.max(0, y + (row - (rows - 1) / 2) * step));
-    const top = Math.max(0, Math.min(picture.height - 2, Math.floor(place)));
-    const [share, upper] = [place - top, top * width];
+    const at = Math.min(picture.height - 1, Math.max(0, y + (row - (rows - 1) / 2) * step));
+    const top = Math.max(0, Math.min(picture.height - 2, Math.floor(at)));
+    const [share, upper] = [at - top, top * width];
     const lower = upper + (picture.height > 1 ? width : 0);
     for (let column = 0; column < columns; column += 1) {
       const [left, across] = [lefts[column] ?? 0, shares[column] ?? 0];

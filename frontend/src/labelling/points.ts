@@ -27,7 +27,7 @@ export function templateEye(closed = 0): Shape {
   const lower: Shape = [at(OPEN_EYE, 0), ...OPEN_EYE.slice(5).reverse()].sort((a, b) => a[0] - b[0]);
   return OPEN_EYE.map(([x, y], index) => {
     if (index === 0 || index >= 5) return [x, y];
-    const next = lower.findIndex(([place]) => place > x);
+    const next = lower.findIndex(([along]) => along > x);
     const [from, to] = [at(lower, next - 1), at(lower, next)];
     const below = from[1] + ((to[1] - from[1]) * (x - from[0])) / (to[0] - from[0]);
     return [x, y + closed * (below - y)];

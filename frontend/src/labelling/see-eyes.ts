@@ -12,9 +12,9 @@ const ASIDE_SECONDS = 0.3;
 const TRIED = 3;
 /** Blinks look alike, the lids rest between them, and both eyes close together. */
 const LEAST_ALIKE = 0.55;
-const MOST_NOISE = 0.15;
+const MAX_NOISE = 0.15;
 const LEAST_SHARE = 0.5;
-const MOST_BLINKS_A_MINUTE = 50;
+const MAX_BLINKS_A_MINUTE = 40;
 /** Pictures on which the surroundings of eyes are known again, as a share. */
 const LEAST_KNOWN = 0.8;
 const KNOWN = 0.5;
@@ -53,9 +53,9 @@ function areLids({ alike, noise, shares, blinks }: LidChanges, followed: readonl
   const known = followed.filter(({ likeness }) => likeness >= KNOWN).length;
   return (
     blinks.length > 0 &&
-    blinks.length <= MOST_BLINKS_A_MINUTE * minutes &&
+    blinks.length <= MAX_BLINKS_A_MINUTE * minutes &&
     alike >= LEAST_ALIKE &&
-    noise <= MOST_NOISE &&
+    noise <= MAX_NOISE &&
     shares.every((share) => share >= LEAST_SHARE) &&
     known >= LEAST_KNOWN * followed.length
   );

@@ -37,12 +37,12 @@ export async function startShape(
 
 /** Without a labelled frame: laid on the eyes found, as closed as they are there, or at a fixed place. */
 function firstShape(number: number, { candidates, eyes: known }: Looked, eyes: 1 | 2, size: Size): Start {
-  const found = eyesFor(known, eyes);
-  if (found === null) return { number, shape: templateShape(eyes, size), from: "template" };
-  const index = candidates.reduce(
-    (best, candidate, place) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? place : best),
+  const blinking = eyesFor(known, eyes);
+  if (blinking === null) return { number, shape: templateShape(eyes, size), from: "template" };
+  const nearest = candidates.reduce(
+    (best, candidate, index) => (Math.abs(candidate - number) < Math.abs((candidates[best] ?? 0) - number) ? index : best),
     0,
   );
-  const shape = shapeOn(placesOn(found, index, known.size, size), found.closed[index] ?? 0);
+  const shape = shapeOn(placesOn(blinking, nearest, known.size, size), blinking.closed[nearest] ?? 0);
   return { number, shape: shape.map((point) => inside(point, size)), from: "eyes" };
 }

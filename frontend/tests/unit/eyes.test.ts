@@ -47,7 +47,7 @@ function recording(eyes: readonly Point[], width: number, blinks: readonly numbe
   return Array.from({ length: COUNT }, (_, index) => painted(index, eyes, width, blinks.includes(index)));
 }
 
-const found: FoundEyes = {
+const BLINKING: FoundEyes = {
   width: 20,
   centres: [
     [
@@ -62,7 +62,7 @@ const found: FoundEyes = {
   closed: [0, 1],
   blinks: [1],
 };
-const KNOWN: EyesOfVideo = { size: [200, 120], two: found, one: null, problem: null };
+const KNOWN: EyesOfVideo = { size: [200, 120], two: BLINKING, one: null, problem: null };
 
 describe("eyes of a video", () => {
   const still = (): void => undefined;
@@ -111,7 +111,7 @@ describe("eyes of a video", () => {
 describe("the first shape", () => {
   it("lies on the eyes found, turned as they are, and is one that stimuli takes, open or closed", () => {
     for (const closed of [-0.2, 0, 0.5, 1, 1.4]) {
-      const shape = shapeOn(placesOn(found, 0, [200, 120], [400, 240]), closed);
+      const shape = shapeOn(placesOn(BLINKING, 0, [200, 120], [400, 240]), closed);
       expect(() => checkShape("frame 0", shape, [400, 240])).not.toThrow();
       const [left, right] = [eyeOf(shape, 0), eyeOf(shape, 1)];
       expect(eyeWidth(left)).toBeCloseTo(40, 0);
@@ -142,7 +142,7 @@ describe("what was found", () => {
   it("is said, with where the shape lies else", () => {
     expect(noticeOf(KNOWN, 2)).toContain("Two eyes found by a blink;");
     expect(noticeOf(KNOWN, 1)).toContain("An eye found by a blink;");
-    expect(noticeOf({ ...KNOWN, two: null, one: found }, 2)).toContain("is it a close-up?");
+    expect(noticeOf({ ...KNOWN, two: null, one: BLINKING }, 2)).toContain("is it a close-up?");
     expect(noticeOf(NO_EYES, 2)).toMatch(/^No eyes found by blinks\..*middle of the picture/);
     expect(noticeOf({ ...NO_EYES, problem: "no worker" }, 1)).toContain("could not be looked for (no worker)");
     expect(eyesFor(KNOWN, 1)?.centres[0]).toEqual([[60, 50]]);
@@ -151,7 +151,7 @@ describe("what was found", () => {
     const pictures = Array.from({ length: 60 }, (_, index): Grey => {
       return { width: 4, height: 4, values: new Uint8ClampedArray(16).fill(index < 2 ? 50 : 2 * index) };
     });
-    const eyes: EyesOfVideo = { ...KNOWN, two: { ...found, blinks: [33, 7] } };
+    const eyes: EyesOfVideo = { ...KNOWN, two: { ...BLINKING, blinks: [33, 7] } };
     const candidates = pictures.map((_, index) => 3 * index);
     expect(chooseFrames({ candidates, pictures, eyes }, [], 2)).toEqual(expect.arrayContaining([0, 21, 99]));
   });
@@ -159,7 +159,7 @@ describe("what was found", () => {
 
 describe("small pictures", () => {
   it("are means of squares", () => {
-    const picture = { width: 256, height: 8, values: new Uint8ClampedArray(256 * 8).map((_, place) => ((place % 256) % 4 < 2 ? 40 : 80)) };
+    const picture = { width: 256, height: 8, values: new Uint8ClampedArray(256 * 8).map((_, pixel) => ((pixel % 256) % 4 < 2 ? 40 : 80)) };
     const small = thumbnailOf(picture);
     expect([small.width, small.height]).toEqual([64, 2]);
     expect([...new Set(small.values)]).toEqual([60]);

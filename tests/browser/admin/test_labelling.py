@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Page, expect
 
+from stimuli_builder.actor.recording import Actor, ActorOptions, truth_points, write_video
 from stimuli_builder.blinks.label_options import preset
 from stimuli_builder.blinks.run import BlinksJob, run_blinks
 from stimuli_builder.tracking.labels import load_labels
@@ -116,6 +117,46 @@ def test_points_are_labelled_undone_and_saved_as_stimuli_reads_them(
 
     open_file(page, "Open labels", tmp_path / "l.json")
     expect(page.get_by_text(f"5 of {FRAMES} frames accepted")).to_be_visible()
+    assert dashboard.complaints == []
+
+
+def test_the_first_points_lie_on_eyes_that_blink(dashboard: Dashboard, tmp_path: Path) -> None:
+    """A face that was never labelled: the shape lies on its eyes, closed in their blinks, which are chosen."""
+    actor = Actor(ActorOptions(seconds=6.5, fps=30, seed=1))
+    write_video(actor, tmp_path / "actor.mp4", lambda: None)
+    truth, closed = list(truth_points(actor.course)), actor.course.closure.mean(axis=1)
+    dashboard.complaints.clear()
+    page = dashboard.open("/labelling")
+    open_file(page, "Open video", tmp_path / "actor.mp4")
+    page.locator('circle.point[data-point="2"]').focus(timeout=60_000)
+    expect(page.get_by_text("Two eyes found by 3 blinks")).to_be_visible()
+    expect(page.get_by_text("Laid on the eyes found by their blinks")).to_be_visible()
+
+    buttons = page.get_by_role("group", name="Frames to label").get_by_role("button")
+    chosen = [int(re.findall(r"\d+", label)[0]) for label in buttons.all_inner_texts()]
+    blinks = sorted(set(actor.course.blink[closed > 0.5]))
+    assert len(blinks) == 3
+    shut = [
+        max(chosen, key=lambda frame: closed[frame] * (actor.course.blink[frame] == blink))
+        for blink in blinks
+    ]
+    assert [actor.course.blink[frame] for frame in shut] == blinks
+    assert closed[shut] == pytest.approx(1, abs=0.5)
+
+    for frame in (chosen[0], shut[-1]):
+        page.get_by_role("button", name=f"Frame {frame}", exact=True).click()
+        expect(page.get_by_text(f"Frame {frame} of 195")).to_be_visible()
+        page.locator(".stage").wait_for()
+        points = np.array([place_of(page, point) for point in range(18)])
+        for eye in (slice(0, 9), slice(9, 18)):
+            corners, true = points[eye][[0, 5]], truth[frame][eye][[0, 5]]
+            width = np.hypot(*(true[1] - true[0]))
+            assert np.hypot(*(corners.mean(axis=0) - true.mean(axis=0))) < 0.2 * width
+            assert np.hypot(*(corners[1] - corners[0])) == pytest.approx(width, rel=0.2)
+            gap = points[eye][7, 1] - points[eye][2, 1]
+            assert (gap < 0.2 * width) == (frame == shut[-1])
+        shoot(dashboard, f"labelling-eyes-{frame}")
+    assert axe_violations(page) == []
     assert dashboard.complaints == []
 
 
