@@ -1,10 +1,10 @@
 """Which blinks the labelling page chooses, and how near its first points lie: the table of docs/labelling.md.
 
-    python tests/bench/bench_label_choice.py develop|held-out [folder with the real clips]
+    PYTHONPATH=. python tests/bench/bench_label_choice.py develop|held-out [folder with the real clips]
 
-Every recording is given to the page's own modules (`frontend/scripts/label_choice.mjs`), its frames as small as
-the page makes them. A blink counts where one of the chosen frames has the lids half closed or more. Real clips are
-those of `../shared/data/face_video`; where they are missing only the actor is measured.
+Every recording is given to the page's own modules (`frontend/scripts/label_choice.mjs`), its frames as small
+as the page makes them. A blink counts where one of the chosen frames has the lids half closed or more. Real
+clips are those of `../shared/data/face_video`; where they are missing only the actor is measured.
 """
 
 import json
@@ -20,6 +20,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from tests.bench.bench_tracking import print_line
 from tests.bench.label_choice_recordings import CLOSE_UP, FACE, FPS, Recording, actor, walked
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +39,7 @@ class Set:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the page's modules say: frames chosen now and without eyes, and the eyes on each candidate frame."""
+    """What the page's modules say: frames chosen now and without eyes, and where eyes are on candidates."""
 
     chosen: list[int]
     before: list[int]
@@ -90,8 +91,8 @@ def errors(answer: Answer, recording: Recording) -> list[float]:
     return found
 
 
-def measure(kind: Set, folder: Path) -> str:
-    """One line of the table."""
+def measure(kind: Set, folder: Path) -> tuple[str, str]:
+    """One line of the table: its name and its figures."""
     blinks = now = before = seen = 0
     distances: list[float] = []
     seconds: list[float] = []
@@ -107,8 +108,9 @@ def measure(kind: Set, folder: Path) -> str:
             distances += errors(answer, recording)
     off = np.percentile(distances, [50, 95, 100]).round(2).tolist() if distances else "-"
     return (
-        f"{kind.name}: blinks {before} -> {now} of {blinks}; eyes found in {seen} of {len(kind.makers)}; "
-        f"off by (median, 95%, worst; eye widths) {off}; {max(seconds):.1f} s of processor"
+        kind.name,
+        f"blinks {before} -> {now} of {blinks}; eyes found in {seen} of {len(kind.makers)}; "
+        f"off by (median, 95%, worst; eye widths) {off}; {max(seconds):.1f} s of processor",
     )
 
 
@@ -116,7 +118,7 @@ def main(which: str, clips: Path) -> None:
     """Measure every set and print a line for each."""
     with tempfile.TemporaryDirectory() as folder:
         for kind in sets(which, clips):
-            print(measure(kind, Path(folder)), flush=True)
+            print_line(*measure(kind, Path(folder)))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Recordings with known blinks for `bench_label_choice.py`: real clips walked to and fro, and the synthetic actor."""
+"""Recordings with known blinks for `bench_label_choice.py`: real clips walked to and fro, and the actor."""
 
 import json
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ BACKGROUND_SIZE = (640, 360)
 
 @dataclass(frozen=True)
 class Clip:
-    """A real clip: its frames that are half closed or more, and how far a frame of 30 a second goes on in it."""
+    """A real clip: its frames with lids half closed or more; its frames to one of 30 a second."""
 
     name: str
     step: float
@@ -64,16 +64,14 @@ def luminance(path: Path) -> Pictures:
 
 
 def _walk(clip: Clip, count: int, rng: np.random.Generator, with_blinks: bool) -> Iterator[tuple[int, bool]]:
-    """Frame of the clip at each time, and whether a blink passes: to and fro between blinks, through one when due."""
+    """Frame of the clip at each time, and whether a blink passes: to and fro, through a blink when due."""
     spacing = SECONDS * FPS / BLINKS
     due = [spacing * (blink + rng.uniform(0.15, 0.85)) for blink in range(BLINKS)] if with_blinks else []
     last = count - 1
     place, way, crossing = float(rng.uniform(0, clip.closed[0][0] - 9)), 1.0, False
     for number in range(int(SECONDS * FPS)):
-        inside = next(
-            (span for span in clip.closed if span[0] - 6 <= place + way * clip.step <= span[1] + 10), None
-        )
-        if inside is None:
+        ahead = place + way * clip.step
+        if not any(first - 6 <= ahead <= end + 10 for first, end in clip.closed):
             crossing = False
         elif not crossing and due and number >= due[0]:
             due.pop(0)
@@ -87,7 +85,7 @@ def _walk(clip: Clip, count: int, rng: np.random.Generator, with_blinks: bool) -
 
 
 def walked(folder: Path, clip: Clip, seed: int, with_blinks: bool = True) -> Recording:
-    """A minute of a real clip that goes to and fro without a cut, with eight blinks at times drawn by `seed`."""
+    """A minute of a real clip, to and fro without a cut, with eight blinks at times drawn by `seed`."""
     frames = luminance(folder / f"{clip.name}.mp4")
     labels = json.loads((folder / f"{clip.name}.points.json").read_text())["frames"]
     known = np.array(sorted(int(number) for number in labels))
@@ -97,17 +95,14 @@ def walked(folder: Path, clip: Clip, seed: int, with_blinks: bool = True) -> Rec
     course = list(_walk(clip, len(frames), np.random.default_rng([seed, 24]), with_blinks))
     indices = np.array([index for index, _ in course])
     closed = [any(first <= index <= last for first, last in clip.closed) for index in indices]
-    canthi = np.stack(
-        [
-            [np.interp(indices, known, corners[:, point, axis]) for axis in (0, 1)]
-            for point in range(corners.shape[1])
-        ]
-    ).transpose(2, 0, 1)
+    flat = corners.reshape(len(known), -1).T
+    canthi = np.stack([np.interp(indices, known, values) for values in flat], axis=1)
     rng = np.random.default_rng([seed, 25])
-    noise = rng.normal(0, 1.0, size=(8, *frames.shape[1:]))
-    noisy = (np.clip(frames[index] + noise[rng.integers(8)], 0, 255) for index in indices)
-    pictures = np.stack([picture.astype(np.uint8) for picture in noisy])
-    return Recording(f"{clip.name}-{seed}", pictures, spans(closed), canthi)
+    noise = np.round(rng.normal(0, 1.0, size=(8, *frames.shape[1:]))).astype(np.int16)
+    pictures = np.empty((len(indices), *frames.shape[1:]), np.uint8)
+    for number, index in enumerate(indices):
+        pictures[number] = np.clip(frames[index] + noise[rng.integers(8)], 0, 255)
+    return Recording(f"{clip.name}-{seed}", pictures, spans(closed), canthi.reshape(len(indices), -1, 2))
 
 
 def spans(flags: list[bool]) -> list[tuple[int, int]]:
@@ -117,7 +112,7 @@ def spans(flags: list[bool]) -> list[tuple[int, int]]:
 
 
 def actor(seed: int, scale: float) -> Recording:
-    """The synthetic actor up to its eighth blink that half closes; below scale 1 shrunk, before an uneven wall."""
+    """The actor up to its eighth blink that half closes; below scale 1 shrunk, before an uneven wall."""
     drawn = Actor(ActorOptions(seconds=SECONDS, fps=FPS, seed=seed))
     closed = spans([bool(both.mean() >= HALF_CLOSED) for both in drawn.course.closure])[:BLINKS]
     count = min(drawn.options.frame_count, closed[-1][1] + 30)
