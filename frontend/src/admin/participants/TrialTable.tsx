@@ -4,7 +4,8 @@ import { Anchor, Badge } from "@mantine/core";
 import { Link, useParams } from "@tanstack/react-router";
 import type { Schemas } from "../api";
 import { type Column, DataTable } from "../ui/DataTable";
-import { fixed, words } from "../ui/format";
+import { fixed } from "../ui/format";
+import { ruleWords } from "../ui/play-words";
 import { VERDICT_COLOURS } from "../ui/verdicts";
 
 type Trial = Schemas["TimelineTrial"];
@@ -35,7 +36,7 @@ const COLUMNS: Column<Trial>[] = [
   {
     title: "Shown",
     cell: (trial) => (
-      <Badge color={VERDICT_COLOURS[trial.verdict] ?? "gray.7"} size="sm" title={words(trial.verdict_rule)}>
+      <Badge color={VERDICT_COLOURS[trial.verdict] ?? "gray.7"} size="sm" title={ruleWords(trial.verdict_rule)}>
         {trial.verdict}
       </Badge>
     ),

@@ -6,6 +6,7 @@ import { words } from "../ui/format";
 import { longestWords, missingWords } from "./facts";
 import type { Play, PlayedBack, Scene } from "./shown";
 import { type Mark, seconds } from "./Timeline";
+import { ruleWords } from "../ui/play-words";
 import { VERDICT_COLOURS } from "../ui/verdicts";
 
 const ANSWER_COLOUR = "#2a9d74";
@@ -29,7 +30,7 @@ export function ViewFacts({ play, played, events }: { play: Play; played: Played
         {play.verdict !== null && (
           <Badge color={VERDICT_COLOURS[play.verdict] ?? "gray.7"}>
             {play.verdict}
-            {play.verdict_rule !== "" && `: ${words(play.verdict_rule)}`}
+            {play.verdict_rule !== "" && `: ${ruleWords(play.verdict_rule)}`}
           </Badge>
         )}
         {play.verdict === null && <Badge variant="default">no verdict: never answered</Badge>}

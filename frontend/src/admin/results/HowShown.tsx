@@ -3,6 +3,7 @@
 import { Card, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
 import { words } from "../ui/format";
+import { methodWords, ruleWords } from "../ui/play-words";
 import { PlotFigure } from "../ui/PlotFigure";
 import { type AnyResults, delayPlot, timePlot } from "./plots";
 
@@ -21,21 +22,27 @@ export function HowShown({ data }: { data: AnyResults }) {
         <Title order={2} size="h5">
           How clips were shown
         </Title>
-        <Counts title="Verdicts" counts={data.playback.verdicts} />
-        <Counts title="Reasons" counts={data.playback.rules} />
-        <Counts title="Played by" counts={data.playback.methods} />
+        <Counts title="Verdicts" counts={data.playback.verdicts} said={words} />
+        <Counts title="Reasons" counts={data.playback.rules} said={ruleWords} />
+        <Counts title="Shown" counts={data.playback.methods} said={methodWords} />
         <PlotFigure options={delays} label="Histogram of the time from key to first frame" />
       </Card>
     </>
   );
 }
 
-function Counts({ title, counts }: { title: string; counts: Record<string, number> }) {
+interface CountsProps {
+  title: string;
+  counts: Record<string, number>;
+  said: (word: string) => string;
+}
+
+function Counts({ title, counts, said }: CountsProps) {
   const entries = Object.entries(counts);
   if (entries.length === 0) return null;
   return (
     <Text size="sm">
-      {title}: {entries.map(([word, count]) => `${words(word)} ${count.toLocaleString()}`).join(", ")}
+      {title} – {entries.map(([word, count]) => `${said(word)}: ${count.toLocaleString()}`).join("; ")}
     </Text>
   );
 }

@@ -1,6 +1,7 @@
 /** Nothing to show of one origin: whose runs there are instead, one press away. */
 
 import { Button, Group, Text } from "@mantine/core";
+import { counted } from "../ui/format";
 import { type DataOrigin, ORIGINS } from "./origins";
 
 interface Props {
@@ -11,11 +12,9 @@ interface Props {
 
 const OF: Record<DataOrigin, string> = { participant: "participants", pilot: "the pilot", simulated: "simulated people" };
 
-const counted = (runs: number) => `${runs.toLocaleString()} ${runs === 1 ? "run" : "runs"}`;
-
 export function NoAnswers({ origin, runs, choose }: Props) {
   const others = ORIGINS.filter(({ value }) => value !== origin && (runs[value] ?? 0) > 0);
-  const listed = others.map(({ value }) => `${counted(runs[value] ?? 0)} of ${OF[value]}`).join(" and ");
+  const listed = others.map(({ value }) => `${counted(runs[value] ?? 0, "run")} of ${OF[value]}`).join(" and ");
   return (
     <Group>
       <Text c="dimmed">

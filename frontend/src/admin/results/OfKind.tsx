@@ -3,10 +3,11 @@
 import { Alert, Card, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
 import type { Schemas } from "../api";
-import { when } from "../ui/format";
+import { counted, when } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
 import { HowShown } from "./HowShown";
+import { labelOfOrigin } from "./origins";
 import { PairResults } from "./PairResults";
 import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from "./plots";
 import { ThresholdResults } from "./ThresholdResults";
@@ -22,9 +23,10 @@ export function OfKind({ study, data, factors }: ShownProps<AnyResults>) {
   return (
     <Stack>
       <Alert>
-        Data series {data.series}, {data.origin}: {data.participants} runs, {data.ratings.toLocaleString()} answers, counted{" "}
-        {when(data.counted_at)}. {data.origin === "simulated" && "These are simulated people: nobody gave these answers. "}This is what
-        arrives, for a look at whether all is well; the analysis is the report below.
+        Data series {data.series}, {labelOfOrigin(data.origin)}: {counted(data.participants, "run")} with answers,{" "}
+        {counted(data.ratings, "answer")}, counted {when(data.counted_at)}.{" "}
+        {data.origin === "simulated" && "These are simulated people: nobody gave these answers. "}This is what arrives, for a look at
+        whether all is well; the analysis is the report below.
       </Alert>
       {data.kind === "clip_rating" && <Shown study={study} data={data} factors={factors} />}
       {data.kind === "paired_comparison" && <PairResults data={data} factors={factors} />}

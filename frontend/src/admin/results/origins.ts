@@ -8,6 +8,10 @@ export const ORIGINS: { value: DataOrigin; label: string }[] = [
   { value: "simulated", label: "Simulated" },
 ];
 
+export function labelOfOrigin(word: string): string {
+  return ORIGINS.find((origin) => origin.value === word)?.label ?? word;
+}
+
 export function originOf(word: string): DataOrigin {
   return ORIGINS.find((origin) => origin.value === word)?.value ?? "participant";
 }

@@ -26,6 +26,11 @@ export function fixed(value: number | null | undefined, digits = 2): string {
   return value === null || value === undefined ? "–" : value.toFixed(digits);
 }
 
+/** "1 run", "2 runs". */
+export function counted(number: number, thing: string): string {
+  return `${number.toLocaleString()} ${number === 1 ? thing : `${thing}s`}`;
+}
+
 /** A key of the data as words: "forms_before" is "forms before". */
 export function words(key: string): string {
   return key.replaceAll("_", " ");
