@@ -331,6 +331,14 @@ class UploadProgress(BaseModel):
     files: int
     waiting: int
     refused: int
+    left_out: int = Field(description="Files that are set aside; they are none of `files`.")
+
+
+class LeaveOut(_In):
+    """Whether one file of an upload is left out of what is made of it."""
+
+    file: str = Field(max_length=300)
+    left_out: bool
 
 
 class AskFrameRate(_In):
@@ -347,6 +355,7 @@ class UploadOut(BaseModel):
     waiting: int = Field(description="Files that are still looked into, or converted.")
     fps: float | None = Field(description="Frames per second asked for; null: each clip its own.")
     has_manifest: bool
+    left_out: list[str] = Field(description="Names of the files that are set aside; they can be put back.")
     tables: list[str] = Field(description="Names of CSV files in the upload.")
     suggested_pattern: str | None
 

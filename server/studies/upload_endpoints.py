@@ -13,8 +13,8 @@ from experiments.source_video import FrameRate
 from server.accounts.identity import Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Invalid
-from server.studies import originals, uploads
-from server.studies.schemas import AskFrameRate, UploadOut, UploadProgress
+from server.studies import left_out, originals, uploads
+from server.studies.schemas import AskFrameRate, LeaveOut, UploadOut, UploadProgress
 from server.transcoding.records import ask_rate
 from server.workspaces.access import Uploader
 
@@ -90,6 +90,14 @@ def ask_frame_rate(
     """Ask for one frame rate of all clips, or for each its own; they are looked into again."""
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     ask_rate(folder, body.fps)
+    return _progress(services, upload, identity.account_id)
+
+
+@router.put("/uploads/{upload}/left-out")
+def leave_file_out(services: ServicesDep, identity: Uploader, upload: str, body: LeaveOut) -> UploadProgress:
+    """Leave one file of an upload out, or put it back; its bytes stay as long as the upload does."""
+    folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
+    (left_out.leave_out if body.left_out else left_out.put_back)(folder, body.file)
     return _progress(services, upload, identity.account_id)
 
 

@@ -9,6 +9,7 @@ from typing import IO
 from experiments.manifest import MANIFEST_NAME
 from experiments.own_clips import check_names, one_form, suggest_pattern
 from server.errors import Invalid, NotFound
+from server.studies.left_out import files_aside
 from server.studies.packed import MAX_FILES, unpack
 from server.studies.schemas import UploadedFile, UploadOut, UploadProgress
 from server.studies.uploaded_file import UploadTooLarge, copy, safe_name
@@ -87,6 +88,7 @@ def check_room(folder: Path) -> None:
     """UploadTooLarge where an upload holds as much as one may."""
     # Files that begin with a dot are the worker's, and may go at any moment.
     kept = [path for path in folder.iterdir() if not path.name.startswith(".")]
+    kept += files_aside(folder)
     if len(kept) > MAX_FILES or sum(path.stat().st_size for path in kept) > MAX_KEPT_BYTES:
         raise UploadTooLarge(
             f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB; add the others "
@@ -165,6 +167,7 @@ def describe(identifier: str, folder: Path) -> UploadOut:
         waiting=sum(file.state == "waiting" for file in files),
         fps=asked_rate(folder),
         has_manifest=has_manifest,
+        left_out=[path.name for path in files_aside(folder)],
         tables=[path.name for path in paths if path.suffix.lower() == ".csv"],
         suggested_pattern=suggest_pattern([path.name for path in clips]),
     )
@@ -191,5 +194,8 @@ def progress(folder: Path) -> UploadProgress:
     known = [records[path.name] for path in clips if path.name in records]
     waiting = 0 if (folder / MANIFEST_NAME).exists() else len(clips) - len(known)
     return UploadProgress(
-        files=len(clips), waiting=waiting, refused=sum(record.problem is not None for record in known)
+        files=len(clips),
+        waiting=waiting,
+        refused=sum(record.problem is not None for record in known),
+        left_out=len(files_aside(folder)),
     )

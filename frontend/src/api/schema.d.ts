@@ -1462,6 +1462,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/admin/uploads/{upload}/left-out": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Leave File Out
+         * @description Leave one file of an upload out, or put it back; its bytes stay as long as the upload does.
+         */
+        put: operations["leave_file_out"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/admin/studies/{study}/originals/{sha256}": {
         parameters: {
             query?: never;
@@ -4834,6 +4854,16 @@ export interface components {
         LanguageChange: {
             /** Language */
             language: string;
+        };
+        /**
+         * LeaveOut
+         * @description Whether one file of an upload is left out of what is made of it.
+         */
+        LeaveOut: {
+            /** File */
+            file: string;
+            /** Left Out */
+            left_out: boolean;
         };
         /**
          * Level
@@ -9443,6 +9473,11 @@ export interface components {
             /** Has Manifest */
             has_manifest: boolean;
             /**
+             * Left Out
+             * @description Names of the files that are set aside; they can be put back.
+             */
+            left_out: string[];
+            /**
              * Tables
              * @description Names of CSV files in the upload.
              */
@@ -9461,6 +9496,11 @@ export interface components {
             waiting: number;
             /** Refused */
             refused: number;
+            /**
+             * Left Out
+             * @description Files that are set aside; they are none of `files`.
+             */
+            left_out: number;
         };
         /**
          * UploadedFile
@@ -10026,6 +10066,7 @@ export type InvitationState = components['schemas']['InvitationState'];
 export type JudgedEdit = components['schemas']['JudgedEdit'];
 export type KeyDifference = components['schemas']['KeyDifference'];
 export type LanguageChange = components['schemas']['LanguageChange'];
+export type LeaveOut = components['schemas']['LeaveOut'];
 export type Level = components['schemas']['Level'];
 export type LevelChoices = components['schemas']['LevelChoices'];
 export type LevelOut = components['schemas']['LevelOut'];
@@ -13610,6 +13651,50 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["AskFrameRate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UploadProgress"];
+                };
+            };
+            /** @description The request's content is not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+            /** @description Refused */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorBody"];
+                };
+            };
+        };
+    };
+    leave_file_out: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                upload: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LeaveOut"];
             };
         };
         responses: {

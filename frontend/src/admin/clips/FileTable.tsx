@@ -1,21 +1,65 @@
 /** Every file of an upload and what became of it; of thousands only those in sight are drawn. */
 
-import { Badge, Text } from "@mantine/core";
+import { Alert, Badge, Button, Group, Stack, Text } from "@mantine/core";
 import { useVirtualizer } from "@tanstack/react-virtual";
-import { useRef } from "react";
+import { type RefObject, useRef } from "react";
 import type { Schemas } from "../api";
 import { changesOf } from "./changes";
+import type { Upload } from "./useUpload";
 
 const ROW_PX = 56;
 const MAX_ROWS = 6;
 
 interface Props {
   files: Schemas["UploadedFile"][];
-  onReplace: (name: string, file: File) => void;
+  /** Names of those that are set aside. */
+  leftOut: string[];
+  upload: Upload;
 }
 
-export function FileTable({ files, onReplace }: Props) {
+export function FileTable({ files, leftOut, upload }: Props) {
   const frame = useRef<HTMLDivElement>(null);
+  // The button that was pressed goes; who works by keyboard stays at the list.
+  const leaveOut = (name: string, isLeft: boolean) => {
+    upload.leaveOut(name, isLeft);
+    frame.current?.focus();
+  };
+  return (
+    <Stack gap="xs">
+      {upload.notLeftOut !== null && (
+        <Alert color="red" variant="light" title="That did not work" role="alert">
+          {upload.notLeftOut.message}
+        </Alert>
+      )}
+      <div role="status" aria-label="Left out">
+        {leftOut.map((name) => (
+          <Group key={name} gap="xs" wrap="nowrap">
+            <Text size="sm" className="wrap-anywhere">
+              {name} is left out.
+            </Text>
+            <Button
+              size="compact-sm"
+              variant="default"
+              style={{ flexShrink: 0 }}
+              aria-label={`Put back ${name}`}
+              onClick={() => leaveOut(name, false)}
+            >
+              Put back
+            </Button>
+          </Group>
+        ))}
+      </div>
+      {files.length > 0 && <Rows files={files} frame={frame} onReplace={upload.replace} onLeaveOut={(name) => leaveOut(name, true)} />}
+    </Stack>
+  );
+}
+
+interface RowProps {
+  onReplace: (name: string, file: File) => void;
+  onLeaveOut: (name: string) => void;
+}
+
+function Rows({ files, frame, ...does }: RowProps & { files: Props["files"]; frame: RefObject<HTMLDivElement | null> }) {
   // eslint-disable-next-line react-hooks/incompatible-library -- what it returns is used here alone
   const rows = useVirtualizer({
     count: files.length,
@@ -45,7 +89,7 @@ export function FileTable({ files, onReplace }: Props) {
               aria-posinset={index + 1}
               style={{ transform: `translateY(${String(start)}px)` }}
             >
-              <OneFile file={file} onReplace={onReplace} />
+              <OneFile file={file} {...does} />
             </li>
           );
         })}
@@ -54,37 +98,48 @@ export function FileTable({ files, onReplace }: Props) {
   );
 }
 
-function OneFile({ file, onReplace }: { file: Schemas["UploadedFile"]; onReplace: Props["onReplace"] }) {
+function OneFile({ file, onReplace, onLeaveOut }: RowProps & { file: Schemas["UploadedFile"] }) {
   const { state, source } = file;
   const [colour, word] = state === "refused" ? ["red", "refused"] : source != null ? ["blue", "converted"] : ["gray", "as it came"];
   return (
-    <>
-      <Text size="sm" className="wrap-anywhere">
-        <Badge variant="default" color={colour} size="sm" mr="xs">
-          {word}
-        </Badge>
-        {file.name}
-        {state === "refused" && (
-          <label>
-            {" "}
-            Replace by:{" "}
-            <input
-              type="file"
-              accept="video/*,.mkv,.mxf,.y4m"
-              aria-label={`Replace ${file.name} by`}
-              onChange={({ target }) => {
-                if (target.files?.[0]) onReplace(file.name, target.files[0]);
-                // The same file, corrected, is a change again.
-                target.value = "";
-              }}
-            />
-          </label>
-        )}
-      </Text>
-      <Text size="xs" c={state === "refused" ? "var(--mantine-color-error)" : "dimmed"} className="wrap-anywhere">
-        {file.problem ?? `${sizeOf(file)}${source == null ? "" : `; ${changesOf(source)}`}`}
-      </Text>
-    </>
+    <Group justify="space-between" align="start" wrap="nowrap" gap="xs">
+      <div>
+        <Text size="sm" className="wrap-anywhere">
+          <Badge variant="default" color={colour} size="sm" mr="xs">
+            {word}
+          </Badge>
+          {file.name}
+          {state === "refused" && (
+            <label>
+              {" "}
+              Replace by:{" "}
+              <input
+                type="file"
+                accept="video/*,.mkv,.mxf,.y4m"
+                aria-label={`Replace ${file.name} by`}
+                onChange={({ target }) => {
+                  if (target.files?.[0]) onReplace(file.name, target.files[0]);
+                  // The same file, corrected, is a change again.
+                  target.value = "";
+                }}
+              />
+            </label>
+          )}
+        </Text>
+        <Text size="xs" c={state === "refused" ? "var(--mantine-color-error)" : "dimmed"} className="wrap-anywhere">
+          {file.problem ?? `${sizeOf(file)}${source == null ? "" : `; ${changesOf(source)}`}`}
+        </Text>
+      </div>
+      <Button
+        size="compact-sm"
+        variant="default"
+        style={{ flexShrink: 0 }}
+        aria-label={`Leave out ${file.name}`}
+        onClick={() => onLeaveOut(file.name)}
+      >
+        Leave out
+      </Button>
+    </Group>
   );
 }
 

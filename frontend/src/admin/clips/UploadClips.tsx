@@ -116,7 +116,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
     <Stack gap="xs">
       <Group justify="space-between">
         <Text>
-          {count(files.length)} clips received
+          {count(files.length)} {files.length === 1 ? "clip" : "clips"} received
           {!received.has_manifest && `: ${summary(files.length - refused - changed, changed, refused)}`}.
         </Text>
         <Button size="compact-sm" variant="default" onClick={upload.forget}>
@@ -150,7 +150,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
         </Alert>
       )}
       {size !== null && <Alert color="yellow">{size}</Alert>}
-      {!received.has_manifest && files.length > 0 && <FileTable files={inOrder(files)} onReplace={upload.replace} />}
+      {!received.has_manifest && <FileTable files={inOrder(files)} leftOut={received.left_out} upload={upload} />}
     </Stack>
   );
 }

@@ -17,6 +17,8 @@ export interface Upload {
   progress: Schemas["UploadProgress"] | null;
   /** What became of each file, once none waits. */
   received: Schemas["UploadOut"] | null;
+  /** The same as it was last, while files are sent or looked into: what stands beside it need not go. */
+  last: Schemas["UploadOut"] | null;
   fps: number | null;
   askFps: (fps: number | null) => void;
   send: (files: readonly File[]) => void;
@@ -25,6 +27,9 @@ export interface Upload {
   /** Why the last file was not taken. */
   notReplaced: Error | null;
   isReplacing: boolean;
+  /** Leave a file out of what is made of the upload, or put it back. */
+  leaveOut: (name: string, leftOut: boolean) => void;
+  notLeftOut: Error | null;
   /** Begin anew; what was sent is deleted by the server within a day. */
   forget: () => void;
 }
@@ -42,11 +47,12 @@ export function useUpload(purpose: string): Upload {
     enabled: id !== null,
     refetchInterval: ({ state }) => ((state.data?.waiting ?? 1) > 0 && state.error === null ? LOOK_EVERY_MS : false),
   });
-  const settled = sending === null && progress.data?.waiting === 0 && progress.data.files > 0;
+  const settled = sending === null && progress.data?.waiting === 0 && progress.data.files + progress.data.left_out > 0;
   const received = useQuery({
-    queryKey: ["upload", id, "files", progress.data?.files, fps],
+    queryKey: ["upload", id, "files", progress.data?.files, progress.data?.left_out, fps],
     queryFn: () => unwrap(api.GET("/api/admin/uploads/{upload}", path)),
     enabled: id !== null && settled,
+    placeholderData: (before, of) => (of?.queryKey[1] === id ? before : undefined),
   });
   const forget = () => {
     localStorage.removeItem(keyOf(purpose));
@@ -54,6 +60,7 @@ export function useUpload(purpose: string): Upload {
     setSending(null);
     send.reset();
     replaced.reset();
+    left.reset();
   };
   const send = useMutation<undefined, Error, readonly File[]>({
     mutationFn: async (files) => {
@@ -76,6 +83,13 @@ export function useUpload(purpose: string): Upload {
       await queries.invalidateQueries({ queryKey: ["upload", id, "progress"] });
     },
   });
+  const left = useMutation<Schemas["UploadProgress"], Error, { file: string; left_out: boolean }>({
+    mutationFn: (body) => unwrap(api.PUT("/api/admin/uploads/{upload}/left-out", { ...path, body })),
+    onSuccess: async (told) => {
+      queries.setQueryData(["upload", id, "progress"], told);
+      await queries.invalidateQueries({ queryKey: ["upload", id, "files"] });
+    },
+  });
   const ask = useMutation<Schemas["UploadProgress"], Error, number | null>({
     mutationFn: (asked) => unwrap(api.PUT("/api/admin/uploads/{upload}/frame-rate", { ...path, body: { fps: asked } })),
     onSuccess: () => queries.invalidateQueries({ queryKey: ["upload"] }),
@@ -88,6 +102,7 @@ export function useUpload(purpose: string): Upload {
     goOn: () => send.variables !== undefined && send.mutate(send.variables),
     progress: id === null || gone ? null : (progress.data ?? null),
     received: settled && !gone ? (received.data ?? null) : null,
+    last: id === null || gone ? null : (received.data ?? null),
     fps: received.data?.fps ?? fps,
     askFps: (asked) => {
       setFps(asked);
@@ -100,6 +115,8 @@ export function useUpload(purpose: string): Upload {
     replace: (name, file) => replaced.mutate({ name, file }),
     notReplaced: replaced.error,
     isReplacing: replaced.isPending,
+    leaveOut: (file, left_out) => left.mutate({ file, left_out }),
+    notLeftOut: left.error,
     forget,
   };
 }

@@ -44,7 +44,7 @@ export function AddClips({ study }: { study: string }) {
           {kept !== null && " The unsaved work of the builder will be saved with them."}
         </Text>
         <UploadClips upload={sent} />
-        {upload !== null && (
+        {upload !== null && upload.files.length > 0 && (
           <Group align="end">
             {!upload.has_manifest && (
               <TextInput

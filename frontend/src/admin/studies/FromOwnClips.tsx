@@ -14,12 +14,12 @@ const MAX_ROWS = 100;
 
 export function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const upload = useUpload("new study");
-  const { received } = upload;
+  const { last, received } = upload;
   return (
     <Stack>
       <UploadClips upload={upload} />
-      {received !== null && received.files.length > 0 && (
-        <Levels key={received.id} name={name} upload={received} onTaken={onTaken} onCreated={upload.forget} />
+      {last !== null && (
+        <Levels key={last.id} name={name} upload={last} isLooked={received !== null} onTaken={onTaken} onCreated={upload.forget} />
       )}
     </Stack>
   );
@@ -30,20 +30,28 @@ const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.
 interface LevelsProps {
   name: string;
   upload: Schemas["UploadOut"];
+  /** Whether every file has been looked into. */
+  isLooked: boolean;
   onTaken: (message: string) => void;
   onCreated: () => void;
 }
 
-function Levels({ name, upload, onTaken, onCreated }: LevelsProps) {
+function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
   const [by, setBy] = useState("pattern");
-  const [pattern, setPattern] = useState(upload.suggested_pattern ?? "");
-  const [csv, setCsv] = useState(`file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`);
+  // As the files suggest it, also after one was left out or came, until it is written.
+  const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
+  const pattern = written.pattern ?? upload.suggested_pattern ?? "";
+  const csv = written.csv ?? `file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`;
   const [template, setTemplate] = useState(TEMPLATES[0]);
   const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
   const [names, setNames] = useState<Record<string, string>>({});
   const files = upload.files.map((file) => file.name);
   const create = useCreate(onTaken, onCreated);
-  const needed = [name === "" && "a short name (above)", asked.title.trim() === "" && "a title of the study"];
+  const needed = [
+    (!isLooked || files.length === 0) && "clips that have been looked into",
+    name === "" && "a short name (above)",
+    asked.title.trim() === "" && "a title of the study",
+  ];
   const field = (key: keyof typeof asked, label: string) => (
     <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
   );
@@ -65,7 +73,7 @@ function Levels({ name, upload, onTaken, onCreated }: LevelsProps) {
             description="Names of factors in braces; {exemplar} numbers the clips of a cell."
             placeholder="{character}_{speed}_{exemplar}.mp4"
             value={pattern}
-            onChange={(event) => setPattern(event.currentTarget.value)}
+            onChange={(event) => setWritten({ ...written, pattern: event.currentTarget.value })}
           />
           {unnamedFactors(pattern, files).map(({ field, levels }) => (
             <TextInput
@@ -88,7 +96,7 @@ function Levels({ name, upload, onTaken, onCreated }: LevelsProps) {
           minRows={6}
           maxRows={16}
           value={csv}
-          onChange={(event) => setCsv(event.currentTarget.value)}
+          onChange={(event) => setWritten({ ...written, csv: event.currentTarget.value })}
         />
       )}
       <Select
