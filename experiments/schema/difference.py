@@ -119,6 +119,18 @@ def _join(path: str, key: str) -> str:
     return f"{path}.{key}" if path else key
 
 
+_TITLES = ("title", "label", "question", "text", "name")
+"""Keys by whose value a person knows a table, the most telling first."""
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, dict):
+        known = next((value[key] for key in _TITLES if value.get(key)), None)
+        texts = value.values() if known is None else (known,)
+        return " / ".join(_in_words(text) for text in texts)
+    return ", ".join(map(_in_words, value)) if isinstance(value, list) else str(value)
+
+
 def _short(value: Any) -> str:
-    text = str(value)
+    text = _in_words(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -79,10 +79,17 @@ def test_a_level_added_changes_what_is_measured_and_its_label_does_not() -> None
     assert [(change.path, change.effect, change.before) for change in more] == [
         ("factors.lower_lid.levels.more", "measured", None)
     ]
-    assert str(more[0]).startswith("factors.lower_lid.levels.more is new: ")
-    assert str(difference(parse_experiment(text.replace("[exemplars]", extra)), old)[0]).startswith(
-        "factors.lower_lid.levels.more is gone: "
-    )
+    assert str(more[0]) == "factors.lower_lid.levels.more is new: More"
+    gone = difference(parse_experiment(text.replace("[exemplars]", extra)), old)
+    assert str(gone[0]) == "factors.lower_lid.levels.more is gone: More"
+
+
+def test_a_form_that_is_new_is_named_by_its_title_and_not_by_its_code() -> None:
+    text = locate("exp3").read_text(encoding="utf-8")
+    form = '\n[[forms]]\nname = "tired"\ntitle = { en = "How you feel", de = "Wie es dir geht" }\n'
+    form += '[[forms.fields]]\ntype = "text"\nname = "how"\nlabel = { en = "How?", de = "Wie?" }\n'
+    new = difference(load_experiment("exp3"), parse_experiment(text + form))
+    assert [str(change) for change in new] == ["forms.tired is new: How you feel / Wie es dir geht"]
 
 
 def test_a_text_in_a_language_that_nobody_has_read_may_join() -> None:
