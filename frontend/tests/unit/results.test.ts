@@ -1,6 +1,8 @@
 import { describe, expect, it } from "vitest";
-import { cellLabels } from "../../src/admin/results/plots";
+import { originLabel } from "../../src/admin/results/origins";
+import { cellLabels, cellPlot } from "../../src/admin/results/plots";
 import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
+import { counted } from "../../src/admin/ui/format";
 
 const factor = (name: string, ...levels: [string, string][]) => ({
   name,
@@ -23,6 +25,24 @@ describe("labels of cells", () => {
   it("are the cell itself where there is one cell, or no such factor is known", () => {
     expect([...cellLabels(["b/20"], FACTORS).values()]).toEqual(["b/20"]);
     expect([...cellLabels(["b/20"], []).values()]).toEqual(["b/20"]);
+  });
+});
+
+describe("the answers in each cell", () => {
+  const of = (bins: number[]) =>
+    cellPlot({ bins, cells: [{ cell: "a", ratings: 1, counts: bins.map(() => 0) }] } as unknown as Parameters<typeof cellPlot>[0], []);
+
+  it("name every point of a scale, and of a slider's many bins as many as fit a narrow screen", () => {
+    expect(of([1, 2, 3, 4, 5, 6, 7]).x).toEqual({ label: "answer", ticks: [1, 2, 3, 4, 5, 6, 7] });
+    const bins = Array.from({ length: 20 }, (_, bin) => 5 * bin);
+    expect(of(bins).x).toEqual({ label: "answer, from the number on, 5 wide", ticks: [0, 10, 20, 30, 40, 50, 60, 70, 80, 90] });
+  });
+});
+
+describe("counts", () => {
+  it("have their plural", () => {
+    expect([0, 1, 1200].map((number) => counted(number, "run"))).toEqual(["0 runs", "1 run", "1,200 runs"]);
+    expect(originLabel("participant")).toBe("Participants");
   });
 });
 

@@ -23,7 +23,7 @@ export function OfKind({ study, data, factors }: ShownProps<AnyResults>) {
   return (
     <Stack>
       <Alert>
-        Data series {data.series}, {labelOfOrigin(data.origin)}: {counted(data.participants, "run")} with answers,{" "}
+        Data series {data.series}, {labelOfOrigin(data.origin).toLowerCase()}: {counted(data.participants, "run")} with answers,{" "}
         {counted(data.ratings, "answer")}, counted {when(data.counted_at)}.{" "}
         {data.origin === "simulated" && "These are simulated people: nobody gave these answers. "}This is what arrives, for a look at
         whether all is well; the analysis is the report below.

@@ -79,6 +79,11 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
 
 const SHARE_COLOUR = "#3c8697";
 
+/** Bins that can all be named below a narrow figure, as the points of a scale are. */
+const MAX_TICKS = 11;
+
+const shareOf = ({ share }: { share: number }) => (share >= 0.005 ? `${Math.round(100 * share)}%` : "");
+
 /** One row a cell, one column an answer: the share of answers as depth of colour, and as a number. */
 export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotOptions {
   const labels = cellLabels(
@@ -94,11 +99,13 @@ export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotO
     })),
   );
   const deepest = Math.max(0.01, ...rows.map((row) => row.share));
+  const every = Math.ceil(bins.length / MAX_TICKS);
+  const step = (bins[1] ?? 1) - (bins[0] ?? 0);
   return {
     height: Math.max(140, 34 * cells.length + 50),
     marginLeft: leftOf(names),
     marginBottom: 36,
-    x: { label: "answer" },
+    x: { label: every === 1 ? "answer" : `answer, from the number on, ${step} wide`, ticks: bins.filter((_, bin) => bin % every === 0) },
     y: { label: null, domain: names },
     marks: [
       labelAxis((name) => name),
@@ -108,14 +115,10 @@ export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotO
         fill: SHARE_COLOUR,
         fillOpacity: (row: { share: number }) => (0.75 * row.share) / deepest,
         inset: 0.5,
+        ...(every === 1 ? {} : { title: shareOf }),
       }),
-      Plot.text(rows, {
-        x: "response",
-        y: "cell",
-        text: (row: { share: number }) => (row.share >= 0.005 ? `${Math.round(100 * row.share)}%` : ""),
-        fill: "currentColor",
-        fontSize: 11,
-      }),
+      // Columns of many bins are narrower than a share's words, which stand in their titles.
+      Plot.text(every === 1 ? rows : [], { x: "response", y: "cell", text: shareOf, fill: "currentColor", fontSize: 11 }),
     ],
   };
 }
