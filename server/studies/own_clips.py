@@ -55,6 +55,7 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
 _START = "Press **Space** or **Enter** to start"
 _WATCHING = {
     "rating": f"{_START} a clip. You see it **once**. Then answer: ",
+    "slider": f"{_START} a clip. You see it **once**. Then move the slider, by mouse or arrow keys: ",
     "sliders": f"{_START} a clip. You see it **once**. Then move the sliders. The first asks: ",
     "acr": f"{_START} a clip. You see it **once**. Then choose from *Bad* to *Excellent*: ",
     "dcr": f"{_START}. You see the reference and then, after a pause, a second clip, **once** each. Then "

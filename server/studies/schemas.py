@@ -120,7 +120,7 @@ class LevelsPattern(_In):
     pattern: Annotated[str, StringConstraints(min_length=3, max_length=300)]
 
 
-Template = Literal["rating", "sliders", "acr", "dcr", "pairs", "just_noticeable"]
+Template = Literal["rating", "slider", "sliders", "acr", "dcr", "pairs", "just_noticeable"]
 
 
 class OwnClips(_In):

@@ -29,6 +29,8 @@ def trial_of(asked: OwnClips, levels: Levels) -> dict[str, Any]:
     match asked.template:
         case "rating":
             return {"kind": "clip_rating", "scale": _points(asked)}
+        case "slider":
+            return {"kind": "clip_rating", "scale": _slider(asked)}
         case "sliders":
             return {"kind": "clip_rating", "arrangement": "one_screen", "scales": _sliders(asked)}
         case "acr":
@@ -52,10 +54,14 @@ def _scale_name(question: str) -> str:
     return word if word and word not in _NOT_ASKED_FOR else SCALE_NAME
 
 
+def _slider(asked: OwnClips) -> dict[str, Any]:
+    return {"name": _scale_name(asked.question), "type": "slider", **_points(asked)}
+
+
 def _sliders(asked: OwnClips) -> list[dict[str, Any]]:
     pleasant = {"question": {"en": "How pleasant was this clip?"}}
     return [
-        {"name": _scale_name(asked.question), "type": "slider", **_points(asked)},
+        _slider(asked),
         {
             "name": "pleasant", "type": "slider", **pleasant,
             "low": {"en": "very unpleasant"}, "high": {"en": "very pleasant"},

@@ -5956,7 +5956,7 @@ export interface components {
              * @default rating
              * @enum {string}
              */
-            template?: "rating" | "sliders" | "acr" | "dcr" | "pairs" | "just_noticeable";
+            template?: "rating" | "slider" | "sliders" | "acr" | "dcr" | "pairs" | "just_noticeable";
             /** Title */
             title: string;
             /**

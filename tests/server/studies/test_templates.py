@@ -29,7 +29,15 @@ def own_study(experimenter: Admin, template: str, files: list[str]) -> Any:
 
 @pytest.mark.parametrize(
     ("template", "trials"),
-    [("rating", 10), ("sliders", 10), ("acr", 10), ("dcr", 10), ("pairs", 20), ("just_noticeable", 40)],
+    [
+        ("rating", 10),
+        ("slider", 10),
+        ("sliders", 10),
+        ("acr", 10),
+        ("dcr", 10),
+        ("pairs", 20),
+        ("just_noticeable", 40),
+    ],
 )
 def test_a_template_is_a_study_that_can_be_taken_part_in(
     client: TestClient, experimenter: Admin, template: str, trials: int
@@ -88,3 +96,5 @@ def test_a_just_noticeable_difference_needs_numbers(experimenter: Admin, words: 
 def test_a_slider_is_named_by_its_question(question: str, name: str) -> None:
     trial = trial_of(OwnClips(template="sliders", title="Own", question=question), {})
     assert [scale["name"] for scale in trial["scales"]] == [name, "pleasant"]
+    alone = trial_of(OwnClips(template="slider", title="Own", question=question), {})
+    assert alone["scale"] == trial["scales"][0]

@@ -22,6 +22,13 @@ export const TEMPLATES: readonly [Words, ...Words[]] = [
     ends: true,
   },
   {
+    value: "slider",
+    label: "Rating on a slider",
+    about: "One clip after the other, each rated on a slider from 0 to 100.",
+    question: "How natural was this clip?",
+    ends: true,
+  },
+  {
     value: "sliders",
     label: "Several sliders",
     about: "One clip after the other, with two sliders from 0 to 100 to begin with.",
