@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { originLabel } from "../../src/admin/results/origins";
+import { labelOfOrigin } from "../../src/admin/results/origins";
 import { cellLabels, cellPlot } from "../../src/admin/results/plots";
 import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
 import { counted } from "../../src/admin/ui/format";
@@ -42,7 +42,7 @@ describe("the answers in each cell", () => {
 describe("counts", () => {
   it("have their plural", () => {
     expect([0, 1, 1200].map((number) => counted(number, "run"))).toEqual(["0 runs", "1 run", "1,200 runs"]);
-    expect(originLabel("participant")).toBe("Participants");
+    expect(labelOfOrigin("participant")).toBe("Participants");
   });
 });
 
