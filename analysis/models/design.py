@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from analysis.models.columns import Grouping, covariate_columns, groupings, ratings, refuse_unknown_columns
 from analysis.models.terms import Term, intercept_term
-from analysis.within.cell_means import natural_order
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
+from analysis.within.level_codes import natural_order
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ import math
 from analysis.plans.result import Analysis
 from analysis.report.numbers import fixed
 from analysis.report.sentences import effect_p, statistics_in_brief
-from analysis.within.effect_tests import Effect
+from analysis.within.effects import Effect
 from analysis.within.simple_effects import SIGNIFICANCE
 
 MAX_LEVELS = 4

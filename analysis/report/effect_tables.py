@@ -13,7 +13,7 @@ from analysis.report.numbers import (
     sum_text,
 )
 from analysis.report.table_cells import title_of
-from analysis.within.effect_tests import Effect
+from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 
 

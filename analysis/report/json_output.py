@@ -4,8 +4,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from analysis.plans.result import Analysis
-from analysis.within.effect_tests import Effect, MultivariateTest
+from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
+from analysis.within.multivariate_tests import MultivariateTest
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
@@ -95,7 +96,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
         "effect": effect.effect,
         "between": list(effect.between),
         "within": list(effect.within),
-        "univariate": asdict(effect.univariate),
+        "univariate": effect.univariate._asdict(),
         "univariate_reason": effect.univariate_reason,
         "multivariate": None if effect.multivariate is None else _multivariate(effect.multivariate),
         "multivariate_reason": effect.multivariate_reason,

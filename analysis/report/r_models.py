@@ -88,7 +88,7 @@ def _ratings(
     names: dict[str, str],
 ) -> str:
     """Trials with codes for people, items and levels, so that no name stands in code."""
-    from analysis.within.cell_means import natural_order
+    from analysis.within.level_codes import natural_order
 
     rows: pd.DataFrame = arguments["rows"]
     items = rows.groupby(list(arguments["item"]), sort=False, observed=True, dropna=False).ngroup()

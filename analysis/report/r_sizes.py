@@ -7,7 +7,7 @@ from typing import Any
 from analysis.plans.result import Analysis
 from analysis.report.r_text import as_csv, r_number
 from analysis.within.bayes_factor import bayes_factor
-from analysis.within.effect_tests import Effect
+from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.pairwise import Pair
 

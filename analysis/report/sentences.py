@@ -7,8 +7,10 @@ from analysis.report.effect_tables import has_sphericity
 from analysis.report.numbers import apa_p, fixed, share, share_interval
 from analysis.report.table_cells import corrected_df
 from analysis.report.tables import uses_multivariate
-from analysis.within.effect_tests import Effect, MultivariateTest, UnivariateTest
+from analysis.within.effects import Effect
+from analysis.within.multivariate_tests import MultivariateTest
 from analysis.within.simple_effects import SIGNIFICANCE
+from analysis.within.univariate import UnivariateTest
 
 
 def sentences(analysis: Analysis) -> tuple[str, ...]:

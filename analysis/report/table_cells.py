@@ -3,7 +3,8 @@
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
 from analysis.report.numbers import fixed, p_value
-from analysis.within.effect_tests import Effect, UnivariateTest
+from analysis.within.effects import Effect
+from analysis.within.univariate import UnivariateTest
 
 
 def title_of(analysis: Analysis, what: str) -> str:

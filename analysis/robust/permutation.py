@@ -8,8 +8,9 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.within.anova import AnovaResult, contrast_strata
-from analysis.within.between import reduced_columns, term_directions
+from analysis.within.anova import AnovaResult
+from analysis.within.contrasts import contrast_scores
+from analysis.within.directions import reduced_columns, term_directions
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -74,15 +75,15 @@ def permutation_tests(
     Sources: Freedman & Lane (1983), doi:10.1080/07350015.1983.10509354; Winkler et al. (2014),
     doi:10.1016/j.neuroimage.2014.01.060, for the flips.
     """
-    strata = contrast_strata(result.y)
+    scores, columns = contrast_scores(result.y)
     design = result.between
-    basis = np.linalg.qr(design.matrix)[0]
+    basis = design.basis
     directions = dict(zip(design.terms, term_directions(design, result.sum_of_squares), strict=True))
     tests = []
     for effect in result.effects:
         members = tuple(result.factors.index(name) for name in effect.within)
         others = design.matrix[:, reduced_columns(design, effect.between, result.sum_of_squares)]
-        z = strata[members]
+        z = scores[:, columns[members]]
         residual = z - others @ np.linalg.lstsq(others, z, rcond=None)[0] if others.size else z
         flips = not effect.between
         f_value = effect.univariate.f_value

@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.within.between import BetweenDesign, no_groups, term_directions
-from analysis.within.contrasts import effect_members, effect_scores, rotate
-from analysis.within.effect_tests import Effect, Scores, effects_of, error_scores, hypothesis_scores
+from analysis.within.between import BetweenDesign, no_groups
+from analysis.within.contrasts import contrast_scores
+from analysis.within.directions import term_directions
+from analysis.within.effects import Effect, effects_of
+from analysis.within.strata import Hypothesis, above_noise, error_stratum
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -146,17 +147,15 @@ def linear_anova(
     models; Olejnik & Algina (2003) for generalised eta squared, all factors manipulated.
     """
     cells = _checked(y, factors, levels)
-    n, k = len(cells), cells[0].size
-    floor = n * k * (8 * np.finfo(float).eps * float(np.abs(cells).max())) ** 2
-    scores, total = _scores(cells, between, sum_of_squares, floor)
-    if not scores:
+    hypotheses, total = _hypotheses(cells, between, sum_of_squares)
+    if not hypotheses:
         raise InputError("expected a factor or a covariate; name one with --within, --between or --covariate")
     names = levels or [[str(i + 1) for i in range(size)] for size in cells.shape[1:]]
     return AnovaResult(
-        effects=effects_of(scores, list(factors), sum(total.values()), confidence),
+        effects=effects_of(hypotheses, factors, sum(total.values()), confidence),
         factors=tuple(factors),
         levels=tuple(tuple(str(level) for level in group) for group in names),
-        n_participants=n,
+        n_participants=len(cells),
         ss_participants=total[()],
         confidence=confidence,
         y=cells,
@@ -165,44 +164,29 @@ def linear_anova(
     )
 
 
-def contrast_strata(cells: Floats) -> dict[tuple[int, ...], Floats]:
-    """Contrast scores (N, q) of cell means (N, a, b, ...), by the positions of the within factors.
-
-    The scores at `()` are those between participants: their means, centred, in units of one cell.
-    """
-    every, columns = _all_scores(cells)
-    return {members: every[:, own] for members, own in columns.items()}
-
-
-def _all_scores(cells: Floats) -> tuple[Floats, dict[tuple[int, ...], slice]]:
-    """Every contrast score (N, K) side by side, and the columns of each set of within factors."""
-    n, k = len(cells), cells[0].size
-    people = cells.reshape(n, -1).mean(axis=1)
-    rotated = rotate(cells - people.reshape(-1, *[1] * (cells.ndim - 1)))
-    parts: dict[tuple[int, ...], Floats] = {(): np.sqrt(k) * (people - people.mean())[:, None]}
-    parts |= {m: effect_scores(rotated, m) for m in effect_members(cells.ndim - 1)}
-    ends = list(accumulate(part.shape[1] for part in parts.values()))
-    columns = {m: slice(end - part.shape[1], end) for (m, part), end in zip(parts.items(), ends, strict=True)}
-    return np.concatenate(list(parts.values()), axis=1), columns
-
-
-def _scores(
-    cells: Floats, between: BetweenDesign, sum_of_squares: int, floor: float
-) -> tuple[list[Scores], dict[tuple[int, ...], float]]:
-    """Scores of every effect, those of fewer factors first, and the error sum of squares of every stratum."""
-    z, columns = _all_scores(cells)
-    basis = np.linalg.qr(between.matrix)[0]
-    df, scores, total = len(basis) - basis.shape[1], [], {}
+def _hypotheses(
+    cells: Floats, between: BetweenDesign, sum_of_squares: int
+) -> tuple[list[Hypothesis], dict[tuple[int, ...], float]]:
+    """Every effect, those of fewer factors first, and the error sum of squares of every stratum."""
+    floor = cells.size * (8 * np.finfo(float).eps * float(np.abs(cells).max())) ** 2
+    z, columns = contrast_scores(cells)
+    basis, df = between.basis, len(z) - between.matrix.shape[1]
     residual = z - basis @ (basis.T @ z)
-    residual = residual - basis @ (basis.T @ residual)
+    residual -= basis @ (basis.T @ residual)
     directed = [rows @ z for rows in term_directions(between, sum_of_squares)]
-    for members, own in columns.items():
-        error = error_scores(residual[:, own], members, df, floor)
-        total[members] = error.ss
-        for term, along in zip(between.terms, directed, strict=True):
+    squares = np.stack([np.einsum("ij,ij->j", one, one) for one in (residual, *directed)])
+    summed = np.add.reduceat(squares, [own.start for own in columns.values()], axis=1)
+    hypotheses, total = [], {}
+    for (members, own), (ss_error, *of_terms) in zip(
+        columns.items(), above_noise(summed, floor).T.tolist(), strict=True
+    ):
+        error = error_stratum(residual[:, own], members, df, ss_error)
+        total[members] = ss_error
+        for term, along, ss in zip(between.terms, directed, of_terms, strict=True):
             if term or members:
-                scores.append(hypothesis_scores(along[:, own], term, error, floor))
-    return sorted(scores, key=lambda s: len(s.between) + len(s.error.members)), total
+                hypotheses.append(Hypothesis(term, error, ss, along[:, own]))
+    hypotheses.sort(key=lambda h: len(h.between) + len(h.error.members))
+    return hypotheses, total
 
 
 def _checked(y: ArrayLike, factors: Sequence[str], levels: Sequence[Sequence[str]] | None) -> Floats:

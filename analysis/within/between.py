@@ -1,8 +1,10 @@
 """What differs between participants: groups and covariates, as the design matrix of the linear model."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, product
+from functools import cached_property
+from itertools import accumulate, combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +15,11 @@ from experiments.errors import InputError
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+WELL_CONDITIONED = 1e-4
+"""Ratio of singular values above which a design is taken apart once for all of its terms."""
+
 RANK_RATIO = 1e-9
 """A column whose part outside the others is smaller than this share of it adds nothing to them."""
-
-WELL_CONDITIONED = 1e-4
-"""Ratio of singular values above which a design is taken apart by one QR for all of its terms."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,30 @@ class BetweenDesign:
     def n_participants(self) -> int:
         """N."""
         return len(self.matrix)
+
+    @cached_property
+    def decomposed(self) -> tuple[Floats, Floats, Floats]:
+        """Singular value decomposition of the matrix, its columns scaled to length one.
+
+        Left vectors (N, p), an orthonormal basis of the columns; singular values (p,); right vectors (p, p).
+        """
+        lengths = np.sqrt(np.einsum("ij,ij->j", self.matrix, self.matrix))
+        scaled = self.matrix / np.where(lengths > 0, lengths, 1.0)
+        if scaled.shape[1] == 1:
+            return scaled, np.ones(1), np.ones((1, 1))
+        left, singular, right = np.linalg.svd(scaled, full_matrices=False)
+        return left, singular, right
+
+    @property
+    def basis(self) -> Floats:
+        """Orthonormal basis (N, p) of the columns of the matrix."""
+        return self.decomposed[0]
+
+    @property
+    def well_conditioned(self) -> bool:
+        """Whether columns, scaled to length one, are so far from dependent that no digit is lost."""
+        singular = self.decomposed[1]
+        return bool(singular[-1] > WELL_CONDITIONED * singular[0])
 
     def row(self, at: dict[str, int]) -> Floats:
         """Design row (p,) of the participant with the levels `at` and every covariate at its mean.
@@ -141,12 +167,13 @@ def between_design(
             raise InputError(f"the covariate '{covariate.name}' is the same for everyone; leave it out")
         parts[covariate.name] = _standardised(covariate, covariate.values)[:, None]
     blocks = [_product([parts[name] for name in term], len(codes)) for term in terms]
-    ends = np.cumsum([block.shape[1] for block in blocks])
+    ends = accumulate(block.shape[1] for block in blocks)
     columns = tuple(tuple(range(end - block.shape[1], end)) for block, end in zip(blocks, ends, strict=True))
     matrix = np.concatenate(blocks, axis=1)
-    _refuse_deficient(matrix, terms, columns)
     names = tuple(tuple(str(level) for level in group) for group in levels)
-    return BetweenDesign(tuple(factors), names, codes, tuple(covariates), tuple(terms), columns, matrix)
+    design = BetweenDesign(tuple(factors), names, codes, tuple(covariates), tuple(terms), columns, matrix)
+    _refuse_deficient(design)
+    return design
 
 
 def _standardised(covariate: Covariate, values: Floats) -> Floats:
@@ -155,8 +182,8 @@ def _standardised(covariate: Covariate, values: Floats) -> Floats:
 
 def _product(parts: Sequence[Floats], n: int = 1) -> Floats:
     """Products of every column of one part with every column of the others, (n, columns)."""
-    block = np.ones((n, 1))
-    for part in parts:
+    block, *others = parts or [np.ones((n, 1))]
+    for part in others:
         block = (block[:, :, None] * part[:, None, :]).reshape(len(block), -1)
     return block
 
@@ -167,88 +194,40 @@ def _refuse_empty_groups(factors: Sequence[str], levels: Sequence[Sequence[str]]
             raise InputError(
                 f"expected at least 2 levels of '{name}', got {len(group)}; leave the factor out"
             )
-    met = {tuple(row) for row in codes.tolist()}
+    met = set(map(tuple, codes.tolist()))
+    if len(met) == math.prod(map(len, levels)):
+        return
     empty = [at for at in product(*(range(len(group)) for group in levels)) if at not in met]
-    if empty:
-        said = "; ".join(
-            " ".join(
-                f"{name}={levels[k][code]}" for k, (name, code) in enumerate(zip(factors, at, strict=True))
-            )
-            for at in empty[:5]
-        )
-        raise InputError(
-            f"nobody with complete data is in {said}: the groups are not fully crossed; leave a factor out"
-        )
+    said = "; ".join(
+        " ".join(f"{name}={levels[k][code]}" for k, (name, code) in enumerate(zip(factors, at, strict=True)))
+        for at in empty[:5]
+    )
+    raise InputError(
+        f"nobody with complete data is in {said}: the groups are not fully crossed; leave a factor out"
+    )
 
 
-def _refuse_deficient(
-    matrix: Floats, terms: Sequence[tuple[str, ...]], columns: Sequence[tuple[int, ...]]
-) -> None:
-    n, p = matrix.shape
+def _refuse_deficient(design: BetweenDesign) -> None:
+    n, p = design.matrix.shape
     if n <= p > 1:
         raise InputError(
             f"expected more participants than coefficients between participants, got {n} for {p}; "
             "the tests have no error term"
         )
-    if _well_conditioned(matrix):
+    if design.well_conditioned:
         return
-    for term, own in zip(terms, columns, strict=True):
-        others = np.delete(matrix, own, axis=1)
-        if others.shape[1] and len(_outside(matrix[:, own], others)[0]) < len(own):
+    for term, own in zip(design.terms, design.columns, strict=True):
+        others = np.delete(design.matrix, own, axis=1)
+        if others.shape[1] and len(outside(design.matrix[:, own], others)) < len(own):
             raise InputError(
                 f"'{':'.join(term)}' is determined by the other groups and covariates; leave one out"
             )
 
 
-def _outside(own: Floats, others: Floats) -> tuple[Floats, Floats]:
-    """Orthonormal rows (r, N) of what `own` spans outside `others`, and their singular values."""
+def outside(own: Floats, others: Floats) -> Floats:
+    """Orthonormal rows (r, N) of what the columns `own` span outside the columns `others`."""
     basis = np.linalg.qr(others)[0] if others.shape[1] else others
     rest = own - basis @ (basis.T @ own)
     rest = rest - basis @ (basis.T @ rest)
     left, singular, _ = np.linalg.svd(rest, full_matrices=False)
-    size = np.linalg.norm(own, axis=0).max()
-    return left.T[singular > RANK_RATIO * size], singular
-
-
-def term_directions(design: BetweenDesign, sum_of_squares: int) -> list[Floats]:
-    """Orthonormal directions (r, N) in participant space that each term of the design is tested on.
-
-    Type III: what the term adds to all other terms. Type II: what it adds to all terms that do not contain
-    it, so that the intercept adds to nothing. For scores z the hypothesis matrix is (U z)' (U z).
-    """
-    if sum_of_squares == 3:
-        basis, upper = np.linalg.qr(design.matrix)
-        if _well_conditioned(upper):
-            # the rows of X^+ that belong to a term are what it adds to all others
-            inverse = np.linalg.solve(upper, basis.T)
-            return [_orthonormal(inverse[list(own)]) for own in design.columns]
-    return [
-        _outside(design.matrix[:, own], design.matrix[:, reduced_columns(design, term, sum_of_squares)])[0]
-        for term, own in zip(design.terms, design.columns, strict=True)
-    ]
-
-
-def _orthonormal(rows: Floats) -> Floats:
-    """Orthonormal rows that span the same."""
-    if len(rows) == 1:
-        return np.asarray(rows / np.sqrt(np.vdot(rows, rows)))
-    return np.linalg.qr(rows.T)[0].T
-
-
-def _well_conditioned(matrix: Floats) -> bool:
-    """Whether columns, scaled to length one, are so far from dependent that no digit that counts is lost."""
-    lengths = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
-    if not (lengths > 0).all():
-        return False
-    singular = np.linalg.svd(matrix / lengths, compute_uv=False)
-    return bool(singular[-1] > WELL_CONDITIONED * singular[0])
-
-
-def reduced_columns(design: BetweenDesign, term: tuple[str, ...], sum_of_squares: int) -> list[int]:
-    """Columns of the model without a term that it is tested against; of type II without what contains it."""
-    return [
-        column
-        for other, columns in zip(design.terms, design.columns, strict=True)
-        if other != term and (sum_of_squares == 3 or not set(term) <= set(other))
-        for column in columns
-    ]
+    return np.asarray(left.T[singular > RANK_RATIO * np.linalg.norm(own, axis=0).max()], dtype=np.float64)

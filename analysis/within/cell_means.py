@@ -1,21 +1,22 @@
 """From long rows, one a trial, to the participants x cells table of means that the ANOVA takes."""
 
-import re
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.within.level_codes import level_codes
 from experiments.errors import InputError, did_you_mean
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?")
+ROUNDING = 1e-10
+"""Ratings that differ by less than this share of them (or of 1) are one and the same."""
 
 NAMED_CELLS = 5
 """How many empty cells a one-line message names before it counts the rest."""
@@ -51,13 +52,6 @@ class CellTable:
         return [dict(zip(self.factors, combination, strict=True)) for combination in product(*self.levels)]
 
 
-def natural_order(names: Sequence[str]) -> list[str]:
-    """Sort names: by value where all are numbers, else by text without case; independent of row order."""
-    if all(_NUMBER.fullmatch(name) for name in names):
-        return sorted(names, key=lambda name: (float(name), name))
-    return sorted(names, key=lambda name: (name.casefold(), name))
-
-
 def cell_table(
     rows: pd.DataFrame,
     participant: str,
@@ -84,64 +78,46 @@ def cell_table(
     for name in (participant, rating, *within):
         if name not in rows.columns:
             raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
-    if rows.empty:
+    if not len(rows):
         raise InputError("there are no ratings to analyse; the table has a header but no rows")
-    person, people = _codes(rows[participant], None, participant)
-    coded = [_codes(rows[name], (levels or {}).get(name), name) for name in within]
-    shape = tuple(len(names) for _, names in coded)
-    cell = (
-        np.ravel_multi_index(tuple(codes for codes, _ in coded), shape) if within else np.zeros_like(person)
-    )
+    person, people = level_codes(rows[participant], participant)
+    coded = [level_codes(rows[name], name, (levels or {}).get(name)) for name in within]
+    slot, shape = person, (len(people), *(len(names) for _, names in coded))
+    for codes, names in coded:
+        slot = slot * len(names) + codes
     values = rows[rating].to_numpy(dtype=np.float64)
-    slot, slots = person * int(np.prod(shape)) + cell, len(people) * int(np.prod(shape))
-    counts = np.bincount(slot, minlength=slots).reshape(len(people), *shape)
-    sums: Floats = np.zeros(counts.shape)
-    sums += np.bincount(slot, weights=values, minlength=slots).reshape(counts.shape)
-    return _complete(
-        people, list(within), [names for _, names in coded], sums, counts, _constant(person, values)
-    )
+    size = math.prod(shape)
+    counts = np.bincount(slot, minlength=size).reshape(shape)
+    sums = np.bincount(slot, weights=values, minlength=size).reshape(shape)
+    table = _complete(people, list(within), [names for _, names in coded], sums, counts)
+    if not _flat(table).any():
+        return table
+    return replace(table, constant=_constant(table, people, person, values))
 
 
-def factorized(column: pd.Series) -> tuple[Integers, Sequence[Any]]:
-    """Codes (n,) of a column into its values, in the order in which these appear; -1 where one is missing."""
-    # of the array itself: an index of the values would take longer than the codes
-    codes, values = pd.factorize(column.to_numpy() if isinstance(column.dtype, np.dtype) else column.array)
-    return np.asarray(codes, dtype=np.int64), list(values)
+def _flat(table: CellTable) -> NDArray[np.bool_]:
+    """Whose cells all have one mean (N,): only they can have given one and the same rating throughout."""
+    means = table.y.reshape(len(table.y), -1)
+    return means.max(axis=1) - means.min(axis=1) <= 4 * ROUNDING * np.maximum(np.abs(means[:, 0]), 1.0)
 
 
-def _codes(column: pd.Series, declared: Sequence[str] | None, name: str) -> tuple[Integers, list[str]]:
-    """Codes of a column into its sorted (or declared) names."""
-    codes, uniques = factorized(column)
-    if (codes < 0).any():
-        raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
-    texts = [str(text) for text in uniques]
-    names = natural_order(texts) if declared is None else [str(level) for level in declared]
-    position = {text: i for i, text in enumerate(names)}
-    for text in texts:
-        if text not in position:
-            raise InputError(f"'{text}' is no level of '{name}'{did_you_mean(text, names)}")
-    lookup = np.array([position[text] for text in texts], dtype=np.int64)
-    return lookup[codes], names
-
-
-def _constant(person: Integers, values: Floats) -> NDArray[np.bool_]:
-    """Which participants gave one and the same rating throughout (and more than one)."""
+def _constant(table: CellTable, people: list[str], person: Integers, values: Floats) -> tuple[str, ...]:
+    """Participants of a table who gave one and the same rating throughout (and more than one)."""
     number = np.bincount(person)
     mean = np.bincount(person, weights=values) / number
     deviation = np.bincount(person, weights=(values - mean[person]) ** 2)
-    return (deviation <= 1e-20 * np.maximum(mean**2, 1.0)) & (number > 1)
+    constant = (deviation <= ROUNDING**2 * np.maximum(mean**2, 1.0)) & (number > 1)
+    kept = set(table.participants)
+    return tuple(people[i] for i in np.flatnonzero(constant) if people[i] in kept)
 
 
 def _complete(
-    people: list[str],
-    factors: list[str],
-    levels: list[list[str]],
-    sums: Floats,
-    counts: Integers,
-    constant: NDArray[np.bool_],
+    people: list[str], factors: list[str], levels: list[list[str]], sums: Floats, counts: Integers
 ) -> CellTable:
+    whole = counts.reshape(len(people), -1).all(axis=1)
+    if whole.all():
+        return _table(people, factors, levels, sums, counts)
     _refuse_empty_cells(factors, levels, counts)
-    whole = (counts > 0).reshape(len(people), -1).all(axis=1)
     dropped = tuple(
         DroppedParticipant(people[i], _cells_at(factors, levels, counts[i] == 0))
         for i in np.flatnonzero(~whole)
@@ -154,14 +130,25 @@ def _complete(
             f"{name_cells(first.missing_cells)}){_case_alone(factors, levels)}; "
             "leave a factor out or collect the missing cells"
         )
+    complete = [people[i] for i in np.flatnonzero(whole)]
+    return _table(complete, factors, levels, sums[whole], counts[whole], dropped)
+
+
+def _table(
+    people: list[str],
+    factors: list[str],
+    levels: list[list[str]],
+    sums: Floats,
+    counts: Integers,
+    dropped: tuple[DroppedParticipant, ...] = (),
+) -> CellTable:
     return CellTable(
-        participants=tuple(people[i] for i in np.flatnonzero(whole)),
+        participants=tuple(people),
         factors=tuple(factors),
         levels=tuple(tuple(names) for names in levels),
-        y=sums[whole] / counts[whole],
-        counts=counts[whole],
+        y=sums / counts,
+        counts=counts,
         dropped=dropped,
-        constant=tuple(people[i] for i in np.flatnonzero(whole & constant)),
     )
 
 

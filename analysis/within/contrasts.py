@@ -1,5 +1,6 @@
 """Orthonormal contrasts of a factorial within-participant design, and the names of its effects."""
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
@@ -33,20 +34,34 @@ def effect_name(factors: Sequence[str]) -> str:
     return ":".join(factors)
 
 
-def rotate(y: Floats) -> Floats:
-    """Rotate cell means (N, a, b, ...) into contrast space, same shape.
+def contrast_scores(y: Floats) -> tuple[Floats, dict[tuple[int, ...], slice]]:
+    """Scores (N, K) of cell means (N, a, b, ...) on the contrasts of every effect, side by side.
 
-    On every factor axis index 0 is the mean direction, the rest the Helmert contrasts, so that the
-    contrast scores of an effect are one slice (see `effect_scores`).
+    With them the columns of each set of within factors, by their positions. The one column of `()` are the
+    scores between participants: their means, centred, in units of one cell.
     """
-    rotated = y
-    for axis in range(1, y.ndim):
-        rotated = np.moveaxis(np.tensordot(rotated, orthonormal_basis(y.shape[axis]), (axis, 0)), -1, axis)
-    return rotated
+    n, k = len(y), y[0].size
+    cells = y.reshape(n, k)
+    people = cells.sum(axis=1) / k
+    scores = cells - people[:, None]
+    for size in y.shape[1:]:
+        # takes the first axis and puts it last: after all of them their order is as before
+        scores = np.swapaxes(scores.reshape(n, size, k // size), 1, 2) @ orthonormal_basis(size)
+    order, columns = _by_effect(y.shape[1:])
+    scores = scores.reshape(n, k)[:, order]
+    scores[:, 0] = math.sqrt(k) * (people - people.sum() / n)
+    return scores, columns
 
 
-def effect_scores(rotated: Floats, members: Sequence[int]) -> Floats:
-    """Contrast scores (N, q) of the effect of the factors at positions `members`."""
-    inside = set(members)
-    cut = tuple(slice(1, None) if axis in inside else slice(0, 1) for axis in range(rotated.ndim - 1))
-    return rotated[(slice(None), *cut)].reshape(rotated.shape[0], -1)
+@lru_cache(maxsize=64)
+def _by_effect(shape: tuple[int, ...]) -> tuple[NDArray[np.int64], dict[tuple[int, ...], slice]]:
+    """Where contrasts lie among the turned cells: index 0 of an axis is its mean, the rest its contrasts."""
+    position = np.arange(math.prod(shape)).reshape(shape)
+    every = [(), *effect_members(len(shape))]
+    parts = [
+        position[tuple(slice(1, None) if axis in members else 0 for axis in range(len(shape)))].ravel()
+        for members in every
+    ]
+    ends = np.cumsum([len(part) for part in parts]).tolist()
+    columns = {m: slice(end - len(part), end) for m, part, end in zip(every, parts, ends, strict=True)}
+    return np.concatenate(parts), columns

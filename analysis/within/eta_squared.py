@@ -1,5 +1,8 @@
 """Effect sizes of within-participant tests and their confidence intervals."""
 
+from collections.abc import Sequence
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
@@ -94,23 +97,22 @@ class SizeIntervals:
 
     Parameters
     ----------
-    f_value, df_effect, df_error : (m,) array
-        As in `partial_eta_squared_ci`.
+    tests : sequence of (float, float, float)
+        F and its df of effect and error, as in `partial_eta_squared_ci`.
     confidence : float
         Coverage.
     """
 
-    def __init__(self, f_value: Floats, df_effect: Floats, df_error: Floats, confidence: float) -> None:
-        self._tests = np.stack([f_value, df_effect, df_error], axis=1)
+    def __init__(self, tests: Sequence[tuple[float, float, float]], confidence: float) -> None:
+        self._tests = tests
         self._confidence = confidence
-        self._known: list[tuple[float, float]] | None = None
 
     def interval(self, at: int) -> tuple[float, float]:
         """Lower and upper bound of the F at a position."""
-        if self._known is None:
-            # with one contrast the univariate and the multivariate test are one
-            once, back = np.unique(self._tests, axis=0, return_inverse=True)
-            f_value, df_effect, df_error = once.T
-            bounds = partial_eta_squared_ci(f_value, df_effect, df_error, self._confidence)[back.reshape(-1)]
-            self._known = [(low, high) for low, high in bounds.tolist()]
-        return self._known[at]
+        return self._every[at]
+
+    @cached_property
+    def _every(self) -> list[tuple[float, float]]:
+        f_value, df_effect, df_error = np.array(self._tests, dtype=np.float64).T
+        bounds = partial_eta_squared_ci(f_value, df_effect, df_error, self._confidence)
+        return [(low, high) for low, high in bounds.tolist()]

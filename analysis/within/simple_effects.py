@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from analysis.within.adjustments import holm
 from analysis.within.anova import AnovaResult
 from analysis.within.contrasts import orthonormal_basis
-from analysis.within.effect_tests import Effect, effects_of, error_scores, hypothesis_scores
+from analysis.within.effects import Effect, effects_of
+from analysis.within.strata import Hypothesis, above_noise, error_stratum
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -56,12 +57,14 @@ def simple_effect(result: AnovaResult, of: str, at: Mapping[str, str]) -> Effect
     else:
         rows = design.row(groups)[None]
     directions = np.linalg.qr(_toward(x, rows))[0].T
-    basis = np.linalg.qr(x)[0]
+    basis = design.basis
     floor = z.size * (8 * np.finfo(float).eps * float(np.abs(result.y).max())) ** 2
-    error = error_scores(z - basis @ (basis.T @ z), members, result.df_error, floor)
-    between = (of,) if of in design.factors else ()
-    scores = hypothesis_scores(directions @ z, between, error, floor)
-    return effects_of([scores], result.factors, error.ss, result.confidence)[0]
+    residual, directed = z - basis @ (basis.T @ z), directions @ z
+    residual -= basis @ (basis.T @ residual)
+    ss_error, ss = above_noise(np.array([np.vdot(residual, residual), np.vdot(directed, directed)]), floor)
+    error = error_stratum(residual, members, result.df_error, float(ss_error))
+    tested = Hypothesis((of,) if of in design.factors else (), error, float(ss), directed)
+    return effects_of([tested], result.factors, error.ss, result.confidence)[0]
 
 
 def _toward(x: Floats, rows: Floats) -> Floats:

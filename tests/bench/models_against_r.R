@@ -12,6 +12,8 @@ factorial <- expand.grid(id = 1:32, a = 1:2, b = 1:2, c = 1:2, d = 1:2, trial = 
 factorial$rating <- sample(1:7, nrow(factorial), TRUE)
 save(factorial, "factorial")
 timed <- function(f) { r <- cpu(f()); c(list(cpu = r$cpu), r$value) }
+# the least of as many calls as ours, warm like ours
+least <- function(f) { f(); every <- sapply(1:50, function(i) cpu(f())$cpu); c(list(cpu = min(every)), f()) }
 lmm <- function(formula, data) function() list(value = REMLcrit(lme4::lmer(formula, data)))
 times <- list(
   ks = timed(lmm(response ~ validity * believability + (1 | id) + (1 | id:validity) + (1 | id:believability) +
@@ -21,10 +23,9 @@ times <- list(
   insteval = timed(lmm(y ~ service + (1 | s) + (1 | d), InstEval)),
   clmm = timed(function() list(value = c(logLik(clmm(factor(response) ~ validity * believability + (1 | id) +
     (1 | content), ks2013.3))))),
-  factorial = timed(function() { suppressMessages(suppressWarnings(
+  factorial = least(function() { suppressMessages(suppressWarnings(
     aov_ez("id", "rating", factorial, within = c("a", "b", "c", "d"), fun_aggregate = mean))); list(value = 0) }),
-  anova = timed(function() { for (i in 1:5) suppressMessages(suppressWarnings(
+  anova = least(function() { suppressMessages(suppressWarnings(
     aov_ez("id", "value", obk.long, between = c("treatment", "gender"), within = c("phase", "hour"), observed = "gender")))
     list(value = 0) }))
-times$anova$cpu <- times$anova$cpu / 5
 write_json(times, file.path(folder, "times.json"), auto_unbox = TRUE, digits = 12)

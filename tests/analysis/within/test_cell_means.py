@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from analysis.plans.result import cell_decisions
-from analysis.within.cell_means import cell_table, natural_order
+from analysis.within.cell_means import cell_table
+from analysis.within.level_codes import natural_order
 from experiments.errors import InputError
 
 

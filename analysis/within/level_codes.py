@@ -1,0 +1,76 @@
+"""Columns of a table as codes into their levels."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.errors import InputError, did_you_mean
+
+Integers = NDArray[np.int64]
+
+_NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?")
+
+_EXACT = 2**53
+"""Whole numbers below have the same order as numbers and as their float64."""
+
+
+def natural_order(names: Sequence[str]) -> list[str]:
+    """Sort names: by value where all are numbers, else by text without case; independent of row order."""
+    if all(_NUMBER.fullmatch(name) for name in names):
+        return sorted(names, key=lambda name: (float(name), name))
+    return sorted(names, key=lambda name: (name.casefold(), name))
+
+
+def factorized(column: pd.Series) -> tuple[Integers, Sequence[Any]]:
+    """Codes (n,) of a column into its values, in the order in which these appear; -1 where one is missing."""
+    # of the array itself: an index of the values would take longer than the codes
+    plain = isinstance(column.dtype, np.dtype) or getattr(column.dtype, "storage", None) == "python"
+    codes, values = pd.factorize(column.to_numpy() if plain else column.array)
+    return np.asarray(codes, dtype=np.int64), list(values)
+
+
+def level_codes(
+    column: pd.Series, name: str, declared: Sequence[str] | None = None
+) -> tuple[Integers, list[str]]:
+    """Codes (n,) of the column `name` into its declared names, or into those it holds in natural order.
+
+    Raises
+    ------
+    InputError
+        A row without a value; a value that is not declared.
+    """
+    if declared is None and (counted := _whole_numbers(column)) is not None:
+        return counted
+    codes, uniques = factorized(column)
+    if codes.min() < 0:
+        raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
+    texts = [str(text) for text in uniques]
+    names = natural_order(texts) if declared is None else [str(level) for level in declared]
+    position = {text: i for i, text in enumerate(names)}
+    for text in texts:
+        if text not in position:
+            raise InputError(f"'{text}' is no level of '{name}'{did_you_mean(text, names)}")
+    lookup = np.array([position[text] for text in texts], dtype=np.int64)
+    return lookup[codes], names
+
+
+def _whole_numbers(column: pd.Series) -> tuple[Integers, list[str]] | None:
+    """The same of whole numbers in a range no wider than the table is long, which are counted; else None."""
+    dtype = column.dtype
+    if not isinstance(dtype, np.dtype) or dtype.kind not in "iu" or not len(column):
+        return None
+    values = column.to_numpy()
+    low, high = int(values.min()), int(values.max())
+    if high - low >= len(values) or max(-low, high) >= _EXACT:
+        return None
+    codes = values.astype(np.int64, copy=False) - low
+    present = np.flatnonzero(np.bincount(codes))
+    if len(present) <= high - low:
+        lookup = np.zeros(high - low + 1, np.int64)
+        lookup[present] = np.arange(len(present))
+        codes = lookup[codes]
+    return codes, [str(level) for level in (present + low).tolist()]
