@@ -88,7 +88,7 @@ def cell_table(
     values = rows[rating].to_numpy(dtype=np.float64)
     size = math.prod(shape)
     counts = np.bincount(slot, minlength=size).reshape(shape)
-    sums = np.bincount(slot, weights=values, minlength=size).reshape(shape)
+    sums = np.asarray(np.bincount(slot, weights=values, minlength=size), dtype=np.float64).reshape(shape)
     table = _complete(people, list(within), [names for _, names in coded], sums, counts)
     if not _flat(table).any():
         return table
@@ -98,7 +98,8 @@ def cell_table(
 def _flat(table: CellTable) -> NDArray[np.bool_]:
     """Whose cells all have one mean (N,): only they can have given one and the same rating throughout."""
     means = table.y.reshape(len(table.y), -1)
-    return means.max(axis=1) - means.min(axis=1) <= 4 * ROUNDING * np.maximum(np.abs(means[:, 0]), 1.0)
+    spread: Floats = means.max(axis=1) - means.min(axis=1)
+    return np.asarray(spread <= 4 * ROUNDING * np.maximum(np.abs(means[:, 0]), 1.0))
 
 
 def _constant(table: CellTable, people: list[str], person: Integers, values: Floats) -> tuple[str, ...]:

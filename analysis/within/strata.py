@@ -81,7 +81,7 @@ def error_stratum(residual: Floats, members: tuple[int, ...], df: int, ss: float
         return ErrorStratum(members, q, df, 0.0, math.nan, math.nan, None, residual, NO_ERROR)
     if q == 1:
         return ErrorStratum(members, 1, df, ss, 1.0, 1.0, None, residual, None)
-    roots = np.linalg.eigvalsh(residual.T @ residual)
+    roots = np.asarray(np.linalg.eigvalsh(residual.T @ residual), dtype=np.float64)
     gg = greenhouse_geisser(roots)
     hf = huynh_feldt(gg, q, df)
     if df < q:
