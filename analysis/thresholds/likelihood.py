@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,8 @@ Shape = Literal["normal", "logistic", "weibull"]
 LAPSE_MAX = 0.1
 CHI2_95 = float(stats.chi2.ppf(0.95, 1))
 BOUND = 1e-9
+GRID = 41
+"""Values of a parameter among which the start of a profile's fit is looked for."""
 QUASI_NEWTON: Any = {"ftol": 1e-15, "gtol": 1e-9, "maxiter": 500}
 SIMPLEX: Any = {"xatol": 1e-9, "fatol": 1e-12, "maxiter": 1000}
 
@@ -105,6 +108,8 @@ class Likelihood:
 
         starts = [start] if start is not None else self._starts(size)
         bounds = [self._bounds()[index] for index in free]
+        if held and free:
+            starts.append(whole(self._scanned(negative, bounds)))
         fits = [
             optimize.minimize(
                 negative,
@@ -119,6 +124,12 @@ class Likelihood:
         # Along a profile the start is near and a loss to 1e-9 will do.
         polished = best.x if held else self._polished(whole, best.x, bounds)
         return whole(polished), -self.negative(whole(polished))
+
+    def _scanned(self, negative: Callable[[Array], float], bounds: list[tuple[float, float]]) -> Array:
+        """The best of a grid within `bounds`: far from the maximum the profile leaves its start's valley."""
+        sizes = [3 if high == LAPSE_MAX else GRID for _, high in bounds]
+        axes = [np.linspace(low, high, size) for (low, high), size in zip(bounds, sizes, strict=True)]
+        return np.array(min(product(*axes), key=lambda values: negative(np.array(values))))
 
     def _polished(
         self, whole: Callable[[Array], Array], values: Array, bounds: list[tuple[float, float]]
@@ -197,7 +208,9 @@ class Likelihood:
         while True:
             outside = inside + step
             if (outside - bound) * np.sign(step) > 0:
-                return None
+                outside = bound
             if loss(outside) > 0:
                 return float(optimize.brentq(loss, inside, outside, xtol=1e-7 * max(1.0, self.width)))
+            if outside == bound:
+                return None
             inside, step = outside, step * 1.6

@@ -78,9 +78,11 @@ def fit_threshold(
         Too few levels, answers all alike, an answer that does not change with x, a threshold far outside.
     """
     refuse_unfit(trials, shape)
-    model = Likelihood(trials, shape, guess, lapse, falling)
+    centre, unit = _scale(trials, shape)
+    model = Likelihood(Trials((trials.x - centre) / unit, trials.n, trials.k), shape, guess, lapse, falling)
     best, value = model.maximum({})
-    location, log_spread = best[0], best[1]
+    location = centre + unit * best[0]
+    log_spread = best[1] + (0.0 if shape == "weibull" else float(np.log(unit)))
     lapsed = best[2] if lapse is None else lapse
     notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None)
     low, high = float(trials.x.min()), float(trials.x.max())
@@ -94,18 +96,25 @@ def fit_threshold(
     empty = Interval(None, None)
     location_ci = model.profile(0, best, value) if intervals else empty
     spread_ci = model.profile(1, best, value) if intervals else empty
+    error = model.standard_error(best) if lapsed > BOUND or lapse is not None else None
+    level = _level(model, best, 0.75)
+    grown = 1.0 if shape == "weibull" else unit
     return Threshold(
         shape,
         guess,
         float(lapsed),
         lapse is None,
         float(location),
-        model.standard_error(best) if lapsed > BOUND or lapse is not None else None,
-        location_ci,
+        None if error is None else unit * error,
+        Interval(
+            *(None if end is None else centre + unit * end for end in (location_ci.low, location_ci.high))
+        ),
         float(np.exp(log_spread)),
-        Interval(*(None if end is None else float(np.exp(end)) for end in (spread_ci.low, spread_ci.high))),
+        Interval(
+            *(None if end is None else grown * float(np.exp(end)) for end in (spread_ci.low, spread_ci.high))
+        ),
         _slope(shape, location, log_spread) * (-1.0 if model.falling else 1.0),
-        _level(model, best, 0.75),
+        None if level is None else centre + unit * level,
         float(value),
         deviance,
         df,
@@ -115,6 +124,12 @@ def fit_threshold(
         model.falling,
         tuple(notes),
     )
+
+
+def _scale(trials: Trials, shape: Shape) -> tuple[float, float]:
+    """Centre and unit in which x is fitted: steps and tolerances are absolute, units of x are anyone's."""
+    unit = float(trials.x.max() - trials.x.min())
+    return (0.0 if shape == "weibull" else float(np.average(trials.x, weights=trials.n))), unit
 
 
 def refuse_unfit(trials: Trials, shape: Shape) -> None:
