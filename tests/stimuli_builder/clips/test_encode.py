@@ -1,6 +1,9 @@
 """The MP4 files."""
 
 import io
+import os
+import subprocess
+import sys
 from itertools import pairwise
 
 import av
@@ -73,3 +76,29 @@ def test_a_temporary_folder_that_cannot_be_written_is_named(
     monkeypatch.setattr("tempfile.tempdir", "/proc")
     with pytest.raises(InputError, match="cannot be written"):
         encode_clip(frames[:2], (320, 120), 30)
+
+
+ENCODED_ANEW = """
+import hashlib
+import numpy as np
+from stimuli_builder.clips.encode import encode_clip
+y, x = np.mgrid[:360, :960]
+planes = []
+for shift in range(12):
+    frame = np.full((540, 960), 128, dtype=np.uint8)
+    frame[:360] = 100 + 40 * np.sin(x / 23) + 30 * np.cos((y - 3 * shift * (x > 480)) / 9)
+    planes.append(frame)
+print(hashlib.sha256(encode_clip(planes, (960, 360), 30)).hexdigest())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is filled by a switch of glibc")
+def test_bytes_do_not_depend_on_what_memory_held_before() -> None:
+    command = [sys.executable, "-c", ENCODED_ANEW]
+    plain, filled = (
+        subprocess.run(
+            command, env={**os.environ, "MALLOC_PERTURB_": byte}, capture_output=True, text=True, check=True
+        ).stdout
+        for byte in ("0", "1")
+    )
+    assert plain == filled
