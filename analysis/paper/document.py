@@ -26,9 +26,9 @@ _TEX_WORDS = {
 _SIGNS = str.maketrans(
     {
         **dict.fromkeys("\u00a0\u2009\u202f\u2002\u2003\u2005\u2006\u2007\u200a\t", " "),
-        **dict.fromkeys("−‒–—\u2010\u2011", "-"),
+        **dict.fromkeys("−‒–—⁻\u2010\u2011", "-"),
         **dict.fromkeys("\u200b\u00ad\ufeff", ""),
-        "²": "2",
+        **dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)),
         "ₚ": "p",
         "≤": "<",
         "≥": ">",

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import product, zip_longest
 from typing import Literal
 
@@ -19,6 +20,8 @@ Verdict = Literal["consistent", "inconsistent", "decision", "unchecked"]
 KINDS: tuple[Kind, ...] = ("F", "t", "chi2", "r", "z")
 
 _NUMBER = r"-?(?:\d+(?:\.\d+)?|\.\d+)"
+_WHOLE = r"(?![\d.]*\d|,\d)"
+"""Not a part of a longer number: of one with a decimal comma the whole part would be read for all of it."""
 _STATISTIC = re.compile(
     rf"(?<![A-Za-z])(?:"
     rf"(?P<F>F) ?[(\[] ?(?P<f1>{_NUMBER}) ?[,;/] ?(?P<f2>{_NUMBER}) ?[)\]]"
@@ -27,9 +30,17 @@ _STATISTIC = re.compile(
     rf"(?: ?[,;] ?N ?= ?[\d,]+)? ?[)\]]"
     rf"|(?P<r>r) ?[(\[] ?(?P<r1>{_NUMBER}) ?[)\]]"
     rf"|(?P<z>[zZ])(?= ?= ?-?[\d.])"
-    rf") ?= ?(?P<value>{_NUMBER})"
+    rf") ?= ?(?P<value>{_NUMBER}){_WHOLE}"
 )
-_P = re.compile(rf"(?<![A-Za-z])[pP] ?(?P<sign>[=<>]) ?(?P<p>{_NUMBER})")
+_P = re.compile(rf"(?<![A-Za-z])[pP] ?(?P<sign>[=<>]) ?(?P<p>{_NUMBER}){_WHOLE}")
+_SCIENTIFIC = re.compile(
+    r"(?<![\w.,])(?:(?P<mantissa>\d+(?:\.\d+)?|\.\d+)"
+    r"(?: ?[x×·*] ?10 ?\^? ?(?=-)|[eE](?=[-+]?\d))|10 ?\^ ?(?=-))(?P<exponent>[-+]?\d{1,3})(?!\w)"
+)
+_THOUSANDS = re.compile(r"(?<![\d.,])\d{1,3}(?:,\d{3})+\.\d+")
+_CORRECTED_BEFORE = re.compile(r"(?:corrected|adjusted) ?$", re.IGNORECASE)
+_CORRECTED_AFTER = re.compile(r"^ ?[,(]? ?(?:[A-Za-zŠš]+[- ])?(?:corrected|adjusted)\b", re.IGNORECASE)
+_ONE_TAILED = re.compile(r"one-(?:tailed|sided)", re.IGNORECASE)
 _ETA = re.compile(
     rf"(?P<before>partial |generali[sz]ed )?(?:η|eta)(?P<after> squared|[- ]?2 ?p|[- ]?2| ?p ?2)?"
     rf" ?= ?(?P<eta>{_NUMBER})"
@@ -38,6 +49,9 @@ _ETA = re.compile(
 _LOOKS_LIKE = re.compile(
     r"(?<![A-Za-z])(?:F ?[(\[] ?\d|t ?[(\[] ?\d|(?:χ|chi) ?-?2 ?[(\[]|[pP] ?[=<>] ?\.?\d)"
 )
+
+NEAR = 30
+"""Characters before and after a p in which it is said to be one-tailed or corrected."""
 
 REACH = 160
 """Characters after a statistic in which its p and its effect size are looked for."""
@@ -85,6 +99,7 @@ class TextCheck:
 
 def check_text(text: str) -> TextCheck:
     """Read and check every statistic of `text` (plain signs, see `analysis.paper.document.plain`)."""
+    text = _plain_numbers(text)
     matches = list(_STATISTIC.finditer(text))
     statistics, covered = [], []
     for match, following in zip_longest(matches, matches[1:]):
@@ -101,11 +116,23 @@ def check_text(text: str) -> TextCheck:
     return TextCheck(tuple(statistics), tuple(unread))
 
 
+def _plain_numbers(text: str) -> str:
+    """Powers of ten as decimals with the same last digit, and numbers with a decimal point without commas."""
+    text = _THOUSANDS.sub(lambda match: match[0].replace(",", ""), text)
+    return _SCIENTIFIC.sub(
+        lambda match: f"{Decimal(match['mantissa'] or '1').scaleb(int(match['exponent'])):f}", text
+    )
+
+
 def _reported(match: re.Match[str], tail: str) -> tuple[ReportedStatistic, int]:
     kind = next(k for k in KINDS if match[k])
     df = tuple(match[g] for g in ("f1", "f2", "t1", "c1", "r1") if match[g])
     p, eta = _P.search(tail), _ETA.search(tail) if kind == "F" else None
     allowed = p_range(kind, df, match["value"])
+    if p and kind in ("t", "r", "z") and _ONE_TAILED.search(tail[max(0, p.start() - NEAR) : p.end() + NEAR]):
+        allowed = (allowed[0] / 2, allowed[1] / 2)
+    if p and _is_corrected(p, tail):
+        allowed = (allowed[0], 1.0)  # a correction makes p larger, by how much the text does not say
     problems = [
         *(_p_problems(p, allowed) if p else ()),
         *(_eta_problems(df, match["value"], eta) if eta else ()),
@@ -130,6 +157,10 @@ def _reported(match: re.Match[str], tail: str) -> tuple[ReportedStatistic, int]:
         tuple(problems),
     )
     return reported, used
+
+
+def _is_corrected(p: re.Match[str], tail: str) -> bool:
+    return bool(_CORRECTED_BEFORE.search(tail[: p.start()]) or _CORRECTED_AFTER.search(tail[p.end() :]))
 
 
 def _corners(printed: str, whole_is_exact: bool = False) -> tuple[float, ...]:

@@ -29,6 +29,15 @@ def only(text: str):
         "F(1, 18) = 0.00, p = 1.000",
         "t(18) = 0.00, p = .998",
         "F(1, 40) = 9.00, p = .005, generalised η² = .05",
+        "F(1, 20) = 1,234.56, p < .001",
+        "t(30) = 5.37, p = 8.2e-06",
+        "t(30) = 5.37, p = 8.2 × 10⁻⁶",
+        "t(30) = 5.37, p < 10^-4",
+        "t(20) = 1.80, one-tailed p = .043",
+        "t(20) = 1.80, p = .043 (one-sided)",
+        "t(20) = 2.60, Holm-corrected p = .051",
+        "t(20) = 2.60, p = .034, Bonferroni-adjusted",
+        "In a 2 x 103 design t(20) = 2.60, p = .017",
     ],
 )
 def test_what_fits_is_consistent(text) -> None:
@@ -47,6 +56,10 @@ def test_what_fits_is_consistent(text) -> None:
         ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.10, .14]", "inconsistent", "noncentral F"),
         ("F(1, 18) = 0.00, p = .90", "inconsistent", "gives p = .9"),
         ("r(48) = .31, p = 1.2", "inconsistent", "no probability"),
+        ("F(1, 20) = 1,234.56, p = .33", "decision", "gives p = 1.9e-19"),
+        ("t(30) = 5.37, p = 8.2e-05", "inconsistent", "gives p = 8.1e-06 to 8.3e-06"),
+        ("t(20) = 1.80, one-tailed p = .087", "decision", "gives p = .04"),
+        ("t(20) = 2.60, p = .001, Bonferroni-corrected", "inconsistent", "gives p = .017 to 1.000"),
     ],
 )
 def test_what_does_not_fit_is_told(text, verdict, why) -> None:
@@ -61,6 +74,13 @@ def test_each_statistic_has_its_own_p_and_what_is_unread_is_said() -> None:
     )
     assert [s.verdict for s in result.statistics] == ["unchecked", "consistent"]
     assert [fragment[:5] for fragment in result.unread] == ["F(3) ", "p = ."]
+
+
+@pytest.mark.parametrize("text", ["F(1; 20) = 4,35; p = 0,003", "t(19) = 2,10; p = 0,049", "z = 2,33"])
+def test_numbers_with_a_decimal_comma_are_told_as_unread(text) -> None:
+    result = check_text(plain(text))
+    assert result.statistics == ()
+    assert bool(result.unread) == ("p = " in text)
 
 
 def test_html_and_tex_are_read_as_their_readers_see_them() -> None:
