@@ -1,9 +1,7 @@
 """`server database go-back`: a SQLite database as a snapshot has it, with what was there before set aside."""
 
 import shutil
-import sqlite3
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
@@ -13,6 +11,7 @@ from server.accounts.audit import record
 from server.clock import iso, now
 from server.db import open_database
 from server.operations.repository import run_counts
+from server.operations.snapshot_repository import closed_to_others, put_into_one_file
 from server.operations.snapshots import Snapshot, aside, database_file, erase_again, snapshots_of
 from server.settings import Settings
 
@@ -51,7 +50,7 @@ def go_back(settings: Settings, snapshot: Snapshot, told: Callable[[str], None])
     path = database_file(settings)
     before = aside(path, now())
     coming = path.with_name(f".{path.name}.coming")
-    with _closed_to_others(path):
+    with closed_to_others(path):
         try:
             shutil.copyfile(snapshot.path, coming)
             coming.chmod(0o600)
@@ -78,8 +77,7 @@ def _note(settings: Settings, coming: Path, snapshot: Snapshot) -> None:
             record(session, None, "database taken back", "database", iso(snapshot.taken_at))
     finally:
         database.close()
-    with closing(sqlite3.connect(coming)) as connection:
-        connection.execute("PRAGMA journal_mode=DELETE")
+    put_into_one_file(coming)
 
 
 def runs_in(settings: Settings) -> int:
@@ -90,23 +88,3 @@ def runs_in(settings: Settings) -> int:
             return sum(int(count) for *_, count in run_counts(session))
     finally:
         database.close()
-
-
-@contextmanager
-def _closed_to_others(path: Path) -> Iterator[None]:
-    """Hold the database alone; one that is damaged beyond opening is let through: it is to be replaced."""
-    if not path.is_file():
-        yield
-        return
-    with closing(sqlite3.connect(path, timeout=1, isolation_level=None)) as connection:
-        try:
-            # SQLite leaves WAL mode only where nobody else has the file open; what waited goes into it then.
-            connection.execute("PRAGMA journal_mode=DELETE").fetchone()
-            connection.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError as error:
-            raise InputError(
-                f"another program has {path} open ({error}); stop the server first, nothing was changed"
-            ) from error
-        except sqlite3.DatabaseError:
-            pass
-        yield

@@ -3,7 +3,6 @@
 import os
 import sqlite3
 from collections.abc import Iterable
-from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -14,6 +13,7 @@ from server.db import checked_url, open_database
 from server.migrate import upgrade
 from server.operations.erasures import ledger
 from server.operations.locking import locked
+from server.operations.snapshot_repository import copied, put_into_one_file
 from server.runs.erasure import replay
 from server.settings import Settings
 
@@ -107,14 +107,9 @@ def take_snapshot(settings: Settings) -> Snapshot:
 
 
 def _copy(source: Path, temporary: Path, target: Path) -> None:
-    """By SQLite's backup API, in one step: it sees one moment, and in WAL mode holds up no writer."""
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     try:
-        with closing(sqlite3.connect(source)) as reading, closing(sqlite3.connect(temporary)) as writing:
-            reading.backup(writing)
-            writing.execute("PRAGMA journal_mode=DELETE")  # one file, which says all by itself
-            (said,) = writing.execute("PRAGMA quick_check(1)").fetchone()
-        if said != "ok":
+        if (said := copied(source, temporary)) != "ok":
             raise InputError(f"{source} is not sound: {said.splitlines()[-1]}; run: server doctor")
         with temporary.open("rb") as written:
             os.fsync(written.fileno())
@@ -199,7 +194,6 @@ def erase_again(settings: Settings, snapshot: Path) -> int:
             erased = replay(session, settings)
     finally:
         database.close()
-    with closing(sqlite3.connect(snapshot)) as connection:
-        connection.execute("PRAGMA journal_mode=DELETE")
+    put_into_one_file(snapshot)
     os.utime(snapshot)
     return erased
