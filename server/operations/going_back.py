@@ -11,8 +11,8 @@ from server.accounts.audit import record
 from server.clock import iso, now
 from server.db import open_database
 from server.operations.repository import run_counts
-from server.operations.snapshot_repository import closed_to_others, put_into_one_file
-from server.operations.snapshots import Snapshot, aside, database_file, erase_again, snapshots_of
+from server.operations.snapshot_repository import closed_to_others
+from server.operations.snapshots import Snapshot, aside, database_file, erase_again, opened_copy, snapshots_of
 from server.settings import Settings
 
 BESIDE = ("", "-wal", "-shm")
@@ -71,13 +71,8 @@ def go_back(settings: Settings, snapshot: Snapshot, told: Callable[[str], None])
 
 def _note(settings: Settings, coming: Path, snapshot: Snapshot) -> None:
     """In the audit log, which goes back too."""
-    database = open_database(settings.model_copy(update={"database_url": f"sqlite:///{coming.resolve()}"}))
-    try:
-        with database.write() as session:
-            record(session, None, "database taken back", "database", iso(snapshot.taken_at))
-    finally:
-        database.close()
-    put_into_one_file(coming)
+    with opened_copy(settings, coming) as database, database.write() as session:
+        record(session, None, "database taken back", "database", iso(snapshot.taken_at))
 
 
 def runs_in(settings: Settings) -> int:

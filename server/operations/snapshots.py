@@ -2,14 +2,15 @@
 
 import os
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from experiments.errors import InputError
 from server.clock import now
-from server.db import checked_url, open_database
+from server.db import Database, checked_url, open_database
 from server.migrate import upgrade
 from server.operations.erasures import ledger
 from server.operations.locking import locked
@@ -187,13 +188,20 @@ def erase_in_snapshots(settings: Settings) -> int:
 
 def erase_again(settings: Settings, snapshot: Path) -> int:
     """Bring a copy to the newest revision and erase in it what the ledger names; return how many runs."""
-    database = open_database(settings.model_copy(update={"database_url": f"sqlite:///{snapshot.resolve()}"}))
-    try:
+    with opened_copy(settings, snapshot) as database:
         upgrade(database)
         with database.write() as session:
             erased = replay(session, settings)
-    finally:
-        database.close()
-    put_into_one_file(snapshot)
     os.utime(snapshot)
     return erased
+
+
+@contextmanager
+def opened_copy(settings: Settings, path: Path) -> Iterator[Database]:
+    """A copy as the server opens its database; one file again afterwards."""
+    database = open_database(settings.model_copy(update={"database_url": f"sqlite:///{path.resolve()}"}))
+    try:
+        yield database
+    finally:
+        database.close()
+    put_into_one_file(path)
