@@ -30,7 +30,7 @@ STARTED = (
     "analysis.models.mixed",
     "analysis.models.ordinal",
     "analysis.plans.clip_rating",
-    "analysis.plans.prepare",
+    "analysis.plans.study",
     "analysis.plans.sensitivity",
     "analysis.read.database",
     "analysis.report.figures",

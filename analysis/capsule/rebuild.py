@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from analysis.plans.plan import plan_of
-from analysis.plans.prepare import study_contents
+from analysis.plans.study import study_contents
 from analysis.read.pool import Origin, Pool
 from analysis.read.runs_file import read_runs
 from analysis.read.study_answers import load_csv

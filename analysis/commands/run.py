@@ -116,7 +116,7 @@ def run(
     """
     from analysis.errors import NoRatingsError
     from analysis.plans.plan import plan_of
-    from analysis.plans.prepare import study_contents
+    from analysis.plans.study import study_contents
     from analysis.read.pool import Origin as PoolOrigin
     from analysis.read.pool import Pool
     from analysis.read.runs_file import read_runs

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.plans.plan import Plan
-from analysis.plans.prepare import Prepared, where
+from analysis.plans.prepare import where
+from analysis.plans.prepared import Prepared
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from analysis.traces.lag import ClipTraces, MeanTrace, lag_of, mean_trace

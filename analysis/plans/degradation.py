@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
 from analysis.plans.result import labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part

@@ -8,27 +8,15 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from analysis.plans.exclusions import Exclusions, judged
-from analysis.plans.prepare import Prepared
-from analysis.plans.result import Analysis
-from analysis.plans.sensitivity import MAX_RATINGS
-from analysis.report.captions import caption
-from analysis.report.contents import Section
-from analysis.report.formats import Table
-from analysis.report.numbers import p_value, share
+from analysis.plans.prepared import Prepared
 from analysis.within.anova import AnovaResult
 from analysis.within.cell_means import CellTable
-from analysis.within.simple_effects import SIGNIFICANCE
 from experiments.definition import Experiment
 from experiments.errors import InputError
 
 MAX_RULES = 6
 """With more rules each is left out alone, and all are: 2 to the power of their number would keep waiting."""
-
-TITLE = "Multiverse of exclusions"
 
 
 @dataclass(frozen=True)
@@ -172,56 +160,3 @@ def rule_names(experiment: Experiment) -> tuple[str, ...]:
         kind if kinds.count(kind) == 1 else f"{kind} ({kinds[: position + 1].count(kind)})"
         for position, kind in enumerate(kinds)
     )
-
-
-def multiverse_section(analysis: Analysis, prepared: Prepared, analyse: Analyse) -> Section:
-    """The section of the report: how far the tests hang on the rules."""
-    if not prepared.experiment.exclusions:
-        return Section(TITLE, "The experiment declares no exclusion rule, so that there is nothing to vary.")
-    if len(prepared.checked.rows) > MAX_RATINGS:
-        said = f"{len(prepared.checked.rows)} ratings are more than {MAX_RATINGS}."
-        return Section(TITLE, f"Not computed: {said}")
-    # matplotlib takes a second to import, which commands that draw nothing need not pay
-    from analysis.report.multiverse_figure import multiverse_picture
-
-    result = multiverse(prepared, analyse)
-    choices = "every choice among" if len(result.rules) <= MAX_RULES else "leaving out one or all of"
-    text = (
-        f"The tests under {choices} the {len(result.rules)} declared exclusion rules: "
-        f"{len(result.universes)} analyses. Exclusions by hand always apply."
-    )
-    if result.n_failed:
-        text += f" {result.n_failed} further choices could not be analysed."
-    picture = multiverse_picture(analysis, result)
-    return Section(TITLE, text, (_table(analysis, result),), (picture,))
-
-
-def _table(analysis: Analysis, result: Multiverse) -> Table:
-    p = np.array([universe.p_values for universe in result.universes])
-    sizes = np.array([universe.sizes for universe in result.universes])
-    declared = next(universe for universe in result.universes if universe.declared)
-    rows = tuple(
-        (
-            analysis.labels.effect(factors),
-            p_value(declared.p_values[i]),
-            _range([p_value(value) for value in _ends(p[:, i])]),
-            f"{int((p[:, i] < SIGNIFICANCE).sum())} of {len(p)}",
-            _range([share(value) for value in _ends(sizes[:, i])]),
-        )
-        for i, factors in enumerate(result.effects)
-    )
-    people = [universe.n_participants for universe in result.universes]
-    header = ("Effect", "p as declared", "p", f"p < {share(SIGNIFICANCE, 2)}", "partial η²")
-    notes = (f"N = {_range([str(min(people)), str(max(people))])}. p by Greenhouse-Geisser.",)
-    title = caption("Tests under other exclusions", analysis.name, analysis.synthetic)
-    return Table("multiverse", title, header, rows, 1, notes)
-
-
-def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Smallest and largest of the values there are; NaN where there is none."""
-    given = values[np.isfinite(values)]
-    return (float(given.min()), float(given.max())) if given.size else (np.nan, np.nan)
-
-
-def _range(ends: list[str]) -> str:
-    return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"

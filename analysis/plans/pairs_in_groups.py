@@ -11,9 +11,9 @@ from analysis.pairs.abilities import fit_abilities
 from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.findings import LikelihoodRatio
 from analysis.pairs.likelihood import Method
-from analysis.plans.paired_comparison import comparisons_of
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
 from analysis.plans.result import labels_of
+from analysis.plans.study_comparisons import comparisons_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part
 from analysis.report.formats import Table

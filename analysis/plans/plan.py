@@ -14,7 +14,7 @@ from analysis.read.reading import Reading
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from analysis.plans.prepare import Prepared
+    from analysis.plans.prepared import Prepared
     from analysis.report.contents import Contents
     from experiments.definition import Experiment
 

@@ -1,68 +1,19 @@
 """From a study's rows to those that count, whatever the kind of trial: one pool, declared exclusions."""
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from analysis.errors import NoRatingsError
 from analysis.plans.exclusions import Exclusions, apply_exclusions
-from analysis.plans.plan import Plan, plan_of
+from analysis.plans.plan import Plan
+from analysis.plans.prepared import Prepared
 from analysis.read.pool import Pool, origins, pooled
-from analysis.read.runs_file import RunEvidence, with_verdicts
 from analysis.read.study_answers import StudyAnswers
-from analysis.report.evidence import evidence_section
 from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.schema.canonical import definition_sha256
-from experiments.trials.scales import scale_called
-
-if TYPE_CHECKING:
-    from analysis.report.contents import Contents
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """What a plan analyses: the main trials that count, what was left out, and every decision on the way."""
-
-    experiment: Experiment
-    source: str
-    synthetic: bool
-    exclusions: Exclusions
-    decisions: tuple[str, ...]
-    checked: StudyAnswers = field(repr=False)
-    """The answers before exclusion."""
-    scale: str | None = None
-    """The scale to analyse, where not all are."""
-
-    @property
-    def rows(self) -> pd.DataFrame:
-        """Main trials with an answer, of the runs that remain."""
-        return self.exclusions.rows
-
-
-def study_contents(
-    experiment: Experiment,
-    answers: StudyAnswers,
-    pool: Pool = Pool(),
-    runs: RunEvidence | None = None,
-    scale: str | None = None,
-) -> "Contents":
-    """Analyse a study by the plan of its kind of trial.
-
-    `runs` are verdicts and signals of a runs file; `scale` names the one to analyse, where not all are.
-    """
-    plan = plan_of(experiment.trial.kind)
-    if scale is not None:
-        scale_called(experiment, scale)
-    answers = with_verdicts(answers, runs) if runs else answers
-    contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
-    chosen, _ = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
-    evidence, numbers = evidence_section(chosen, runs)
-    if evidence is None:
-        return contents
-    return replace(contents, evidence=evidence, numbers=contents.numbers | {"evidence": numbers})
 
 
 def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Pool = Pool()) -> Prepared:

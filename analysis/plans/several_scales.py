@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.plans.clip_rating import analyse, further_sections, on_scale
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
+from analysis.plans.rating_tests import analyse, further_sections, on_scale
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Progress, Section

@@ -1,28 +1,16 @@
 """The analysis of thresholds over two factors: a function with a line of thresholds for each series."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from analysis.plans.prepare import Prepared
-from analysis.plans.threshold import Difference, answers_of, differences, series_labels
+from analysis.plans.prepared import Prepared
+from analysis.plans.series_answers import answers_of, series_labels
 from analysis.report.contents import Contents
 from analysis.thresholds.people import Answers
-from analysis.thresholds.plane import Points
-from analysis.thresholds.plane_people import PlanesResult, fit_planes, points_of
+from analysis.thresholds.plane_people import SeriesPlane, fit_planes, points_of
+from analysis.thresholds.series import Difference, differences
 from experiments.errors import InputError
 from experiments.trials.threshold.declaration import Threshold, threshold_of
 from experiments.trials.threshold.grid import model
-
-
-@dataclass(frozen=True)
-class SeriesPlane:
-    """One series: its trials by stimulus, and its fits; `result` is None where `reason` says why not."""
-
-    name: str
-    label: str
-    points: Points
-    result: PlanesResult | None
-    reason: str | None
 
 
 def analyse(prepared: Prepared) -> Contents:

@@ -10,7 +10,7 @@ from analysis.within.multivariate_tests import MultivariateTest
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
-    from analysis.plans.prepare import Prepared
+    from analysis.plans.prepared import Prepared
 
 
 _OF_SIMPLE = ("univariate", "multivariate", "mauchly", "eta_sq_partial", "eta_sq_partial_ci")

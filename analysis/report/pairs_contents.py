@@ -8,7 +8,7 @@ from analysis.pairs.abilities import PairsResult
 from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.factors import FactorTest, ItemFactors
 from analysis.pairs.findings import Findings
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
 from analysis.plans.result import Labels, labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture
 from analysis.report.formats import Table
@@ -20,8 +20,8 @@ from analysis.thresholds.plane_people import PlanesResult
 from experiments.trials.threshold.declaration import threshold_of
 
 if TYPE_CHECKING:
-    from analysis.plans.threshold import Difference
-    from analysis.plans.threshold_plane import SeriesPlane
+    from analysis.thresholds.plane_people import SeriesPlane
+    from analysis.thresholds.series import Difference
 
 METHODS = (
     "P(x, z) = guess + (1 - guess - lapse) F((x - t - b (z - z0)) / s), F the normal distribution "

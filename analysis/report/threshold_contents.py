@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
+from analysis.plans.series_answers import answers_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture
 from analysis.report.formats import Table
@@ -22,7 +23,7 @@ from analysis.thresholds.psychometric import Threshold
 from experiments.trials.threshold.declaration import threshold_of
 
 if TYPE_CHECKING:
-    from analysis.plans.threshold import Difference, SeriesFit
+    from analysis.thresholds.series import Difference, SeriesFit
 
 METHODS = (
     "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and lapse "
@@ -77,8 +78,6 @@ def _r_files(
     prepared: Prepared, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]", key: str
 ) -> dict[str, bytes]:
     """The script that fits every function anew in R, and its trials."""
-    from analysis.plans.threshold import answers_of
-
     return threshold_files(prepared.experiment.title, fits, answers_of(prepared), differences, key)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
 from analysis.plans.result import labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part, Picture

@@ -57,6 +57,17 @@ class PlanesResult:
     population: dict[str, PopulationPlane] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class SeriesPlane:
+    """One series: its trials by stimulus, and its fits; `result` is None where `reason` says why not."""
+
+    name: str
+    label: str
+    points: Points
+    result: PlanesResult | None
+    reason: str | None
+
+
 def fit_planes(
     answers: Answers,
     shape: PlaneShape,

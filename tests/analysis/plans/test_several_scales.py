@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from analysis.plans.clip_rating import READING
-from analysis.plans.prepare import study_contents
+from analysis.plans.study import study_contents
 from analysis.read.study_answers import load_csv
 from analysis.report.write import write_report
 from experiments import design

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.plans.prepare import study_contents
+from analysis.plans.study import study_contents
 from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents

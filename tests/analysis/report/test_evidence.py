@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.plans.clip_rating import READING
-from analysis.plans.prepare import study_contents
+from analysis.plans.study import study_contents
 from analysis.read.runs_file import read_runs
 from analysis.read.study_answers import load_csv
 from analysis.report.write import write_report

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from analysis.plans.paired_comparison import READING as PAIRS
-from analysis.plans.prepare import study_contents
+from analysis.plans.study import study_contents
 from analysis.plans.threshold import READING as THRESHOLDS
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents

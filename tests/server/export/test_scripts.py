@@ -34,7 +34,7 @@ def run(command: list[str]) -> str:
 def own_f(answers: Path) -> float:
     """F of the first effect by this repository's own analysis of the same file."""
     from analysis.plans.plan import plan_of
-    from analysis.plans.prepare import study_contents
+    from analysis.plans.study import study_contents
     from analysis.read.study_answers import load_csv
 
     contents = study_contents(EXP3, load_csv(answers, EXP3, plan_of("clip_rating").reading))

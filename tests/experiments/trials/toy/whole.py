@@ -25,7 +25,7 @@ from fastapi.testclient import TestClient  # noqa: E402
 from sqlalchemy import text  # noqa: E402
 
 from analysis.plans.plan import plan_of  # noqa: E402
-from analysis.plans.prepare import study_contents  # noqa: E402
+from analysis.plans.study import study_contents  # noqa: E402
 from analysis.read.study_answers import load_csv, load_database  # noqa: E402
 from analysis.report.write import write_report  # noqa: E402
 from experiments.schema.stored import load_stored  # noqa: E402

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from analysis.plans.plan import Plan
-from analysis.plans.prepare import Prepared
+from analysis.plans.prepared import Prepared
 from analysis.read.reading import Reading
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part
