@@ -13,7 +13,7 @@ class Texts(Declaration):
     debrief: str
     """Last page: what the study is about. Shown after the last answer only."""
     practice: str = ""
-    """Page before the practice trials; empty shows a title of the page's own."""
+    """Page before the practice trials; empty shows how many there are, and that they do not count."""
     block_break: str = ""
     """Page between blocks; empty shows a few words of the page's own."""
     screened_out: str = ""

@@ -8834,7 +8834,7 @@ export interface components {
             debrief: string;
             /**
              * Practice
-             * @description Page before the practice trials; empty shows a title of the page's own.
+             * @description Page before the practice trials; empty shows how many there are, and that they do not count.
              * @default
              */
             practice: string;

@@ -6,15 +6,14 @@
  */
 import { initJsPsych, ParameterType, type JsPsych } from "jspsych";
 
-type Declared = { type: ParameterType; description: string };
 export const { INT, FLOAT, STRING, BOOL, OBJECT } = ParameterType;
 export type SimulationMode = "visual" | "data-only";
 
 export interface Screen<Parameters extends object, Data extends object> {
   name: string;
-  /** What the timeline gives, and what the trial records. */
-  parameters: { [Name in keyof Required<Parameters>]: Declared };
-  data: { [Name in keyof Required<Data>]: Declared };
+  /** What the timeline gives, and what the trial records, by type; what each is stands beside it. */
+  parameters: { [Name in keyof Required<Parameters>]: ParameterType };
+  data: { [Name in keyof Required<Data>]: ParameterType };
   show(display: HTMLElement, parameters: Parameters): Promise<Data>;
   /** What a participant would have done, without showing anything. */
   simulate(parameters: Parameters): Data | Promise<Data>;
@@ -23,6 +22,10 @@ export interface Screen<Parameters extends object, Data extends object> {
 }
 
 const VERSION = "1.0.0";
+
+/** As jsPsych wants its declarations. */
+const declared = (types: Record<string, ParameterType>) =>
+  Object.fromEntries(Object.entries(types).map(([name, type]) => [name, { type }]));
 
 export interface PluginClass<Parameters> {
   new (jsPsych: JsPsych): object;
@@ -33,7 +36,7 @@ export interface PluginClass<Parameters> {
 
 export function plugin<Parameters extends object, Data extends object>(screen: Screen<Parameters, Data>): PluginClass<Parameters> {
   return class {
-    static readonly info = { name: screen.name, version: VERSION, parameters: screen.parameters, data: screen.data };
+    static readonly info = { name: screen.name, version: VERSION, parameters: declared(screen.parameters), data: declared(screen.data) };
     constructor(private readonly jsPsych: JsPsych) {}
 
     trial(display: HTMLElement, trial: Parameters): void {

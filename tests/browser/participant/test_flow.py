@@ -13,6 +13,7 @@ from tests.browser.visit import Visit, axe_violations
 from tests.helpers.databases import run_server_command
 
 pytestmark = pytest.mark.browser
+PRACTICE_PAGE = next(line for line in PLAIN.splitlines() if line.startswith('practice = "# Practice'))
 
 
 @pytest.mark.slow
@@ -71,6 +72,21 @@ def test_reading_at_200_percent_needs_no_sideways_scrolling(
     context.close()
     assert {name: px for name, px in wide.items() if px > 0} == {}
     assert len(wide) >= 7
+
+
+def test_steps_count_what_is_shown_and_practice_says_what_it_is(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    """Of a study that measures nothing the step of the screen is not counted."""
+    declared = without(PLAIN, (PRACTICE_PAGE, ""))
+    study = server.add_study(tmp_path / "clips", declared)
+    server.start()
+    steps: list[str] = []
+    visit = Visit(page, server.address, lambda _: steps.extend(page.locator(".eyebrow").all_inner_texts()))
+    visit.open(study.link_token).begin().instructions()
+    assert [step for step in steps if "of" in step] == ["Step 1 of 3", "Step 2 of 3", "Step 3 of 3"]
+    page.wait_for_selector("text=Practice clips: 1. These answers do not count.")
+    assert axe_violations(page) == []
 
 
 def test_by_touch_and_in_german(server: ServerProcess, tmp_path: Path, chromium: Browser) -> None:

@@ -114,6 +114,7 @@ export const messages: Messages = {
 
   practice_title: "تدريب",
   practice_note: "تدريب {number} من {total}",
+  practice_ahead: "مقاطع التدريب: {trials}. هذه الإجابات لا تُحسب.",
   practice_done_title: "انتهى التدريب",
   practice_done: {
     by: "trials",
@@ -182,15 +183,7 @@ export const messages: Messages = {
   break_ready: "يمكنك المتابعة متى شئت.",
   break_go_on: "متابعة",
   welcome_back_title: "أهلًا بعودتك",
-  welcome_back: {
-    by: "total",
-    zero: "تتابع من حيث توقفت: أُنجز {done} من {total} مقطع.",
-    one: "تتابع من حيث توقفت: أُنجز {done} من مقطع واحد ({total}).",
-    two: "تتابع من حيث توقفت: أُنجز {done} من مقطعين ({total}).",
-    few: "تتابع من حيث توقفت: أُنجز {done} من {total} مقاطع.",
-    many: "تتابع من حيث توقفت: أُنجز {done} من {total} مقطعًا.",
-    other: "تتابع من حيث توقفت: أُنجز {done} من {total} مقطع.",
-  },
+  welcome_back: "تتابع من حيث توقفت. المقاطع المنجزة: {done} من {total}.",
 
   finishing_title: "جارٍ حفظ إجاباتك الأخيرة",
   finishing_wait: {

@@ -100,6 +100,7 @@ export const messages: Messages = {
 
   practice_title: "Übung",
   practice_note: "Übung {number} von {total}",
+  practice_ahead: "Filme zur Übung: {trials}. Diese Antworten zählen nicht.",
   practice_done_title: "Das war die Übung",
   practice_done: {
     by: "trials",
@@ -153,11 +154,7 @@ export const messages: Messages = {
   break_ready: "Sie können weitermachen, wann Sie möchten.",
   break_go_on: "Weiter",
   welcome_back_title: "Willkommen zurück",
-  welcome_back: {
-    by: "total",
-    one: "Sie machen dort weiter, wo Sie aufgehört haben: {done} von {total} Film ist erledigt.",
-    other: "Sie machen dort weiter, wo Sie aufgehört haben: {done} von {total} Filmen sind erledigt.",
-  },
+  welcome_back: "Sie machen dort weiter, wo Sie aufgehört haben. Filme erledigt: {done} von {total}.",
 
   finishing_title: "Ihre letzten Antworten werden gespeichert",
   finishing_wait: {

@@ -99,6 +99,7 @@ export const messages = {
 
   practice_title: "Practice",
   practice_note: "Practice {number} of {total}",
+  practice_ahead: "Practice clips: {trials}. These answers do not count.",
   practice_done_title: "That was the practice",
   practice_done: {
     by: "trials",
@@ -152,11 +153,7 @@ export const messages = {
   break_ready: "You can go on whenever you like.",
   break_go_on: "Go on",
   welcome_back_title: "Welcome back",
-  welcome_back: {
-    by: "total",
-    one: "You go on where you stopped: {done} of {total} clip is done.",
-    other: "You go on where you stopped: {done} of {total} clips are done.",
-  },
+  welcome_back: "You go on where you stopped. Clips done: {done} of {total}.",
 
   finishing_title: "Saving your last answers",
   finishing_wait: {

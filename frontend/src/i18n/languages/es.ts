@@ -100,6 +100,7 @@ export const messages: Messages = {
 
   practice_title: "Práctica",
   practice_note: "Práctica {number} de {total}",
+  practice_ahead: "Vídeos de práctica: {trials}. Estas respuestas no cuentan.",
   practice_done_title: "Esa fue la práctica",
   practice_done: {
     by: "trials",
@@ -152,11 +153,7 @@ export const messages: Messages = {
   break_ready: "Puede continuar cuando quiera.",
   break_go_on: "Continuar",
   welcome_back_title: "Bienvenido de nuevo",
-  welcome_back: {
-    by: "total",
-    one: "Sigue donde lo dejó: {done} de {total} vídeo está hecho.",
-    other: "Sigue donde lo dejó: {done} de {total} vídeos están hechos.",
-  },
+  welcome_back: "Sigue donde lo dejó. Vídeos hechos: {done} de {total}.",
 
   finishing_title: "Guardando sus últimas respuestas",
   finishing_wait: {

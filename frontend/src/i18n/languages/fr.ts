@@ -105,6 +105,7 @@ export const messages: Messages = {
 
   practice_title: "Entraînement",
   practice_note: "Entraînement {number} sur {total}",
+  practice_ahead: "Vidéos d’entraînement : {trials}. Ces réponses ne comptent pas.",
   practice_done_title: "L’entraînement est terminé",
   practice_done: {
     by: "trials",
@@ -157,11 +158,7 @@ export const messages: Messages = {
   break_ready: "Vous pouvez continuer quand vous voulez.",
   break_go_on: "Continuer",
   welcome_back_title: "Bon retour",
-  welcome_back: {
-    by: "total",
-    one: "Vous reprenez où vous vous étiez arrêté : {done} vidéo sur {total} est terminée.",
-    other: "Vous reprenez où vous vous étiez arrêté : {done} vidéos sur {total} sont terminées.",
-  },
+  welcome_back: "Vous reprenez où vous vous étiez arrêté. Vidéos terminées : {done} sur {total}.",
 
   finishing_title: "Enregistrement de vos dernières réponses",
   finishing_wait: {

@@ -101,6 +101,7 @@ export const messages: Messages = {
 
   practice_title: "Prova",
   practice_note: "Prova {number} di {total}",
+  practice_ahead: "Video di prova: {trials}. Queste risposte non contano.",
   practice_done_title: "La prova è finita",
   practice_done: {
     by: "trials",
@@ -153,11 +154,7 @@ export const messages: Messages = {
   break_ready: "Può continuare quando vuole.",
   break_go_on: "Continua",
   welcome_back_title: "Bentornato",
-  welcome_back: {
-    by: "total",
-    one: "Riprende da dove si era fermato: {done} di {total} video è fatto.",
-    other: "Riprende da dove si era fermato: {done} di {total} video sono fatti.",
-  },
+  welcome_back: "Riprende da dove si era fermato. Video fatti: {done} di {total}.",
 
   finishing_title: "Salvataggio delle Sue ultime risposte",
   finishing_wait: {

@@ -94,6 +94,7 @@ export const messages: Messages = {
 
   practice_title: "練習",
   practice_note: "練習 {number} / {total}",
+  practice_ahead: "練習の動画は{trials}本です。ここでの回答は結果に含まれません。",
   practice_done_title: "練習は終わりです",
   practice_done: { by: "trials", other: "ここからの回答が本番です。動画は全部で{trials}本です。" },
   practice_parts: "約{block}本ずつに分かれ、間に休憩があります。",
@@ -138,7 +139,7 @@ export const messages: Messages = {
   break_ready: "いつでも続けられます。",
   break_go_on: "続ける",
   welcome_back_title: "お帰りなさい",
-  welcome_back: { by: "total", other: "前回の続きから始めます。動画 {total}本中{done}本が終わっています。" },
+  welcome_back: "前回の続きから始めます。動画 {total}本中{done}本が終わっています。",
 
   finishing_title: "最後の回答を保存しています",
   finishing_wait: { by: "count", other: "あと{count}件を送信します。このページを開いたままにしてください。" },

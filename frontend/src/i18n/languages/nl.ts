@@ -98,6 +98,7 @@ export const messages: Messages = {
 
   practice_title: "Oefening",
   practice_note: "Oefening {number} van {total}",
+  practice_ahead: "Oefenfilmpjes: {trials}. Deze antwoorden tellen niet mee.",
   practice_done_title: "Dat was de oefening",
   practice_done: {
     by: "trials",
@@ -150,11 +151,7 @@ export const messages: Messages = {
   break_ready: "U kunt verder wanneer u wilt.",
   break_go_on: "Verder",
   welcome_back_title: "Welkom terug",
-  welcome_back: {
-    by: "total",
-    one: "U gaat verder waar u gebleven was: {done} van {total} filmpje is klaar.",
-    other: "U gaat verder waar u gebleven was: {done} van {total} filmpjes zijn klaar.",
-  },
+  welcome_back: "U gaat verder waar u gebleven was. Filmpjes klaar: {done} van {total}.",
 
   finishing_title: "Uw laatste antwoorden worden opgeslagen",
   finishing_wait: {

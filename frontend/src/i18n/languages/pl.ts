@@ -112,6 +112,7 @@ export const messages: Messages = {
 
   practice_title: "Ćwiczenie",
   practice_note: "Ćwiczenie {number} z {total}",
+  practice_ahead: "Filmy ćwiczeniowe: {trials}. Te odpowiedzi się nie liczą.",
   practice_done_title: "To było ćwiczenie",
   practice_done: {
     by: "trials",
@@ -174,13 +175,7 @@ export const messages: Messages = {
   break_ready: "Można kontynuować w dowolnej chwili.",
   break_go_on: "Dalej",
   welcome_back_title: "Witamy ponownie",
-  welcome_back: {
-    by: "total",
-    one: "Dalej od miejsca przerwania: gotowe {done} z {total} filmu.",
-    few: "Dalej od miejsca przerwania: gotowe {done} z {total} filmów.",
-    many: "Dalej od miejsca przerwania: gotowe {done} z {total} filmów.",
-    other: "Dalej od miejsca przerwania: gotowe {done} z {total} filmu.",
-  },
+  welcome_back: "Dalej od miejsca przerwania. Gotowe filmy: {done} z {total}.",
 
   finishing_title: "Zapisywanie ostatnich odpowiedzi",
   finishing_wait: {

@@ -99,6 +99,7 @@ export const messages: Messages = {
 
   practice_title: "Treino",
   practice_note: "Treino {number} de {total}",
+  practice_ahead: "Vídeos de treino: {trials}. Estas respostas não contam.",
   practice_done_title: "O treino terminou",
   practice_done: {
     by: "trials",
@@ -151,11 +152,7 @@ export const messages: Messages = {
   break_ready: "Pode continuar quando quiser.",
   break_go_on: "Continuar",
   welcome_back_title: "Bem-vindo de volta",
-  welcome_back: {
-    by: "total",
-    one: "Continua onde parou: {done} de {total} vídeo está feito.",
-    other: "Continua onde parou: {done} de {total} vídeos estão feitos.",
-  },
+  welcome_back: "Continua onde parou. Vídeos feitos: {done} de {total}.",
 
   finishing_title: "A guardar as suas últimas respostas",
   finishing_wait: {

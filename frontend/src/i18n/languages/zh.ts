@@ -91,6 +91,7 @@ export const messages: Messages = {
 
   practice_title: "练习",
   practice_note: "练习 {number}，共 {total}",
+  practice_ahead: "练习短片共 {trials} 段，这些回答不计入结果。",
   practice_done_title: "练习结束",
   practice_done: { by: "trials", other: "从现在起您的回答会被计入。共有 {trials} 段短片。" },
   practice_parts: "每部分约 {block} 段，中间有休息。",
@@ -135,7 +136,7 @@ export const messages: Messages = {
   break_ready: "您可以随时继续。",
   break_go_on: "继续",
   welcome_back_title: "欢迎回来",
-  welcome_back: { by: "total", other: "您从上次停下的地方继续：已完成 {done} 段短片，共 {total} 段。" },
+  welcome_back: "您从上次停下的地方继续：已完成 {done} 段短片，共 {total} 段。",
 
   finishing_title: "正在保存您最后的回答",
   finishing_wait: { by: "count", other: "还有 {count} 个回答要发送。请保持此页面打开。" },

@@ -32,7 +32,7 @@ export function practiceNodes(session: Session): Node[] {
   if (trials.length === 0) return [];
   const head = run.blocks[0];
   const first = head?.block ?? null;
-  const text = run.texts.practice || `# ${t("practice_title")}`;
+  const text = run.texts.practice || `# ${t("practice_title")}\n\n${t("practice_ahead", { trials: trials.length })}`;
   const total = counted(run).length;
   const remarks = [t("practice_done", { trials: total })];
   if (head && run.blocks.length > 1) remarks.push(t("practice_parts", { block: head.trials }));

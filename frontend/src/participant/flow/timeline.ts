@@ -28,22 +28,25 @@ function beginning(session: Session): Node[] {
     steps.push((eyebrow) => stageNode(session, "forms_before", trial(formPage(session), { eyebrow, form })));
   }
   if (trialsLeft(session)) {
-    steps.push((eyebrow) => screenNode(session, eyebrow));
+    // Only where it will show something: steps that are counted and never come read as a fault. A window made smaller
+    // later is put right before the first trial.
+    if (needsScreenSetup(session) || needsSize(session)) steps.push((eyebrow) => screenNode(session, eyebrow));
     steps.push((eyebrow) => stageNode(session, "instructions", introduction(session, eyebrow)));
   }
   const total = steps.length;
   return steps.map((make, index) => make(t("step", { step: index + 1, steps: total })));
 }
 
+const needsSize = ({ run, screen }: Session): boolean => run.display.calibrate !== "off" && screen.calibration === null;
+
 function screenNode(session: Session, eyebrow: string): Node {
-  const { run, screen } = session;
   const setup: Node = {
     timeline: [trial(screenSetup(session), { eyebrow, again: false })],
     conditional_function: () => needsScreenSetup(session),
   };
   const measure: Node = {
     timeline: [trial(calibration(session), { eyebrow, occasion: "first" })],
-    conditional_function: () => run.display.calibrate !== "off" && screen.calibration === null,
+    conditional_function: () => needsSize(session),
   };
   return stageNode(session, "calibration", { timeline: [setup, measure] });
 }

@@ -19,11 +19,11 @@ export function blockBreak(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "block-break",
     parameters: {
-      block: { type: INT, description: "the block that comes next" },
-      blocks: { type: INT, description: "how many blocks there are" },
-      seconds_min: { type: INT, description: "shortest rest in seconds" },
+      block: INT, // the block that comes next
+      blocks: INT, // how many blocks there are
+      seconds_min: INT, // shortest rest in seconds
     },
-    data: { rested_ms: { type: INT, description: "length of the rest in ms" } },
+    data: { rested_ms: INT }, // length of the rest in ms
     show: async (display, parameters) => (await loadRest()).rest(session, display, parameters),
     simulate: () => ({ rested_ms: 0 }),
     act: (display) => pressWhile(display, ".break", [".primary"]),

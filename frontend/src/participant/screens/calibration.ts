@@ -21,13 +21,13 @@ export function calibration(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "calibration",
     parameters: {
-      eyebrow: { type: STRING, description: "small line above the title" },
-      occasion: { type: STRING, description: "first, screen_changed or recheck" },
+      eyebrow: STRING, // small line above the title
+      occasion: STRING, // first, screen_changed or recheck
     },
     data: {
-      px_per_mm: { type: FLOAT, description: "CSS pixels per millimetre, null where skipped" },
-      method: { type: STRING, description: "card or ruler" },
-      checked: { type: BOOL, description: "true where an earlier size was looked at once more and holds" },
+      px_per_mm: FLOAT, // CSS pixels per millimetre, null where skipped
+      method: STRING, // card or ruler
+      checked: BOOL, // true where an earlier size was looked at once more and holds
     },
     show: async (display, { eyebrow, occasion }) => (await loadCalibration()).calibrate(session, display, eyebrow, occasion),
     simulate: async () => (await loadCalibration()).simulate(session),

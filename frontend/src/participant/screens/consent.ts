@@ -18,8 +18,8 @@ interface Data {
 export function consent(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "consent",
-    parameters: { eyebrow: { type: STRING, description: "small line above the title" } },
-    data: { agreed: { type: BOOL, description: "always true: without consent there is no data" } },
+    parameters: { eyebrow: STRING }, // small line above the title
+    data: { agreed: BOOL }, // always true: without consent there is no data
     show: (display, { eyebrow }) => new Promise((resolve) => showConsent(session, display, eyebrow, () => resolve({ agreed: true }))),
     simulate: async () => {
       await session.api.consent();

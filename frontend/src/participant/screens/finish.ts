@@ -26,8 +26,8 @@ const MISSING = ["ratings_missing", "forms_missing"];
 export function finish(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "finish",
-    parameters: { token: { type: STRING, description: "the run's token" } },
-    data: { completion_code: { type: STRING, description: "as given by the server" } },
+    parameters: { token: STRING }, // the run's token
+    data: { completion_code: STRING }, // as given by the server
     show: (display, { token }) => complete(session, display, token),
     async simulate({ token }) {
       await session.outbox.drained();

@@ -22,10 +22,10 @@ export function formPage(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "form",
     parameters: {
-      eyebrow: { type: STRING, description: "small line above the title" },
-      form: { type: OBJECT, description: "the declared form" },
+      eyebrow: STRING, // small line above the title
+      form: OBJECT, // the declared form
     },
-    data: { answers: { type: OBJECT, description: "answers by field name, null where left open" } },
+    data: { answers: OBJECT }, // answers by field name, null where left open
     show: (display, { form, eyebrow }) => new Promise((resolve) => showForm(session, display, form, eyebrow, resolve)),
     async simulate({ form }) {
       const answers = Object.fromEntries(form.fields.map((field) => [field.name, typeOf(field).simulated(field)]));

@@ -34,13 +34,13 @@ export function preloadPage(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "preload-clips",
     parameters: {
-      eyebrow: { type: STRING, description: "small line above the title" },
-      trials: { type: OBJECT, description: "trials whose clips must be here" },
+      eyebrow: STRING, // small line above the title
+      trials: OBJECT, // trials whose clips must be here
     },
     data: {
-      clips: { type: INT, description: "clips of the block" },
-      failed: { type: INT, description: "clips that could not be had" },
-      waited_ms: { type: INT, description: "time on the screen in ms" },
+      clips: INT, // clips of the block
+      failed: INT, // clips that could not be had
+      waited_ms: INT, // time on the screen in ms
     },
     show: (display, { eyebrow, trials }) => waitForClips(session, display, eyebrow, sourcesOf(trials)),
     simulate: ({ trials }) => ({ clips: sourcesOf(trials).length, failed: 0, waited_ms: 0 }),

@@ -23,10 +23,10 @@ export function screenSetup(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "screen-setup",
     parameters: {
-      eyebrow: { type: STRING, description: "small line above the title" },
-      again: { type: BOOL, description: "true where full screen was left during the trials" },
+      eyebrow: STRING, // small line above the title
+      again: BOOL, // true where full screen was left during the trials
     },
-    data: { full_screen: { type: BOOL, description: "whether the page fills the screen" } },
+    data: { full_screen: BOOL }, // whether the page fills the screen
     async show(display, { eyebrow, again }) {
       if (lacksFullScreen(session)) await askFullScreen(session, display, eyebrow, again);
       const { minimum_width_px: width, minimum_height_px: height } = session.run.display;

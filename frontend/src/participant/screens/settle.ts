@@ -16,8 +16,8 @@ const SEEN_MS = 250;
 export function settle(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "settle",
-    parameters: { limit_ms: { type: INT, description: "longest wait in ms; what comes later joins the next block" } },
-    data: { settled: { type: BOOL, description: "true where the server had everything" } },
+    parameters: { limit_ms: INT }, // longest wait in ms; what comes later joins the next block
+    data: { settled: BOOL }, // true where the server had everything
     async show(display, { limit_ms }) {
       let said: string | null = null;
       const tell = (): void => {

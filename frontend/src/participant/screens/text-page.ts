@@ -20,12 +20,12 @@ export function textPage(session: Session): PluginClass<TextPageParameters> {
   return plugin<TextPageParameters, TextPageData>({
     name: "text-page",
     parameters: {
-      eyebrow: { type: STRING, description: "small line above the title" },
-      text: { type: STRING, description: "the text in Markdown" },
-      action: { type: STRING, description: "label of the button that goes on" },
-      remarks: { type: STRING, description: "a plain paragraph after the text, or empty" },
+      eyebrow: STRING, // small line above the title
+      text: STRING, // the text in Markdown
+      action: STRING, // label of the button that goes on
+      remarks: STRING, // a plain paragraph after the text, or empty
     },
-    data: { read_ms: { type: STRING, description: "time on the page in ms" } },
+    data: { read_ms: STRING }, // time on the page in ms
     async show(display, { eyebrow, text, action, remarks }) {
       const started = performance.now();
       const footer = h("footer", { class: "actions" });

@@ -15,8 +15,8 @@ function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
   const loaded = loadModule(() => import("./attention-check"));
   return plugin<{ trial: TrialInfo }, { response: number }>({
     name: "attention-check",
-    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
-    data: { response: { type: INT, description: "the answer given" } },
+    parameters: { trial: OBJECT }, // the assigned trial, with its prompt
+    data: { response: INT }, // the answer given
     show: async (display, parameters) => (await loaded).check(session, display, parameters.trial),
     async simulate(parameters) {
       const { check_scale } = declaredRating(session);

@@ -34,11 +34,11 @@ export function clipRating(session: Session, other: Promise<WatchAndRate> | null
     name: "clip-rating",
     parameters: PARAMETERS,
     data: {
-      response: { type: INT, description: "the rating; null for none" },
-      rt: { type: FLOAT, description: "from the last frame to the answer, ms" },
-      frames_missing: { type: INT, description: "frames never drawn" },
-      key_to_first_frame_ms: { type: FLOAT, description: "from key to first frame, ms" },
-      again: { type: BOOL, description: "whether this was a repetition" },
+      response: INT, // the rating; null for none
+      rt: FLOAT, // from the last frame to the answer, ms
+      frames_missing: INT, // frames never drawn
+      key_to_first_frame_ms: FLOAT, // from key to first frame, ms
+      again: BOOL, // whether this was a repetition
     },
     show: async (display, parameters) => runTrial(session, display, parameters, (await other) ?? watchAndRate),
     simulate: async (parameters) => (await import("./simulate")).simulatedRating(session, parameters),

@@ -12,8 +12,8 @@ function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
   const loaded = loadModule(() => import("./attention-check"));
   return plugin<{ trial: TrialInfo }, { chosen: number }>({
     name: "continuous-check",
-    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
-    data: { chosen: { type: INT, description: "the answer given" } },
+    parameters: { trial: OBJECT }, // the assigned trial, with its prompt
+    data: { chosen: INT }, // the answer given
     show: async (display, parameters) => (await loaded).check(session, display, parameters.trial),
     async simulate(parameters) {
       const chosen = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? "1");

@@ -30,10 +30,10 @@ export function continuousRating(session: Session): PluginClass<TrialParameters>
     name: "continuous-rating",
     parameters: PARAMETERS,
     data: {
-      samples: { type: INT, description: "samples of the trace" },
-      moves: { type: INT, description: "how often the slider began to move" },
-      frames_missing: { type: INT, description: "frames never drawn" },
-      again: { type: BOOL, description: "true where this was a repetition" },
+      samples: INT, // samples of the trace
+      moves: INT, // how often the slider began to move
+      frames_missing: INT, // frames never drawn
+      again: BOOL, // true where this was a repetition
     },
     show: (display, parameters) => runTrial(session, display, parameters),
     simulate: async (parameters) => (await import("./simulate")).simulatedTrace(session, parameters),

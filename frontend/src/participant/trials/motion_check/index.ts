@@ -15,8 +15,8 @@ interface Parameters {
 function motionCheck(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, CheckData>({
     name: "motion-check",
-    parameters: { trial: { type: OBJECT, description: "the assigned check" } },
-    data: { check: { type: INT, description: "number of the choice; null where there is none" } },
+    parameters: { trial: OBJECT }, // the assigned check
+    data: { check: INT }, // number of the choice; null where there is none
     show: (display, parameters) => showCheck(session, display, parameters.trial),
     simulate: (parameters) => simulateCheck(session, parameters.trial),
     act: actCheck,

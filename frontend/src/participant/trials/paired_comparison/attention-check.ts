@@ -20,8 +20,8 @@ interface Data {
 export function pairCheck(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "pair-check",
-    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
-    data: { winner: { type: STRING, description: "the answer given" } },
+    parameters: { trial: OBJECT }, // the assigned trial, with its prompt
+    data: { winner: STRING }, // the answer given
     show: (display, { trial }) => check(session, display, trial),
     async simulate({ trial }) {
       const winner = winnerOf(/\*\*(\d)\*\*/.exec(trial.prompt ?? "")?.[1] ?? "1", true) ?? "left";

@@ -33,9 +33,9 @@ export function comparison(session: Session): PluginClass<TrialParameters> {
     name: "paired-comparison",
     parameters: PARAMETERS,
     data: {
-      winner: { type: STRING, description: "left, right or tie; null where the pair could not be shown" },
-      rt: { type: FLOAT, description: "from the last frame to the answer, ms" },
-      again: { type: BOOL, description: "true where this was a repetition" },
+      winner: STRING, // left, right or tie; null where the pair could not be shown
+      rt: FLOAT, // from the last frame to the answer, ms
+      again: BOOL, // true where this was a repetition
     },
     show: (display, parameters) => runTrial(session, display, parameters),
     simulate: async (parameters) => (await import("./simulate")).simulatedComparison(session, parameters),

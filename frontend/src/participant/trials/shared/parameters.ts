@@ -10,11 +10,11 @@ export interface TrialParameters extends Showable {
 }
 
 export const PARAMETERS = {
-  trial: { type: OBJECT, description: "the assigned trial" },
-  play: { type: INT, description: "1, or more for a repetition" },
-  next: { type: OBJECT, description: "the trial after this one" },
-  number: { type: INT, description: "its place among those counted" },
-  total: { type: INT, description: "how many those are at most" },
+  trial: OBJECT, // the assigned trial
+  play: INT, // 1, or more for a repetition
+  next: OBJECT, // the trial after this one
+  number: INT, // its place among those counted
+  total: INT, // how many those are at most
 };
 
 /** The parameters as functions, asked when the trial's turn comes. */

@@ -19,8 +19,8 @@ interface Data {
 export function thresholdCheck(session: Session): PluginClass<Parameters> {
   return plugin<Parameters, Data>({
     name: "threshold-check",
-    parameters: { trial: { type: OBJECT, description: "the assigned trial, with its prompt" } },
-    data: { chosen: { type: STRING, description: "the answer given" } },
+    parameters: { trial: OBJECT }, // the assigned trial, with its prompt
+    data: { chosen: STRING }, // the answer given
     show: (display, { trial }) => check(session, display, trial),
     async simulate({ trial }) {
       const asked = Number(/\*\*(\d)\*\*/.exec(trial.prompt ?? "")?.[1] ?? "1");

@@ -35,9 +35,9 @@ export function thresholdTrial(session: Session): PluginClass<TrialParameters> {
     name: "threshold",
     parameters: PARAMETERS,
     data: {
-      chosen: { type: STRING, description: "the answer; null where the clips could not be shown" },
-      rt: { type: FLOAT, description: "from the last frame to the answer, ms" },
-      again: { type: BOOL, description: "true where this was a repetition" },
+      chosen: STRING, // the answer; null where the clips could not be shown
+      rt: FLOAT, // from the last frame to the answer, ms
+      again: BOOL, // true where this was a repetition
     },
     show: (display, parameters) => runTrial(session, display, parameters),
     simulate: async (parameters) => (await import("./simulate")).simulatedThreshold(session, parameters),
