@@ -156,3 +156,17 @@ def held_against(
     said = deviations_said(seal, experiment, contents.n_participants, clips)
     numbers = {**contents.numbers, "sealed_plan": {"sha256": seal.sha256, "said": list(said)}}
     return replace(contents, decisions=(*said, *contents.decisions), numbers=numbers)
+
+
+@dataclass(frozen=True)
+class DrawnPart:
+    """A part with its figures drawn and its further sections made, as the templates print it."""
+
+    title: str
+    brief: tuple[str, ...]
+    first: Table
+    tables: tuple[Table, ...]
+    sentences: tuple[str, ...]
+    self_check: str
+    pictures: tuple[Picture, ...]
+    sections: tuple[Section, ...]

@@ -1,14 +1,10 @@
 """Tables for LaTeX, and the report as a whole document that pdfLaTeX, XeLaTeX and LuaLaTeX set."""
 
 import re
-from typing import TYPE_CHECKING
 
-from analysis.report.contents import Contents, Picture, Section
+from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
 from analysis.report.italics import pieces
-
-if TYPE_CHECKING:
-    from analysis.report.write import DrawnPart
 
 NEEDS = r"\usepackage{array,booktabs,graphicx,longtable}"
 """What a document must load for the tables."""
@@ -100,7 +96,7 @@ def _columns(table: Table) -> str:
     return "".join(kinds)
 
 
-def as_document(contents: Contents, parts: "tuple[DrawnPart, ...]", version: str) -> str:
+def as_document(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> str:
     """Everything that the page says as a document, figures beside it as PNG.
 
     Parameters
@@ -173,7 +169,7 @@ def _sentence(text: str) -> str:
     )
 
 
-def _part(part: "DrawnPart", synthetic: bool) -> list[str]:
+def _part(part: DrawnPart, synthetic: bool) -> list[str]:
     heading = "subsection" if part.title else "section"
     made = [rf"\section{{{latex_text(part.title)}}}"] if part.title else []
     made += [rf"\{heading}{{Results}}", _pointer(part), as_latex(part.first, "[H]")]
@@ -187,7 +183,7 @@ def _part(part: "DrawnPart", synthetic: bool) -> list[str]:
     return made
 
 
-def _pointer(part: "DrawnPart") -> str:
+def _pointer(part: DrawnPart) -> str:
     """Which table and figures answer the question."""
     said = rf"See Table~\ref{{tab:{part.first.key}}}"
     figures = [rf"\ref{{fig:{picture.key}}}" for picture in part.pictures]

@@ -6,7 +6,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from analysis.report.contents import Contents, Picture, Section
+from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
 from analysis.report.italics import pieces
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from docx.document import Document
     from docx.table import _Cell
 
-    from analysis.report.write import DrawnPart
 
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
 """What the file says of when it was made: a clock's time would differ from run to run."""
@@ -24,7 +23,7 @@ TABLE_POINTS = 8
 _CONTROL = re.compile("[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\ufffe\\uffff]")
 
 
-def as_docx(contents: Contents, parts: "tuple[DrawnPart, ...]", version: str) -> bytes:
+def as_docx(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> bytes:
     """Everything that the page says, with tables that can be edited and figures as pictures.
 
     Parameters
@@ -83,7 +82,7 @@ def _add_sentence(document: "Document", text: str) -> None:
         paragraph.add_run(piece).italic = is_symbol
 
 
-def _add_part(document: "Document", part: "DrawnPart", synthetic: bool) -> None:
+def _add_part(document: "Document", part: DrawnPart, synthetic: bool) -> None:
     level = 2 if part.title else 1
     if part.title:
         document.add_heading(_sayable(part.title), 1)

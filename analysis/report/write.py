@@ -1,33 +1,17 @@
 """One report: HTML, Markdown, Word and LaTeX, tables for LaTeX, figures, and the results as JSON."""
 
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
-from analysis.report.contents import Contents, Picture, Progress, Section
-from analysis.report.formats import Table
+from analysis.report.contents import Contents, DrawnPart, Progress
 from analysis.report.latex import NEEDS, as_document, as_latex
 from analysis.report.templating import filled
 from analysis.report.word import as_docx
 from experiments.errors import InputError
 from experiments.files import whole_file
 from experiments.json import json_text
-
-
-@dataclass(frozen=True)
-class DrawnPart:
-    """A part with its figures drawn and its further sections made, as the templates print it."""
-
-    title: str
-    brief: tuple[str, ...]
-    first: Table
-    tables: tuple[Table, ...]
-    sentences: tuple[str, ...]
-    self_check: str
-    pictures: tuple[Picture, ...]
-    sections: tuple[Section, ...]
 
 
 def write_report(
