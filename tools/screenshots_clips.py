@@ -39,6 +39,7 @@ SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
 MOVED = "hazel"
 """Whose brow, cheek, squint and gaze are shown moved."""
+FACES_IN_A_ROW = 6
 LIMIT_BYTES = 400_000
 Rgb = NDArray[np.uint8]
 
@@ -52,8 +53,7 @@ def main() -> None:
         tall = whole[1] > whole[0]
         character = find_character(name).levels(whole if tall else SIZE)
         save(closures_sheet(character, tall), folder / f"{name}-closures.jpg")
-        if not tall:
-            save(blink_sheet(character), folder / f"{name}-blink.jpg")
+        save(blink_sheet(character, tall), folder / f"{name}-blink.jpg")
         if character.read_lower is not None:
             save(lower_lid_sheet(character), folder / f"{name}-lower-lid.jpg")
         if name == MOVED:
@@ -120,21 +120,38 @@ def movement_sheet(character: LevelSet, name: str) -> Rgb:
     return np.hstack(columns)
 
 
-def blink_sheet(character: LevelSet) -> Rgb:
-    """A model blink of 9 frames at 30 fps: without motion blur at the left, with it at the right."""
+def blink_sheet(character: LevelSet, tall: bool) -> Rgb:
+    """A model blink of 9 frames at 30 fps, without motion blur and with it, a third of actual size.
+
+    Eyes one below the other, kinds side by side; whole faces in rows, the kinds one below the other.
+    """
+    kinds = []
+    for blur, title in ((False, "NB: one sample a frame"), (True, "MB: mean of ten samples, linear light")):
+        frames = blink_frames(character, blur)
+        kinds.append(_titled(in_rows(frames, FACES_IN_A_ROW) if tall else np.vstack(frames), title))
+    if tall:
+        return np.vstack(kinds)
+    return np.hstack([kinds[0], np.full((kinds[0].shape[0], 6, 3), 255, np.uint8), kinds[1]])
+
+
+def blink_frames(character: LevelSet, blur: bool) -> list[Rgb]:
+    """The blink's frames, a third of their size, from the second on."""
     shown = exemplar(RenderSettings(profile="model", duration_frames=9), "screenshot", 1, 2011)
     curve = clip_curve(shown.profile, Timing(2, 1, shown.phase_samples, 30), "none")
-    painter = FramePainter(character)
-    columns = []
-    for blur, title in ((False, "NB: one sample a frame"), (True, "MB: mean of ten samples, linear light")):
-        rows = []
-        for row in frame_weights(len(curve.closure), 30, blur)[1:]:
-            light = character.base.astype(np.float32)
-            used = np.flatnonzero(row)
-            light[character.window.slices] = painter.light(curve, used, row[used])
-            rows.append(_reduced(linear_to_srgb(light / np.float32(FULL_SCALE)), 3))
-        columns.append(_titled(np.vstack(rows), title))
-    return np.hstack([columns[0], np.full((columns[0].shape[0], 6, 3), 255, np.uint8), columns[1]])
+    painter, frames = FramePainter(character), []
+    for row in frame_weights(len(curve.closure), 30, blur)[1:]:
+        light = character.base.astype(np.float32)
+        used = np.flatnonzero(row)
+        light[character.window.slices] = painter.light(curve, used, row[used])
+        frames.append(_reduced(linear_to_srgb(light / np.float32(FULL_SCALE)), 3))
+    return frames
+
+
+def in_rows(pictures: list[Rgb], columns: int) -> Rgb:
+    """Pictures of one size from left to right and from top to bottom; white where the last row ends early."""
+    blank = np.full_like(pictures[0], 255)
+    filled = [*pictures, *[blank] * (-len(pictures) % columns)]
+    return np.vstack([np.hstack(filled[k : k + columns]) for k in range(0, len(filled), columns)])
 
 
 def profile_curves(path: Path) -> None:
