@@ -19,6 +19,8 @@ _COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]+(,[0-9]+)?")
 _HUNDREDS = re.compile(r"[+-]?[1-9][0-9]{2}")
 MISSING_CODES = (-9999.0, -999.0, -99.0, -88.0, -77.0, -9.0, 99.0, 999.0, 9999.0)
 """Numbers by which people mark that there is none."""
+SIZE_MIN = 1e-100
+"""Numbers all below it, or one above its inverse, have sums of squares that a float64 cannot tell apart."""
 IN_COVARIATE = "correct them or leave them empty"
 """What to do about unusual numbers where there is no scale that would refuse them."""
 
@@ -27,16 +29,37 @@ def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
     """Parse a column of numbers; decimal commas are read (and reported), missing marks become NaN."""
     categories = list(table.columns[name].cat.categories)
     commas = [text for text in categories if _DECIMAL_COMMA.fullmatch(text)]
-    _refuse_two_readings(table, name, categories, commas)
+    if name not in table.numeric:
+        _refuse_two_readings(table, name, categories, commas)
     values = np.array([_number(text) for text in [*categories, ""]])
     numeric = np.isfinite(values)
     _refuse_words(
         table, name, {t for t, fine in zip(categories, numeric, strict=False) if not fine} - MISSING_MARKS
     )
+    _refuse_out_of_bounds(table, name, values[:-1])
     if commas:
         table.decisions.append(f"decimal commas in '{name}' (e.g. '{commas[0]}') read as decimal points")
     parsed: NDArray[np.float64] = values[table.columns[name].cat.codes.to_numpy().astype(np.int64)]
     return parsed
+
+
+def _refuse_out_of_bounds(table: TextTable, name: str, values: NDArray[np.float64]) -> None:
+    """Refuse numbers whose squares, which every test sums, are too large or too small for a float64."""
+    sizes = np.abs(values[np.isfinite(values)])
+    if not sizes.size or not sizes.max():
+        return
+    if sizes.max() > 1 / SIZE_MIN:
+        text = table.columns[name].cat.categories[int(np.nanargmax(np.abs(values)))]
+        row = int(np.argmax((table.columns[name] == text).to_numpy()))
+        raise InputError(
+            f"{table.source}: '{name}' is {text} in line {table.line(row)}: sums of squares of such numbers "
+            "cannot be computed; correct it, or give the column in a larger unit"
+        )
+    if sizes.max() < SIZE_MIN:
+        raise InputError(
+            f"{table.source}: every number of '{name}' is below {SIZE_MIN:g}: sums of squares of such "
+            "numbers cannot be computed; give the column in a smaller unit"
+        )
 
 
 def _refuse_two_readings(table: TextTable, name: str, categories: list[str], commas: list[str]) -> None:

@@ -1,5 +1,6 @@
 """Read a long table as text, with every doubt about it raised as one line."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,7 @@ from analysis.read.wide import wide_hint
 from experiments.errors import InputError, nearest
 
 NAMED_ROWS = 5
+NAMED_COLUMNS = 30
 
 
 @dataclass
@@ -23,7 +25,7 @@ class TextTable:
     """Columns of text (categorical, kept as written, stripped) and what was decided while reading.
 
     `lines` (rows,) are where the rows stand in the file; `labels` has, of a column, the word for each code;
-    `reader` reads further columns of the file.
+    `numeric` are columns of numbers, not of texts like them; `reader` reads further columns of the file.
     """
 
     columns: pd.DataFrame
@@ -31,6 +33,7 @@ class TextTable:
     header: tuple[str, ...]
     lines: NDArray[np.int64] = field(repr=False)
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    numeric: frozenset[str] = frozenset()
     decisions: list[str] = field(default_factory=list)
     reader: Reader | None = field(default=None, repr=False)
 
@@ -63,7 +66,9 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
     cells = trials_only(reader.cells(names), list(needed or ()), _sorts(reader, header))
     if cells.rows.empty:
         raise InputError(f"{path.name} has a header but no rows{' that are trials' * bool(cells.decisions)}")
-    table = TextTable(cells.rows, path.name, cells.header, cells.lines, cells.labels, reader=reader)
+    table = TextTable(
+        cells.rows, path.name, cells.header, cells.lines, cells.labels, cells.numeric, reader=reader
+    )
     table.decisions.extend(cells.decisions)
     for name in names:
         table.columns[name] = _stripped(table.columns[name])
@@ -92,15 +97,20 @@ def _names_to_read(
         if name not in header:
             hint = wide_hint(header) or _lines_above(header) or _columns_there(name, header)
             raise InputError(f"{source} has no column '{name}'{hint}")
-    for name in header:
-        if name and header.count(name) > 1 and name in (*needed, *optional):
+    # counted once for all: a header may have 100,000 names
+    there, asked = Counter(header), {*needed, *optional}
+    for name, times in there.items():
+        if name and times > 1 and name in asked:
             raise InputError(f"{source} has two columns called '{name}'; rename one")
-    return list(dict.fromkeys([*needed, *(name for name in optional if name in header)]))
+    return list(dict.fromkeys([*needed, *(name for name in optional if name in there)]))
 
 
 def _columns_there(name: str, header: Sequence[str]) -> str:
     near = nearest(name, header)
-    return f"; did you mean '{near}'?" if near else f"; its columns are {', '.join(header)}"
+    if near:
+        return f"; did you mean '{near}'?"
+    rest = len(header) - NAMED_COLUMNS
+    return f"; its columns are {', '.join(header[:NAMED_COLUMNS])}{f' and {rest} more' if rest > 0 else ''}"
 
 
 def _lines_above(header: Sequence[str]) -> str:

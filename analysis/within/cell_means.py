@@ -16,7 +16,10 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 ROUNDING = 1e-10
-"""Ratings that differ by less than this share of them (or of 1) are one and the same."""
+"""Means that differ by less than this share of them (or of 1) may be of one and the same rating."""
+
+LAST_DIGITS = 4 * float(np.finfo(np.float64).eps)
+"""Ratings that differ by no more than this share of them are one and the same: 0.1 + 0.2 and 0.3."""
 
 NAMED_CELLS = 5
 """How many empty cells a one-line message names before it counts the rest."""
@@ -105,9 +108,10 @@ def _flat(table: CellTable) -> NDArray[np.bool_]:
 def _constant(table: CellTable, people: list[str], person: Integers, values: Floats) -> tuple[str, ...]:
     """Participants of a table who gave one and the same rating throughout (and more than one)."""
     number = np.bincount(person)
-    mean = np.bincount(person, weights=values) / number
-    deviation = np.bincount(person, weights=(values - mean[person]) ** 2)
-    constant = (deviation <= ROUNDING**2 * np.maximum(mean**2, 1.0)) & (number > 1)
+    first = np.zeros(len(number))
+    first[person[::-1]] = values[::-1]
+    apart = np.abs(values - first[person]) > LAST_DIGITS * np.abs(first[person])
+    constant = (np.bincount(person, weights=apart) == 0) & (number > 1)
     kept = set(table.participants)
     return tuple(people[i] for i in np.flatnonzero(constant) if people[i] in kept)
 

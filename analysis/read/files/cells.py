@@ -24,6 +24,8 @@ class Cells:
         Line (or row of the sheet) on which each row stands, (rows,).
     labels : mapping of str to mapping of str to str
         Of a column, the word for each coded value, where the file has such words (SPSS).
+    numeric : frozenset of str
+        Columns whose every cell is a number to the program that wrote the file, and no text like one.
     decisions : tuple of str
         What was understood, for the reader of the tables.
     """
@@ -32,6 +34,7 @@ class Cells:
     header: tuple[str, ...]
     lines: NDArray[np.int64] = field(repr=False)
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    numeric: frozenset[str] = frozenset()
     decisions: tuple[str, ...] = ()
 
 
@@ -58,4 +61,14 @@ def cells_of(
     positions = [header.index(name) for name in names]
     columns = {name: [texts[i][p] for i in filled] for name, p in zip(names, positions, strict=True)}
     lines = np.array(filled, dtype=np.int64) + first_line
-    return Cells(pd.DataFrame(columns, dtype=str), tuple(header), lines, **more)
+    numeric = frozenset(
+        name for name, p in zip(names, positions, strict=True) if all(_is_number(rows[i][p]) for i in filled)
+    )
+    return Cells(pd.DataFrame(columns, dtype=str), tuple(header), lines, numeric=numeric, **more)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a cell is a number, or empty."""
+    return value is None or (
+        isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    )

@@ -1,8 +1,11 @@
 """CSV and its kin: comma, semicolon or tab, taken from the header line."""
 
+import codecs
 import csv
 import warnings
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pandas as pd
@@ -11,11 +14,45 @@ from analysis.read.files.cells import Cells
 from analysis.read.files.raggedness import refuse_ragged
 from experiments.errors import InputError
 
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),
+    (codecs.BOM_UTF32_BE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
+"""Byte order marks of encodings that spreadsheets write beside UTF-8, the longer first."""
+
+
+def utf8(path: Path) -> BinaryIO:
+    """The file as UTF-8, opened; one whose byte order mark says UTF-16 or 32 is encoded anew.
+
+    Raises
+    ------
+    InputError
+        A text that is not what its mark says, or UTF-16 without one.
+    """
+    with path.open("rb") as file:
+        start = file.read(4)
+    encoding = next((name for mark, name in _MARKS if start.startswith(mark)), None)
+    if b"\0" in start and encoding is None:
+        raise InputError(
+            f"{path.name} holds null bytes, as UTF-16 text without a byte order mark does; "
+            "save it as CSV UTF-8"
+        )
+    if encoding is None:
+        return path.open("rb")
+    try:
+        return BytesIO(path.read_bytes().decode(encoding).encode())
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path.name} is not {encoding} text ({error.reason}); save it as CSV UTF-8"
+        ) from error
+
 
 def delimited_header(path: Path) -> tuple[list[str], str]:
     """Names of the columns, and the separator."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as lines:
+        with TextIOWrapper(utf8(path), encoding="utf-8-sig", newline="") as lines:
             first = lines.readline()
             separator = max(",;\t", key=first.count)
             lines.seek(0)
@@ -40,12 +77,13 @@ def delimited_cells(path: Path, names: list[str]) -> Cells:
 
 
 def _parse(path: Path, separator: str, positions: list[int], width: int) -> pd.DataFrame:
-    refuse_ragged(path, separator, width)
+    with utf8(path) as file:
+        refuse_ragged(file, separator, width, path.name)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), utf8(path) as file:
             warnings.simplefilter("error")
             frame = pd.read_csv(
-                path,
+                file,
                 sep=separator,
                 header=None,
                 skiprows=1,

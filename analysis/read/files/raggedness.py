@@ -1,39 +1,75 @@
 """Find the first line of a CSV file whose number of cells differs from the header's."""
 
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import InputError
+from analysis.read.files.quotes import refuse_damaged_quotes, wrong_width
 
 Bytes = NDArray[np.uint8]
+Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 24
 _NEWLINE, _QUOTE, _RETURN = 10, 34, 13
+_MARK = b"\xef\xbb\xbf"
 
 
-def refuse_ragged(path: Path, separator: str, width: int) -> None:
+def refuse_ragged(file: BinaryIO, separator: str, width: int, name: str) -> None:
     """Raise InputError naming the first line that has not `width` cells; blank lines are allowed.
 
-    Needed because a parser told which columns to read drops surplus cells without a word.
+    Needed because a parser told which columns to read drops surplus cells without a word. Files whose double
+    quotes do not enclose whole cells are gone through cell by cell, which takes longer.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        The file, UTF-8 with or without byte order mark, opened at its beginning.
     """
     line, carry = 1, np.empty(0, np.uint8)
-    with path.open("rb") as file:
-        while True:
-            block = np.frombuffer(file.read(_BLOCK), np.uint8)
-            end = block.size == 0
-            carry = np.concatenate([carry, block if not end else np.array([_NEWLINE], np.uint8)])
-            whole, lines = _check(carry, ord(separator), width, line, path.name)
-            line, carry = line + lines, carry[whole:]
-            if end:
-                return
+    if file.read(len(_MARK)) != _MARK:
+        file.seek(0)
+    while True:
+        block = np.frombuffer(file.read(_BLOCK), np.uint8)
+        end = block.size == 0
+        carry = np.concatenate([carry, block if not end else np.array([_NEWLINE], np.uint8)])
+        outside = _outside_quotes(carry, ord(separator), end)
+        if outside is None:
+            file.seek(0)
+            refuse_damaged_quotes(file.read().removeprefix(_MARK), separator, width, name)
+            return
+        whole, lines = _check(carry, outside, ord(separator), width, line, name)
+        line, carry = line + lines, carry[whole:]
+        if end:
+            return
 
 
-def _check(data: Bytes, separator: int, width: int, first_line: int, name: str) -> tuple[int, int]:
+def _outside_quotes(data: Bytes, separator: int, end: bool) -> Flags | None:
+    """Which bytes stand outside of quoted cells; None where a quote stands in the midst of a cell.
+
+    `data` begins with a line; unless it is the `end` of the file its last line may be cut off.
+    """
+    quotes: Flags = data == _QUOTE
+    if not quotes.any():
+        return np.asarray(~quotes)
+    at = np.flatnonzero(quotes)
+    if end and at.size % 2:
+        return None
+    edges = np.zeros(256, dtype=bool)
+    edges[[separator, _NEWLINE, _RETURN, _QUOTE]] = True
+    opens, closes = at[0::2], at[1::2]
+    before = data[np.maximum(opens - 1, 0)]
+    behind = data[np.minimum(closes + 1, data.size - 1)]
+    if not ((opens == 0) | edges[before]).all() or not edges[behind].all():
+        return None
+    inside: Bytes = np.bitwise_xor.accumulate(quotes.view(np.uint8))
+    return np.asarray(inside == 0)
+
+
+def _check(
+    data: Bytes, outside: Flags, separator: int, width: int, first_line: int, name: str
+) -> tuple[int, int]:
     """Check the whole lines of `data`; give back the bytes and the lines they took."""
-    quotes = data == _QUOTE
-    outside = np.bitwise_xor.accumulate(quotes.view(np.uint8)) == 0 if quotes.any() else ~quotes
     ends = np.flatnonzero((data == _NEWLINE) & outside)
     if ends.size == 0:
         return 0, 0
@@ -45,10 +81,8 @@ def _check(data: Bytes, separator: int, width: int, first_line: int, name: str) 
     wrong = np.flatnonzero((cells != width) & ~blank)
     if wrong.size:
         row = int(wrong[0])
-        line = first_line + int((data[: starts[row]] == _NEWLINE).sum())
-        raise InputError(
-            f"{name}: line {line} has {cells[row]} cells, the header {width}; "
-            "put cells that hold a separator in double quotes"
-        )
+        first = first_line + int((data[: starts[row]] == _NEWLINE).sum())
+        last = first + int((data[starts[row] : ends[row]] == _NEWLINE).sum())
+        raise wrong_width(name, first, last, int(cells[row]), width)
     whole = int(ends[-1]) + 1
     return whole, int((data[:whole] == _NEWLINE).sum())

@@ -79,7 +79,7 @@ def test_blank_lines_and_blanks_around_cells_do_not_matter(tmp_path) -> None:
         ("id,y,f\n,2,a\n", "'id' is empty in line 2"),
         ("id,y,f\n1,2,a\n1,2,a,b\n", "line 3 has 4 cells, the header 3"),
         ("id,y,f\n1,2\n", "line 2 has 2 cells, the header 3"),
-        ('id,y,f\n1,2,"a\n', "not a CSV file|cells"),
+        ('id,y,f\n1,2,"a\n', "line 2 opens is never closed"),
         ("id,y,f\n1,,a\n", "no rating in any row"),
         (b"id,y,f\nM\xfcller,2,a\n", "not UTF-8"),
         (b"\x89PNG\x00\xff\xfe", "not UTF-8"),
