@@ -62,5 +62,6 @@ export default defineConfig({
       },
     },
   },
-  worker: { format: "es" },
+  // Notes for the bundler, which has read them.
+  worker: { format: "es", rolldownOptions: { output: { comments: false } } },
 });

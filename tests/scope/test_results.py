@@ -1,8 +1,17 @@
-"""Results stored as they end: a run that was stopped goes on."""
+"""Results stored as they end: a run that was stopped goes on, piece by piece."""
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
+import pytest
+
+from tests.scope.test_compare import log, play, record
+from tools.scope import results as module
+from tools.scope.measure import Row
+from tools.scope.pieces import row_of
 from tools.scope.results import Results
+from tools.scope.table import HEADER, cells
 
 KEY = ("row", "chromium", "30", "idle")
 
@@ -17,9 +26,39 @@ def test_what_was_measured_with_as_many_plays_is_not_measured_again(tmp_path: Pa
     assert [result.cells for result in later.of("row")] == [("chromium", "30")]
 
 
-def test_a_later_result_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
+def test_pieces_add_up_until_they_are_measured_anew(tmp_path: Path) -> None:
     path = tmp_path / "scope.jsonl"
-    for count in (20, 200):
-        Results(path).add(KEY, count, [str(count)], None)
-    assert [result.count for result in Results(path).of("row")] == [200]
-    assert not Results(path, again=True).has(KEY, 20)
+    for count in (40, 40, 20):
+        Results(path).add(KEY, count, [], None)
+    assert Results(path).count(KEY) == 100
+    anew = Results(path, again=True)
+    assert anew.count(KEY) == 0
+    anew.add(KEY, 40, [], None)
+    anew.add(KEY, 20, [], None)
+    assert anew.count(KEY) == Results(path).count(KEY) == 60
+
+
+def test_plays_of_a_page_that_drew_otherwise_do_not_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "scope.jsonl"
+    monkeypatch.setattr(module, "measured_sha256", lambda: "the page of before")
+    Results(path).add(KEY, 40, [], None)
+    monkeypatch.setattr(module, "measured_sha256", lambda: "this page")
+    later = Results(path)
+    assert later.count(KEY) == 0
+    later.add(KEY, 20, [], None)
+    assert [json.loads(line)["count"] for line in path.read_text().splitlines()] == [40, 20]
+
+
+def test_two_pieces_make_the_row_that_both_would_have_been(tmp_path: Path) -> None:
+    plays = (play(log(), record()), play(log(without=(7,)), record(verdict="uncertain")))
+    whole = Row("chromium", "156", 30, "idle", plays, 0, 2000.0, True, (1.0, 3.0), 1.0, 0.0)
+    path = tmp_path / "scope.jsonl"
+    for one, load in zip(plays, whole.loads, strict=True):
+        part = Row("chromium", "156", 30, "idle", (one,), 0, 2000.0, True, (load,), 1.0, 0.0)
+        Results(path).add(KEY, 1, cells(part), asdict(part))
+    joined = row_of([piece.details for piece in Results(path).pieces(KEY)])
+    assert joined == whole
+    assert cells(joined)[-1] == "1.0 to 3.0"
+    assert len(cells(joined)) == len(HEADER)

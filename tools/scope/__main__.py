@@ -7,9 +7,11 @@ python -m tools.scope views --tries 100      reload, kill -9, another device: vi
 python -m tools.scope pairs --pairs 50       two clips on one canvas: are they ever a frame apart?
 python -m tools.scope long --rates 30        clips of a minute: every frame there, and memory as before?
 
-Each result is stored as it ends (--results), and what is there is not measured again: a run that was stopped
-goes on where it was. --before-others: on a machine that others use too the browser goes before other programs
-in rows that are not busy.
+Each result is stored as it ends (--results FILE, best outside the project), rows in pieces of 40 plays, and
+what is there is not measured again: a run that was stopped goes on where it was. Results of a page that drew
+or judged otherwise stay in the file and do not count. --table prints the table of what is there.
+--before-others: on a machine that others use too the browser goes before other programs in rows that are not
+busy.
 """
 
 import argparse
@@ -25,8 +27,9 @@ from tools.scope.compare import REFRESH_MS
 from tools.scope.conditions import CONDITIONS
 from tools.scope.display import Display, missing_here
 from tools.scope.long import LONG_S, measure_long
-from tools.scope.measure import measure
+from tools.scope.measure import Row, measure
 from tools.scope.pairs import measure_pairs
+from tools.scope.pieces import PIECE_PLAYS, row_of
 from tools.scope.results import Results
 from tools.scope.table import HEADER, cells, markdown
 from tools.scope.views import count_views
@@ -53,7 +56,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--before-others",
         action="store_true",
-        help="real-time priority for browsers in rows that are not busy (root)",
+        help="real-time priority for browsers in pairs, long clips and rows that are not busy (root)",
     )
     parser.add_argument(
         "--ordinary-display",
@@ -62,6 +65,9 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument(
         "--results", type=Path, default=Path("out/scope.jsonl"), help="file of results (out/scope.jsonl)"
+    )
+    parser.add_argument(
+        "--table", action="store_true", help="measure nothing, print the table of the results"
     )
     parser.add_argument("--again", action="store_true", help="measure what the file has already, too")
     options = parser.parse_args()
@@ -95,6 +101,9 @@ class Task:
 
 def main() -> None:
     options = arguments()
+    if options.table:
+        _print(Results(options.results))
+        return
     missing = missing_here() or ", ".join(f"no {name} here" for name in options.browsers if not program(name))
     if missing:
         sys.exit(f"error: {missing}")
@@ -148,24 +157,32 @@ def _row_task(browser: str, fps: int, name: str, plays: int) -> Task:
     key = ("row", browser, str(fps), name)
 
     def take(bench: Bench) -> None:
-        row = measure(
-            bench.display,
-            bench.server,
-            bench.folder,
-            browser,
-            fps,
-            condition,
-            plays,
-            bench.options.before_others,
-        )
-        line = cells(row)
-        bench.results.add(key, plays, line, asdict(row))
+        while (left := plays - bench.results.count(key)) > 0:
+            piece = min(left, PIECE_PLAYS)
+            row = measure(
+                bench.display,
+                bench.server,
+                bench.folder,
+                browser,
+                fps,
+                condition,
+                piece,
+                bench.options.before_others,
+            )
+            bench.results.add(key, piece, cells(row), asdict(row))
+            print(f"    {bench.results.count(key)} of {plays} plays", flush=True)
+        line = cells(_row(bench.results, key))
         print(
             "    " + ", ".join(f"{head}: {cell}" for head, cell in zip(HEADER[3:], line[3:], strict=True)),
             flush=True,
         )
 
     return Task(key, plays, f"{browser}, {fps} fps, {name}: {condition.sentence}", take)
+
+
+def _row(results: Results, key: tuple[str, ...]) -> Row:
+    """The row of all that the file holds of it."""
+    return row_of([piece.details for piece in results.pieces(key)])
 
 
 def _view_task(browser: str, tries: int) -> Task:
@@ -183,7 +200,9 @@ def _pair_task(browser: str, fps: int, pairs: int) -> Task:
     key = ("pairs", browser, str(fps))
 
     def take(bench: Bench) -> None:
-        row = measure_pairs(bench.display, bench.server, bench.folder, browser, fps, pairs)
+        row = measure_pairs(
+            bench.display, bench.server, bench.folder, browser, fps, pairs, bench.options.before_others
+        )
         bench.results.add(key, pairs, [row.line()], asdict(row))
         print(f"    {row.line()}", flush=True)
 
@@ -211,9 +230,9 @@ def _long_task(browser: str, fps: int) -> Task:
 
 def _print(results: Results) -> None:
     print(f"\nOne refresh is {REFRESH_MS:.1f} ms. Figures hold up to the frame buffer, not to the monitor.\n")
-    rows = results.of("row")
+    rows = [cells(_row(results, key)) for key in results.keys("row")]
     if rows:
-        print(markdown([result.cells for result in rows]))
+        print(markdown(rows))
     for kind in ("views", "pairs", "long"):
         for result in results.of(kind):
             print(f"\n{kind} ({result.at}): {result.cells[0]}")

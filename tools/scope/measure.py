@@ -1,5 +1,6 @@
 """One row of the table: a run of plays in one browser, at one rate, under one condition."""
 
+import itertools
 import json
 import os
 import random
@@ -23,6 +24,8 @@ from tools.scope.records import stored_plays
 
 SETTLE_S = 0.3
 AFTER_CLIP_S = 0.25
+NUMBERS = itertools.count(1)
+"""Each piece of a row is a study of its own."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,8 @@ class Row:
     ----------
     lost : int
         Plays whose clip was never seen on the screen.
-    load : float
-        The machine's, over the last minute.
+    loads : tuple of float
+        The machine's load average over the last minute, of each piece of the row.
     blind_ms, blind_share : float
         The poller's own longest hold-up, and the share of its time that hold-ups took.
     """
@@ -47,14 +50,9 @@ class Row:
     lost: int
     polls_per_s: float
     real_time: bool
-    load: float
+    loads: tuple[float, ...]
     blind_ms: float
     blind_share: float
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """What the row is of."""
-        return ("row", self.browser, str(self.fps), self.condition)
 
 
 def measure(
@@ -68,7 +66,7 @@ def measure(
     before_others: bool,
 ) -> Row:
     """Show `plays` clips and compare each with its record."""
-    name = f"{browser}_{fps}_{condition.name}"
+    name = f"{browser}_{fps}_{condition.name}_{next(NUMBERS)}"
     text = declaration(name, fps, plays)
     make_clip_folder(text, folder / name, fps)
     study = server.add_built_study(folder / name, text)
@@ -94,7 +92,7 @@ def measure(
         lost,
         rate,
         log["real_time"],
-        os.getloadavg()[0],
+        (os.getloadavg()[0],),
         *blind(log),
     )
 

@@ -72,7 +72,13 @@ class PairRow:
 
 
 def measure_pairs(
-    display: Display, server: ServerProcess, folder: Path, browser: str, fps: int, plays: int
+    display: Display,
+    server: ServerProcess,
+    folder: Path,
+    browser: str,
+    fps: int,
+    plays: int,
+    before_others: bool,
 ) -> PairRow:
     """Show `plays` pairs of bar-coded clips and compare the two from outside and in the ledger."""
     name = f"pairs_{browser}_{fps}"
@@ -80,7 +86,7 @@ def measure_pairs(
     make_clip_folder(text, folder / name, fps, CLIP_HEIGHT_PX)
     study = server.add_built_study(folder / name, text)
     log_file = folder / f"{name}.json"
-    with Browser(browser, display.name) as driver:
+    with Browser(browser, display.name, before_others) as driver:
         driver.ask("open", address=f"{server.address}/run/{study.link_token}")
         driver.wait_for("ready")
         display.click(WIDTH_PX - 40, HEIGHT_PX - 40)

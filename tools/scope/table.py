@@ -35,7 +35,7 @@ def cells(row: Row) -> list[str]:
         _median_and_95([_bias(play) for play in plays if play.record.key_to_first_frame_ms is not None]),
         f"{row.polls_per_s:.0f}" + ("" if row.real_time else " (ordinary priority)"),
         f"{row.blind_ms:.0f}, {100 * row.blind_share:.1f}%",
-        f"{row.load:.1f}",
+        " to ".join(dict.fromkeys(f"{load:.1f}" for load in (min(row.loads), max(row.loads)))),
     ]
 
 

@@ -1,4 +1,4 @@
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it, vi } from "vitest";
 
 import type { TrialInfo } from "../../src/api/schema";
 import { composition, drawFrame, framesOf } from "../../src/participant/playback/compose";
@@ -6,6 +6,13 @@ import type { DecodedClip } from "../../src/participant/playback/decode";
 import { winnerOf } from "../../src/participant/trials/paired_comparison/answer-keys";
 import { clipsOf } from "../../src/participant/trials/shared/roles";
 import { layoutOf, roomNeeded } from "../../src/participant/trials/paired_comparison/layout";
+import { stageFor } from "../../src/participant/trials/paired_comparison/pair-stage";
+import type { Session } from "../../src/participant/session";
+import { showStage, type Stage } from "../../src/participant/trials/shared/stage";
+import { aTrial } from "./a-trial";
+
+vi.mock("../../src/participant/screens/screen-setup", () => ({ askRoom: vi.fn() }));
+vi.mock(import("../../src/participant/trials/shared/stage"), async (load) => ({ ...(await load()), showStage: vi.fn() }));
 
 const BESIDE = { arrangement: "side_by_side", gap_mm: 10, if_too_narrow: "stack" } as const;
 const PIXELS = { width: 960, height: 360 };
@@ -35,6 +42,33 @@ describe("layout of a pair", () => {
     const layout = layoutOf({ arrangement: "one_after_the_other", gap_ms: 300 }, PIXELS, SHOWN, SHOWN, null);
     expect(layout?.boxes[0]).toEqual(layout?.boxes[1]);
     expect(layout?.canvas).toEqual(PIXELS);
+  });
+});
+
+describe("place of a pair in a window that is made narrower", () => {
+  afterEach(() => vi.unstubAllGlobals());
+  const widths = async (px_per_mm: number | null): Promise<number[]> => {
+    const sizes: (() => { width: number; height: number })[] = [];
+    vi.mocked(showStage).mockImplementation((_session, _display, size) => {
+      sizes.push(size);
+      return {} as Stage;
+    });
+    const window = { innerWidth: 1_800, innerHeight: 900 };
+    vi.stubGlobal("window", window);
+    const declared = { kind: "paired_comparison", presentation: BESIDE };
+    const run = { display: { inter_ocular_mm: 60 }, trial: declared };
+    await stageFor({ run, screen: { px_per_mm } } as unknown as Session, {} as HTMLElement, aTrial());
+    const before = sizes[0]?.();
+    window.innerWidth = 400;
+    const after = sizes[0]?.();
+    expect((after?.width ?? 0) / (after?.height ?? 0)).toBeCloseTo((before?.width ?? 0) / (before?.height ?? 0));
+    return [before?.width ?? 0, after?.width ?? 0].map(Math.round);
+  };
+  it("gives way to it as a single clip does, where nothing was measured", async () => {
+    expect(await widths(null)).toEqual([2 * 800 + 38, 400]);
+  });
+  it("is kept at actual size", async () => {
+    expect(await widths(4)).toEqual([2 * 480 + 40, 2 * 480 + 40]);
   });
 });
 

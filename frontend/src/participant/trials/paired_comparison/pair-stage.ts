@@ -2,7 +2,7 @@
 import type { TrialInfo } from "../../../api/schema";
 import { askRoom } from "../../screens/screen-setup";
 import type { Session } from "../../session";
-import { clipSize, showStage, type Stage } from "../shared/stage";
+import { clipSize, inWindow, showStage, type Stage } from "../shared/stage";
 import { declaredPairs } from "./declared";
 import { layoutOf, roomNeeded, type Layout } from "./layout";
 
@@ -15,7 +15,7 @@ export async function stageFor(session: Session, display: HTMLElement, trial: Tr
     const room = { width: window.innerWidth, height: window.innerHeight };
     const layout = layoutOf(presentation, pixels, shown, room, px_per_mm);
     if (layout) {
-      return { stage: showStage(session, display, () => layout.shown, "pair_name"), layout };
+      return { stage: showStage(session, display, () => inWindow(session, layout.shown), "pair_name"), layout };
     }
     await askRoom(session, display, "", roomNeeded(presentation, shown, px_per_mm));
   }

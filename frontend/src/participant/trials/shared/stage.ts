@@ -35,11 +35,16 @@ export function stage(clip: HTMLElement, size: () => Size, name: string): Stage 
   return { element, below, setPlaying: (playing) => element.classList.toggle("playing", playing), fit, layout: layout() };
 }
 
-/** One clip at actual size, whatever the window is; where no size was measured it is at most as wide as the window. */
-export function clipSize({ run, screen }: Session, trial: TrialInfo): Size {
-  const own = clipWidth(trial, run.display.inter_ocular_mm, screen.px_per_mm);
-  const width = screen.px_per_mm === null ? Math.min(own, window.innerWidth) : own;
-  return { width, height: clipHeight(trial, width) };
+/** Actual size, whatever the window is; where no size was measured it is at most as wide as the window. */
+export function inWindow({ screen }: Session, { width, height }: Size): Size {
+  const scale = screen.px_per_mm === null ? Math.min(1, window.innerWidth / width) : 1;
+  return { width: width * scale, height: height * scale };
+}
+
+/** The size of one clip. */
+export function clipSize(session: Session, trial: TrialInfo): Size {
+  const width = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
+  return inWindow(session, { width, height: clipHeight(trial, width) });
 }
 
 /** The place of clips of this size, with the way out, as all that is on the screen. */
