@@ -54,10 +54,13 @@ class View:
     def create(self, dialect: Dialect) -> str:
         """The statement that makes the view; a migration keeps a copy of it as it was then."""
         selected = ",\n       ".join(
-            f"{_spelled(column, dialect)} AS {column.name}" for column in self.columns
+            f"{spelled(column, dialect)} AS {column.name}" for column in self.columns
         )
-        rows = self.rows if isinstance(self.rows, str) else self.rows(dialect)
-        return f"CREATE VIEW {self.name} AS\nSELECT {selected}\n{rows}"
+        return f"CREATE VIEW {self.name} AS\nSELECT {selected}\n{self.rows_in(dialect)}"
+
+    def rows_in(self, dialect: Dialect) -> str:
+        """The SQL after SELECT, in the words of one database; it ends in the conditions."""
+        return self.rows if isinstance(self.rows, str) else self.rows(dialect)
 
     def csv_header(self, factors: Sequence[str]) -> list[str]:
         """Column names of the CSV export: as the view, with a column a factor in the place of `levels`."""
@@ -71,21 +74,31 @@ class View:
 
         What is missing stays None, which a CSV writer leaves empty.
         """
-        index = self._levels_at
-        if index is None:
-            return tuple(row)
-        return (*row[:index], *_level_cells(row[index], factors), *row[index + 1 :])
+        return with_levels(row, self._levels_at, factors)
 
     @cached_property
     def _levels_at(self) -> int | None:
-        return self.names.index(LEVELS.name) if LEVELS.name in self.names else None
+        return levels_at(self.columns)
 
     def factors_in_header(self, header: Iterable[str]) -> list[str]:
         """The factor columns of a CSV export: every column the view does not name, in order."""
         return [name for name in header if name not in self.names]
 
 
-def _spelled(column: Column, dialect: Dialect) -> str:
+def levels_at(columns: Iterable[Column]) -> int | None:
+    """Which of these columns `LEVELS` is; None where it is none of them."""
+    return next((index for index, column in enumerate(columns) if column.name == LEVELS.name), None)
+
+
+def with_levels(row: Sequence[Any], index: int | None, factors: tuple[str, ...]) -> tuple[Any, ...]:
+    """The cells with one a factor in the place of the levels, which stand at `index`."""
+    if index is None:
+        return tuple(row)
+    return (*row[:index], *_level_cells(row[index], factors), *row[index + 1 :])
+
+
+def spelled(column: Column, dialect: Dialect) -> str:
+    """The SQL behind a column in the words of one database, as the view selects it."""
     if column.member:
         member = _member(column, dialect)
         return f"coalesce({member}, {column.otherwise})" if column.otherwise else member

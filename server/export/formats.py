@@ -12,7 +12,7 @@ from server.export import codebook, identities, psych_ds, repository, runs
 from server.export.converted import Ending, columns_json, converted
 from server.export.excel import guarded, marked
 from server.export.extract import Extract
-from server.export.pieces import csv_pieces, rating_table, whole
+from server.export.pieces import csv_pieces, rating_pieces, whole
 from server.export.ratings_csv import rating_count
 from server.export.tables import ExportTable, answers_table, runs_table, wide_table
 from server.export.wide import cells_of
@@ -29,7 +29,7 @@ Pieces = Callable[[Session, Study, Extract], Iterator[bytes]]
 
 def ratings_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """One row a play: the columns of the codebook, one column a factor."""
-    yield from csv_pieces(rating_table(session, study, extract))
+    yield from rating_pieces(session, study, extract)
 
 
 def runs_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from server.export.extract import Extract
+from server.export.rating_lines import rating_lines
 from server.export.ratings_csv import factor_names, rating_count, rating_rows, view_of
 from server.models import Study
 from server.text import encoded
@@ -39,6 +40,15 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
         stream = io.StringIO()
         csv.writer(stream, lineterminator="\n").writerows(batch)
         yield encoded(stream.getvalue())
+
+
+def rating_pieces(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
+    """Header and lines of the tidy CSV, some hundred lines a piece."""
+    factors, view = factor_names(session, study), view_of(session, study)
+    yield from csv_pieces([view.csv_header(factors)])
+    lines = whole(rating_lines(session, study, extract, view, factors), rating_count(session, study, extract))
+    while batch := list(islice(lines, ROWS_A_PIECE)):
+        yield encoded("\n".join((*batch, "")))
 
 
 def rating_table(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:

@@ -26,10 +26,13 @@ def factor_names(session: Session, study: Study) -> tuple[str, ...]:
 
 def rating_count(session: Session, study: Study, extract: Extract) -> int:
     """Rows that `rating_rows` gives."""
-    if any(len(one.trial.rated_scales()) > 1 for one in all_definitions(session, study)):
+    trials = [one.trial for one in all_definitions(session, study)]
+    if any(len(trial.rated_scales()) > 1 for trial in trials):
         # A rating is a row a scale.
         return repository.rows_in_view(session, study, extract, view_of(session, study))
-    return repository.play_count(session, study, extract, active_definition(session, study).trial.kind)
+    kind = active_definition(session, study).trial.kind
+    of_one_kind = all(trial.kind == kind for trial in trials)
+    return repository.play_count(session, study, extract, None if of_one_kind else kind)
 
 
 def rating_rows(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:

@@ -5,7 +5,7 @@ from datetime import datetime
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from sqlalchemy import CursorResult, Select, TextClause, bindparam, func, select, text
+from sqlalchemy import CursorResult, Select, TextClause, bindparam, func, select, text, true
 from sqlalchemy.orm import Session
 
 from experiments.columns import View, names_of
@@ -17,6 +17,8 @@ from server.models import FormAnswer, IdentityKey, Link, Rating, RecruiterIdenti
 RUNS_AT_ONCE = 100
 RUNS_OF_ROWS_AT_ONCE, ROWS_AT_ONCE = 20, 8_000
 IDENTITIES_AT_ONCE = 500
+Runs = Sequence[tuple[int, str]]
+Rows = Sequence[Sequence[Any]]
 
 
 class KnownPerson(NamedTuple):
@@ -70,10 +72,11 @@ def answers_by_form(session: Session, run: StudyRun) -> dict[str, dict[str, Any]
     return dict(session.execute(query).all())
 
 
-def play_count(session: Session, study: Study, extract: Extract, kind: str) -> int:
-    """Stored plays of trials of this kind."""
+def play_count(session: Session, study: Study, extract: Extract, kind: str | None) -> int:
+    """Stored plays of trials of this kind; None counts those of any, which an index holds."""
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
-    return session.scalar(query.where(extract.of(study), Rating.kind == kind)) or 0
+    of_kind = true() if kind is None else Rating.kind == kind
+    return session.scalar(query.where(extract.of(study), of_kind)) or 0
 
 
 def rows_in_view(session: Session, study: Study, extract: Extract, view: View) -> int:
@@ -89,17 +92,32 @@ def rows_in_view(session: Session, study: Study, extract: Extract, view: View) -
 def view_rows(session: Session, study: Study, extract: Extract, view: View) -> Iterator[Sequence[Any]]:
     """Rows of the view (values in the order of its names) by start of the run, then trial and play.
 
-    Booleans are 0 and 1. The rows of some runs are in memory at a time, about `ROWS_AT_ONCE` of at most
-    `RUNS_OF_ROWS_AT_ONCE` runs, judged by the runs before, and are sorted here: asked to sort them,
-    PostgreSQL may read every run's trials for each run (1,800 rows a second of a million).
+    Booleans are 0 and 1. The rows of some runs are in memory at a time and are sorted here: asked to sort
+    them, PostgreSQL may read every run's trials for each run (1,800 rows a second of a million).
     """
-    connection, latest, at_once = session.connection(), 0, 1
-    of_runs, order = _rows_of_runs(view), _order(view)
+    connection, of_runs, order = session.connection(), _rows_of_runs(view), _order(view)
+
+    def read(runs: Runs) -> Rows:
+        number = {public_id: index for index, (_, public_id) in enumerate(runs)}
+        rows = plain_rows(connection.execute(of_runs, {"runs": list(number)}))
+        return sorted(rows, key=partial(order, number))
+
+    for rows in batches_of_runs(session, study, extract, read):
+        yield from rows
+
+
+def batches_of_runs(
+    session: Session, study: Study, extract: Extract, read: Callable[[Runs], Rows]
+) -> Iterator[Rows]:
+    """The rows that `read` gives of some runs at a time (id and public id), by start of the run.
+
+    They are about `ROWS_AT_ONCE` of at most `RUNS_OF_ROWS_AT_ONCE` runs, judged by the runs before.
+    """
+    latest, at_once = 0, 1
     while runs := _runs_after(session, study, extract, latest, at_once):
-        latest = runs[-1].id
-        number = {run.public_id: index for index, run in enumerate(runs)}
-        rows = _plain_rows(connection.execute(of_runs, {"runs": list(number)}))
-        yield from sorted(rows, key=partial(order, number))
+        latest = runs[-1][0]
+        rows = read(runs)
+        yield rows
         at_once = min(RUNS_OF_ROWS_AT_ONCE, max(1, ROWS_AT_ONCE * len(runs) // max(1, len(rows))))
 
 
@@ -122,16 +140,17 @@ def _rows_of_runs(view: View) -> TextClause:
     return rows.bindparams(bindparam("runs", expanding=True))
 
 
-def _plain_rows(result: CursorResult[Any]) -> Sequence[Any]:
+def plain_rows(result: CursorResult[Any]) -> Rows:
     """All rows as the driver gives them: SQLAlchemy's row objects would take a tenth of an export's time."""
     rows = result.cursor.fetchall()
     result.close()
     return rows
 
 
-def _runs_after(session: Session, study: Study, extract: Extract, latest: int, at_once: int) -> Sequence[Any]:
+def _runs_after(session: Session, study: Study, extract: Extract, latest: int, at_once: int) -> Runs:
     query = select(StudyRun.id, StudyRun.public_id).where(extract.of(study), StudyRun.id > latest)
-    return session.execute(query.order_by(StudyRun.id).limit(at_once)).all()
+    runs = session.execute(query.order_by(StudyRun.id).limit(at_once))
+    return [(run, public_id) for run, public_id in runs]
 
 
 def known_person_count(session: Session, study: Study) -> int:

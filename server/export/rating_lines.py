@@ -1,0 +1,138 @@
+"""The lines of the tidy CSV: what the rows of a run or of a clip share is read and written once.
+
+The text is that of `View.csv_row` of every row of the view in a CSV writer's hands.
+"""
+
+import csv
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
+from operator import itemgetter
+from typing import Any
+
+from sqlalchemy import Connection, TextClause, bindparam, text
+from sqlalchemy.orm import Session
+
+from experiments.columns import View
+from experiments.columns.stretches import Stretch, Stretches
+from experiments.columns.view import Dialect, levels_at, with_levels
+from server.export import repository
+from server.export.extract import Extract
+from server.export.repository import Rows, Runs
+from server.models import Study
+
+CLIPS_KEPT = 20_000
+_EMPTY = '""\n'
+Part = Callable[[Rows], Iterable[str]]
+"""The text of one stretch for each of some rows."""
+
+
+def rating_lines(
+    session: Session, study: Study, extract: Extract, view: View, factors: tuple[str, ...]
+) -> Iterator[str]:
+    """Lines of CSV without their ends, by start of the run, then trial, play and scale."""
+    connection = session.connection()
+    stretches = _stretches(view, "sqlite" if connection.dialect.name == "sqlite" else "postgresql")
+    answers, order = _of_runs(stretches.answers()), itemgetter(*range(1 + len(stretches.order)))
+    parts = list(_parts(connection, stretches, factors))
+
+    def read(runs: Runs) -> Rows:
+        result = connection.execute(answers, {"runs": [run for run, _ in runs]})
+        return sorted(repository.plain_rows(result), key=order)
+
+    for rows in repository.batches_of_runs(session, study, extract, read):
+        yield from map(",".join, zip(*(part(rows) for part in parts), strict=True))
+
+
+@cache
+def _stretches(view: View, dialect: Dialect) -> Stretches:
+    return Stretches(view, dialect)
+
+
+def _of_runs(query: str) -> TextClause:
+    return text(query).bindparams(bindparam("runs", expanding=True))
+
+
+def _parts(connection: Connection, stretches: Stretches, factors: tuple[str, ...]) -> Iterator[Part]:
+    slices = stretches.slices()
+    for stretch in stretches.all:
+        if stretch.of_run:
+            yield _RunPart(connection, stretches, stretch, factors)
+        elif stretch.clips:
+            yield _ClipPart(connection, stretches, stretch, factors)
+        else:
+            yield _AnswerPart(next(slices), stretch, factors)
+
+
+class _AnswerPart:
+    """Text that is another one in every row."""
+
+    def __init__(self, cells: slice, stretch: Stretch, factors: tuple[str, ...]) -> None:
+        self._cells, self._factors = itemgetter(cells), factors
+        self._levels = levels_at(stretch.columns)
+
+    def __call__(self, rows: Rows) -> Iterable[str]:
+        cells: Iterable[Sequence[Any]] = map(self._cells, rows)
+        if self._levels is not None:
+            cells = (with_levels(row, self._levels, self._factors) for row in cells)
+        return csv_texts(cells)
+
+
+class _RunPart:
+    """Text that is the same in all rows of a run."""
+
+    def __init__(
+        self, connection: Connection, stretches: Stretches, stretch: Stretch, factors: tuple[str, ...]
+    ) -> None:
+        self._connection, self._query = connection, _of_runs(stretches.runs(stretch))
+        self._levels, self._factors = levels_at(stretch.columns), factors
+
+    def __call__(self, rows: Rows) -> Iterable[str]:
+        runs = [row[0] for row in rows]
+        result = self._connection.execute(self._query, {"runs": list(set(runs))})
+        text_of = {
+            run: _text(with_levels(cells, self._levels, self._factors))
+            for run, *cells in repository.plain_rows(result)
+        }
+        return map(text_of.__getitem__, runs)
+
+
+class _ClipPart(dict[Any, str]):
+    """Text that is the same wherever the same clips were shown, by their ids."""
+
+    def __init__(
+        self, connection: Connection, stretches: Stretches, stretch: Stretch, factors: tuple[str, ...]
+    ) -> None:
+        super().__init__()
+        self._connection, self._query = connection, text(stretches.shown(stretch))
+        self._levels, self._factors, self._clips = levels_at(stretch.columns), factors, stretch.clips
+        self._ids = itemgetter(*map(stretches.clip_at, stretch.clips))
+
+    def __call__(self, rows: Rows) -> Iterable[str]:
+        return map(self.__getitem__, map(self._ids, rows))
+
+    def __missing__(self, ids: Any) -> str:
+        if len(self) >= CLIPS_KEPT:
+            self.clear()
+        shown = dict(zip(self._clips, ids if isinstance(ids, tuple) else (ids,), strict=True))
+        (cells,) = repository.plain_rows(self._connection.execute(self._query, shown))
+        self[ids] = _text(with_levels(cells, self._levels, self._factors))
+        return self[ids]
+
+
+def _text(cells: Iterable[Any]) -> str:
+    return csv_texts([cells])[0]
+
+
+def csv_texts(rows: Iterable[Iterable[Any]]) -> list[str]:
+    """Each row as CSV, to be put beside others, so without the line's end.
+
+    The writer calls `write` once a row. It is told of line ends, or it would not quote them. A line of one
+    empty cell has quotes, which part of a line has not.
+    """
+    lines = _Lines()
+    csv.writer(lines, lineterminator="\n").writerows(rows)
+    return ["" if line == _EMPTY else line[:-1] for line in lines]
+
+
+class _Lines(list[str]):
+    write = list.append
