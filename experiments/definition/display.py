@@ -6,6 +6,9 @@ from pydantic import Field
 
 from experiments.base import Declaration
 
+PHONE_PX = ((390, 660), (840, 340))
+"""Room of a page on a usual phone, upright and on its side, in CSS pixels."""
+
 
 class Display(Declaration):
     """How the clip must appear: size on the screen, surround, and what the device must offer."""
@@ -39,3 +42,19 @@ class Display(Declaration):
     sync_patch: bool = False
     """Draws a square into the clip's lower left corner that codes the frame's number, for a photodiode or a
     phone's film (`stimuli scope`). For measuring a set-up, not for participants."""
+
+    @property
+    def turned_away(self) -> str:
+        """Which devices can take no part, in a sentence; empty where phones can."""
+        needed = (self.minimum_width_px, self.minimum_height_px)
+        if not self.allow_touch:
+            return (
+                "Phones and tablets are turned away: devices with a touch screen and no mouse are not let in."
+            )
+        if any(needed[0] <= width and needed[1] <= height for width, height in PHONE_PX):
+            return ""
+        (width, height), _ = PHONE_PX
+        return (
+            f"Phones are turned away: a window of at least {needed[0]} x {needed[1]} px is asked for, and a "
+            f"phone has about {width} x {height}. Minimum width and height are under Screen and playback."
+        )

@@ -27,6 +27,19 @@ def fault(declared: BaseModel, languages: Sequence[str]) -> str | None:
     )
 
 
+def unlisted(declared: BaseModel, languages: Sequence[str]) -> str:
+    """A sentence on texts that nobody is offered, since their language is not listed; empty where none is."""
+    texts = list(_texts(declared))
+    codes = {code: None for _, text in texts for code in text if code not in languages}
+    if not codes:
+        return ""
+    path = next(path for path, text in texts if not codes.keys().isdisjoint(text))
+    return (
+        f"Texts in {', '.join(codes)} are offered to nobody, such as that of {path}: languages lists "
+        f"{', '.join(languages)} alone."
+    )
+
+
 def _texts(declared: BaseModel, prefix: str = "") -> Iterator[Text]:
     """Every text that was written; those by default have the languages of the page and no others."""
     for key, field in type(declared).model_fields.items():

@@ -1,7 +1,7 @@
 """The Methods paragraph: sentences whose every number names its source; plain text, LaTeX, HTML.
 
-A sentence is a template with {name} for a number, {name:s} for the ending of its plural, and words for
-what was declared.
+A sentence is a template with {name} for a number, {name:was|were} for the word that goes with one and with
+several, and words for what was declared.
 """
 
 import json
@@ -14,6 +14,7 @@ from experiments.definition import Experiment
 from server.methods.repository import Number
 
 _HOLE = re.compile(r"\{(\w+)\}")
+_AGREEING = re.compile(r"\{(\w+):([^|{}]*)\|([^|{}]*)\}")
 LATEX_SIGNS = {
     "\\": r"\textbackslash{}",
     **{sign: "\\" + sign for sign in "&%$#_{}"},
@@ -86,7 +87,10 @@ class Methods:
             name = hole[1]
             return form.format(value=self.numbers[name].value, mark=order.get(name, 0))
 
-        return _HOLE.sub(number, sentence)
+        def agreeing(word: re.Match[str]) -> str:
+            return word[2] if self.numbers[word[1]].value == 1 else word[3]
+
+        return _HOLE.sub(number, _AGREEING.sub(agreeing, sentence))
 
 
 def _escaped(text: str) -> str:
@@ -135,8 +139,8 @@ def _recruitment(recruiter: str, counted: Mapping[str, Number]) -> list[str]:
     if counted["by_recruiter"].value:
         lines.append("The recruiter named the person in {by_recruiter}; data bear pseudonyms of this study.")
     lines.append(
-        "Of all visits {complete} were completed, {withdrew} ended at the person's wish, "
-        "{screened_out} by screening, and {unfinished} were left open."
+        "Of all visits {complete} {complete:was|were} completed, {withdrew} ended at the person's wish, "
+        "{screened_out} by screening, and {unfinished} {unfinished:was|were} left open."
     )
     if counted["erased"].value:
         lines.append("Erased afterwards, answers and consent with them: {erased}.")
@@ -175,12 +179,12 @@ def _checks(experiment: Experiment, counted: Mapping[str, Number]) -> list[str]:
         lines.append(
             f"In each block {{motion_checks_per_block}} short clip{'s' * (motion.per_block != 1)} showed "
             f"what was asked by motion alone ({kinds}); of {{motion_checks}} answers to them in completed "
-            "visits {motion_checks_right} were right."
+            "visits {motion_checks_right} {motion_checks_right:was|were} right."
         )
     if counted["motion_checks_other_way"].value:
         lines.append(
-            "{motion_checks_other_way} were answered the other way that is offered to people who cannot "
-            "see such clips."
+            "{motion_checks_other_way} {motion_checks_other_way:was|were} answered the other way that is "
+            "offered to people who cannot see such clips."
         )
     return lines
 
@@ -189,12 +193,19 @@ def _warnings(experiment: Experiment) -> list[str]:
     names = ", ".join(rule.rule.replace("_", " ") for rule in experiment.warnings.rules)
     if not names:
         return []
-    ends = " {ended_by_warnings} were ended since they went on." if experiment.warnings.then == "end" else ""
-    return [f"While taking part people were warned of {names}, in {{warned}} visits.{ends}"]
+    ends = (
+        " {ended_by_warnings} {ended_by_warnings:was|were} ended since they went on."
+        if experiment.warnings.then == "end"
+        else ""
+    )
+    return [f"While taking part people were warned of {names}, in {{warned}} {{warned:visit|visits}}.{ends}"]
 
 
 def _exclusions(experiment: Experiment, rules: Sequence[tuple[str, str]]) -> list[str]:
-    by_hand = "By hand, with a reason on record, {excluded_by_hand} visits were excluded."
+    by_hand = (
+        "By hand, with a reason on record, {excluded_by_hand} "
+        "{excluded_by_hand:visit was|visits were} excluded."
+    )
     if not experiment.exclusions:
         return ["No exclusion was declared before the data.", by_hand]
     declared = ", ".join(rule.rule.replace("_", " ") for rule in experiment.exclusions)
@@ -206,8 +217,9 @@ def _exclusions(experiment: Experiment, rules: Sequence[tuple[str, str]]) -> lis
 def _display(experiment: Experiment) -> list[str]:
     lines = [
         "Every clip was drawn frame by frame in the participant's browser and each frame's time recorded; of "
-        "{plays} plays in completed visits {plays_good} were shown as declared, {plays_uncertain} could not "
-        "be verified, {plays_flagged} had a frame lost or late, and {plays_failed} failed."
+        "{plays} {plays:play|plays} in completed visits {plays_good} {plays_good:was|were} shown as "
+        "declared, {plays_uncertain} could not be verified, {plays_flagged} had a frame lost or late, and "
+        "{plays_failed} failed."
     ]
     if experiment.display.calibrate != "off":
         lines.append("The size on the screen was calibrated in {calibrated} of {complete} completed visits.")
@@ -218,15 +230,18 @@ def _evidence(counted: Mapping[str, Number]) -> list[str]:
     judged = sum(counted[name].value for name in ("likely", "unclear", "unlikely"))
     if not judged:
         return [
-            "Whether answers were given by people was not judged ({not_judged} completed visits bring no "
-            "evidence)."
+            "Whether answers were given by people was not judged ({not_judged} completed "
+            "{not_judged:visit brings|visits bring} no evidence)."
         ]
     lines = [
         "Automated answers: tickets of the server, the server's time, digests of the clips and summaries of "
-        "key and pointer presses were gathered as evidence; by them {likely} completed visits were likely a "
-        "person's, {unclear} unclear, {unlikely} unlikely, and {not_judged} could not be judged.",
+        "key and pointer presses were gathered as evidence; by them {likely} completed "
+        "{likely:visit was|visits were} likely a person's, {unclear} unclear, {unlikely} unlikely, and "
+        "{not_judged} could not be judged.",
         "This is evidence, not proof: it does not tell a person who lets a program choose the answers.",
     ]
     return (
-        [*lines, "Answers or views were refused in {refused} visits."] if counted["refused"].value else lines
+        [*lines, "Answers or views were refused in {refused} {refused:visit|visits}."]
+        if counted["refused"].value
+        else lines
     )

@@ -70,6 +70,7 @@ class DesignOut(BaseModel):
     expected_minutes: float
     notes: list[str] = Field(description="Groups, and how often each clip or pair is expected to be shown.")
     groups: list[str] = Field(description="Groups that links decide; empty where they decide none.")
+    turned_away: str = Field(description="Devices that can take no part, in a sentence; empty where all can.")
 
 
 class Checked(BaseModel):

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.assignment.groups import names
 from experiments.definition import Experiment
+from experiments.definition.languages import unlisted
 from experiments.errors import InputError, did_you_mean
 from experiments.load import DEMOS, SHIPPED, DefinitionError, locate, parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
@@ -94,15 +95,17 @@ def design_out(experiment: Experiment) -> DesignOut:
         expected_minutes=expected_minutes(experiment),
         notes=_notes(experiment),
         groups=names(experiment) if experiment.groups.by == "link" else [],
+        turned_away=experiment.display.turned_away,
     )
 
 
 def _notes(experiment: Experiment) -> list[str]:
-    """What the kind's plan adds, or why the design cannot be analysed as it stands."""
+    """What the kind's plan adds, or why the design cannot be analysed; texts that nobody is offered."""
+    unread = [note for note in [unlisted(experiment, experiment.languages)] if note]
     try:
-        return list(KINDS[experiment.trial.kind].plan(experiment))
+        return [*KINDS[experiment.trial.kind].plan(experiment), *unread]
     except InputError as error:
-        return [str(error)]
+        return [str(error), *unread]
 
 
 def check(text: str) -> Checked:

@@ -2,6 +2,7 @@ import json
 
 import pytest
 
+from experiments.definition.languages import unlisted
 from experiments.errors import InputError
 from experiments.load import (
     FOLDER,
@@ -154,6 +155,13 @@ def test_demos_are_found_by_the_names_of_their_file_and_of_the_experiment(name: 
     assert load_experiment(by_name.name) == by_name == load_experiment(str(FOLDER / f"{file}.toml"))
     with pytest.raises(InputError, match=r"no experiment 'pairs_dmo'; did you mean 'pairs-demo'\?"):
         load_experiment("pairs_dmo")
+
+
+def test_texts_that_nobody_is_offered_are_named() -> None:
+    """`unlisted` is what the builder's notes and those of the check say."""
+    assert unlisted(parse_experiment(EXP1), ("en", "de")) == ""
+    alone = parse_experiment(EXP1.replace('languages = ["en", "de"]', 'languages = ["en"]'))
+    assert unlisted(alone, alone.languages).startswith("Texts in de are offered to nobody, such as that of ")
 
 
 def test_a_text_without_the_first_language_is_refused() -> None:

@@ -17,6 +17,12 @@ export const studyQuery = (study: string) =>
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}", { params: { path: { study } } })),
   });
 
+export const sealQuery = (study: string) =>
+  queryOptions({
+    queryKey: ["study", study, "seal"],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/seal", { params: { path: { study } } })),
+  });
+
 export const clipsQuery = (study: string) =>
   queryOptions({
     queryKey: ["clips", study],

@@ -3704,6 +3704,11 @@ export interface components {
              * @description Groups that links decide; empty where they decide none.
              */
             groups: string[];
+            /**
+             * Turned Away
+             * @description Devices that can take no part, in a sentence; empty where all can.
+             */
+            turned_away: string;
         };
         /**
          * Display

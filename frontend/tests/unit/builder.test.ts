@@ -35,6 +35,14 @@ describe("the declaration's schema", () => {
     expect(all.filter(([, editor]) => editor.kind === "raw").map(([path]) => path)).toEqual([]);
   });
 
+  it("has a table for each language wherever it has something for each, and names hold texts or numbers", () => {
+    const all = new Map(editors(EXPERIMENT, ""));
+    const odd = [...all].filter(([, editor]) => editor.kind === "languages" && editorOf(editor.of).kind !== "table");
+    expect(odd.map(([path]) => path)).toEqual([]);
+    expect(all.get("groups.quotas")).toEqual({ kind: "dictionary", of: "number" });
+    expect(all.get("groups.answers")).toEqual({ kind: "dictionary", of: "text" });
+  });
+
   it("has help for every key", () => {
     const tables = [EXPERIMENT, ...Object.values(EXPERIMENT.$defs ?? {})];
     const keys = tables.flatMap((table) => Object.entries(table.properties ?? {}));

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { sizeRemark } from "../../src/admin/clips/sizes";
-import { levelsByPattern, unnamedFactors, withNames } from "../../src/admin/studies/file-pattern";
+import { levelsByPattern, patternProblem, unnamedFactors, withNames } from "../../src/admin/studies/file-pattern";
 
 const FILES = ["rosie_slow_1.mp4", "hal_slow_1.webm", "hal_fast_2.mp4"];
 
@@ -13,6 +13,13 @@ describe("levels by the names of files", () => {
 
   it("fit whichever way an accent is written", () => {
     expect(levelsByPattern("Ärm_{side}.mp4".normalize("NFD"), ["Ärm_links.mp4"])).toEqual([{ file: "Ärm_links.mp4", levels: ["links"] }]);
+  });
+
+  it("need a factor, and a pattern that every name fits", () => {
+    expect(patternProblem("", FILES)).toContain("such as {speed}");
+    expect(patternProblem("{exemplar}.mp4", FILES)).toContain("such as {speed}");
+    expect(patternProblem("{robot}_{speed}_{exemplar}.mp4", [...FILES, "notes.mp4"])).toContain("notes.mp4 does not");
+    expect(patternProblem("{robot}_{speed}_{exemplar}.mp4", FILES)).toBe(false);
   });
 
   it("ask what a factor without a name is", () => {

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { labelOfOrigin } from "../../src/admin/results/origins";
-import { cellLabels, cellPlot } from "../../src/admin/results/plots";
+import { cellLabels, cellPlot, countTicks } from "../../src/admin/results/plots";
 import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
 import { counted } from "../../src/admin/ui/format";
 
@@ -10,6 +10,16 @@ const factor = (name: string, ...levels: [string, string][]) => ({
   levels: levels.map(([level, label]) => ({ name: level, label })),
 });
 const FACTORS = [factor("character", ["a", "Anna"], ["b", "Bert"]), factor("speed", ["100", "100 ms"], ["20", "20 ms"])];
+
+describe("counts", () => {
+  it("have ticks at whole numbers alone, at most seven", () => {
+    expect(countTicks(1)).toEqual([0, 1]);
+    expect(countTicks(6)).toEqual([0, 1, 2, 3, 4, 5, 6]);
+    expect(countTicks(7)).toEqual([0, 2, 4, 6]);
+    expect(countTicks(31)).toEqual([0, 10, 20, 30]);
+    for (const largest of [13, 99, 1234, 98_765]) expect(countTicks(largest).length).toBeLessThanOrEqual(7);
+  });
+});
 
 describe("labels of cells", () => {
   it("stand in declared order, of the factors in which the cells differ", () => {

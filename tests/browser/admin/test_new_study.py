@@ -62,6 +62,9 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     page.get_by_role("tab", name="From a definition (TOML)").click()
     page.get_by_role("tab", name="From your own clips").click()
     expect(page.get_by_text("12 clips received")).to_be_visible()
+    page.get_by_label("Pattern", exact=True).fill("")
+    expect(page.get_by_text("a pattern with the name of a factor in braces")).to_be_visible()
+    expect(page.get_by_role("button", name="Create", exact=True)).to_be_disabled()
     hand.fill(page.get_by_label("Pattern", exact=True), "{robot}_{speed}_{exemplar}.mp4")
     hand.fill(page.get_by_label("Title of the study"), "Robots")
     hand.fill(page.get_by_label("Question", exact=True), "How alive is it?")
@@ -87,7 +90,14 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     page.get_by_text("robots, version 2").wait_for()
 
     hand.press("Set live")
-    hand.click(page.get_by_role("dialog").get_by_role("button", name="Set live"))
+    asked = page.get_by_role("dialog")
+    expect(asked.get_by_text("The plan is not sealed: that can only be done before")).to_be_visible()
+    expect(asked.get_by_text("Phones are turned away: a window of at least 800 x 500 px")).to_be_visible()
+    confirm = asked.get_by_role("button", name="Set live")
+    # Blue, as what begins something; red is for what is lost.
+    red, blue = confirm.evaluate("(b) => getComputedStyle(b).backgroundColor.match(/\\d+/g)")[::2]
+    assert int(blue) > int(red)
+    hand.click(confirm)
     expect(page.get_by_text("Participants can begin", exact=True)).to_be_visible()
     dialog = page.get_by_role("dialog")
     link = dialog.locator("code").first.inner_text()

@@ -70,6 +70,7 @@ def test_the_counts_are_those_of_the_runs(
         numbers[f"plays_{verdict}"] for verdict in ("good", "uncertain", "flagged", "failed")
     )
     assert "2 were completed" in answer["paragraph"]
+    assert "and 1 was left open" in answer["paragraph"]
     assert "attention checks failed" in answer["paragraph"]
     with services.database.read() as session:  # as somebody who doubts a number would
         declared = [one for one in answer["numbers"] if one["source"].startswith("declaration: ")]

@@ -8,6 +8,7 @@ import { api, type Schemas, unwrap } from "../api";
 import { Design } from "../studies/Design";
 import { JudgedEdit } from "../studies/JudgedEdit";
 import { TomlText } from "../studies/TomlText";
+import { TurnedAway } from "../studies/TurnedAway";
 import { useChange } from "../ui/useChange";
 import type { Data } from "./data";
 import { Field } from "./fields/Field";
@@ -17,7 +18,7 @@ import { EXPERIMENT } from "./schema";
 import { type Section, sectionOf, SECTIONS } from "./sections";
 import { Texts } from "./Texts";
 import { TrialPreview } from "./TrialPreview";
-import { type Builder, BuilderContext, useBuilder } from "./useBuilder";
+import { type Builder, BuilderContext, useBuilder, useBuilderHere } from "./useBuilder";
 
 interface Props {
   detail: Schemas["StudyDetail"];
@@ -70,11 +71,13 @@ export function Workbench({ detail, start }: Props) {
 }
 
 function Page({ section }: { section: Section }) {
+  const builder = useBuilderHere();
   if (section.id === "forms") return <Forms />;
   if (section.id === "texts") return <Texts />;
   return (
     <Stack gap="sm">
       {section.id === "trial" && <TrialPreview />}
+      {section.id === "screen" && <TurnedAway design={builder.design ?? undefined} />}
       {section.keys
         .map((key) => [key, EXPERIMENT.properties?.[key]] as const)
         .map(([key, schema]) =>

@@ -52,7 +52,7 @@ export type Editor =
   | { kind: "numbers" }
   | { kind: "lists" }
   | { kind: "translations" }
-  | { kind: "dictionary" }
+  | { kind: "dictionary"; of: "text" | "number" }
   | { kind: "table"; keys: [name: string, schema: Schema][]; required: string[] }
   | { kind: "variants"; tag: string; variants: Record<string, Schema> }
   | { kind: "elements"; of: Schema; atLeast: number }
@@ -104,10 +104,12 @@ function listEditor(schema: Schema): Editor {
 
 function tableEditor(schema: Schema): Editor {
   if (schema.properties !== undefined) return { kind: "table", keys: Object.entries(schema.properties), required: schema.required ?? [] };
-  if (schema.additionalProperties?.type === "string") return { kind: "dictionary" };
+  if (schema.additionalProperties?.type === "string") return { kind: "dictionary", of: "text" };
   const [inner] = Object.values(schema.patternProperties ?? {});
   if (inner === undefined) return { kind: "raw" };
-  return resolved(inner).type === "string" ? { kind: "translated" } : { kind: "languages", of: resolved(inner) };
+  const { type } = resolved(inner);
+  if (type === "integer" || type === "number") return { kind: "dictionary", of: "number" };
+  return type === "string" ? { kind: "translated" } : { kind: "languages", of: resolved(inner) };
 }
 
 /** A key that may be left out altogether (`X | None`): its schema without the null. */

@@ -4,7 +4,7 @@ import { Button, Card, FileInput, Group, Stack, Text, Title } from "@mantine/cor
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
-import { useMay } from "../queries";
+import { sealQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
@@ -12,10 +12,7 @@ import { useChange } from "../ui/useChange";
 import { notify } from "../ui/notify";
 
 export function SealCard({ study }: { study: string }) {
-  const seal = useQuery({
-    queryKey: ["study", study, "seal"],
-    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/seal", { params: { path: { study } } })),
-  });
+  const seal = useQuery(sealQuery(study));
   return (
     <Card withBorder>
       <Title order={2} size="h4">
@@ -79,6 +76,7 @@ function Unsealed({ study, seal }: Props) {
         label="Seal the plan"
         question="A seal is never replaced: what is declared in this version is what reports will be held against."
         confirm="Seal"
+        harmless
         onConfirm={() => make.mutate(undefined)}
       />
     </Group>

@@ -123,6 +123,19 @@ export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotO
   };
 }
 
+const MAX_COUNT_TICKS = 6;
+
+/** Ticks at whole numbers: there is no half answer. */
+export function countTicks(largest: number): number[] {
+  let [ten, digit] = [1, 1];
+  while (largest > MAX_COUNT_TICKS * ten * digit) {
+    if (digit === 5) [ten, digit] = [10 * ten, 1];
+    else digit = digit === 1 ? 2 : 5;
+  }
+  const step = ten * digit;
+  return Array.from({ length: Math.floor(largest / step) + 1 }, (_, index) => index * step);
+}
+
 /** A histogram of bins `step` wide that start at `from`. */
 function histogram(bins: { from: number; count: number }[], step: number, label: string, counted: string): Plot.PlotOptions {
   return {
@@ -130,7 +143,7 @@ function histogram(bins: { from: number; count: number }[], step: number, label:
     marginLeft: 52,
     marginBottom: 36,
     x: { label },
-    y: { label: counted, grid: true },
+    y: { label: counted, grid: true, ticks: countTicks(Math.max(1, ...bins.map(({ count }) => count))), tickFormat: "d" },
     marks: [
       Plot.rectY(bins, { x1: "from", x2: ({ from }: { from: number }) => from + step, y: "count", fill: SHARE_COLOUR, tip: true }),
       Plot.ruleY([0]),

@@ -4,6 +4,7 @@ import { useParams } from "@tanstack/react-router";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { Design } from "./Design";
+import { TurnedAway } from "./TurnedAway";
 
 export function DesignTab() {
   const { study = "" } = useParams({ strict: false });
@@ -12,6 +13,7 @@ export function DesignTab() {
       {(detail) => (
         <Stack>
           <Design design={detail.design} />
+          <TurnedAway design={detail.design} />
           <Accordion variant="contained">
             <Accordion.Item value="toml">
               <Accordion.Control>Definition (TOML)</Accordion.Control>

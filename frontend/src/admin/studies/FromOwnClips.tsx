@@ -5,7 +5,7 @@ import { useState } from "react";
 import type { Schemas } from "../api";
 import { UploadClips } from "../clips/UploadClips";
 import { useUpload } from "../clips/useUpload";
-import { fieldsOf, levelsByPattern, unnamedFactors, withNames } from "./file-pattern";
+import { fieldsOf, levelsByPattern, patternProblem, unnamedFactors, withNames } from "./file-pattern";
 import { StillNeeded } from "./StillNeeded";
 import { TEMPLATES } from "./templates";
 import { useCreate } from "./useCreate";
@@ -49,6 +49,7 @@ function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
   const create = useCreate(onTaken, onCreated);
   const needed = [
     (!isLooked || files.length === 0) && "clips that have been looked into",
+    by === "pattern" && patternProblem(withNames(pattern, names), files),
     name === "" && "a short name (above)",
     asked.title.trim() === "" && "a title of the study",
   ];
@@ -79,7 +80,7 @@ function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
             <TextInput
               key={field}
               label={`What are ${inWords(levels)}?`}
-              description={`The name of this factor in tables and figures, such as ‘robot’. Left open it is called ${field}.`}
+              description={`The name of this factor in tables and figures: what they are levels of, as slow and fast are of ‘speed’. Left open it is called ${field}.`}
               value={names[field] ?? ""}
               onChange={(event) => setNames({ ...names, [field]: event.currentTarget.value })}
               maw={400}

@@ -1,12 +1,15 @@
-import { Alert, Button, Card, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Alert, Anchor, Button, Card, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
 import { api, unwrap } from "../api";
+import { studiesQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { useCreate } from "./useCreate";
 
 export function FromShipped({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const shipped = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
   const create = useCreate(onTaken);
+  const present = new Set(useQuery(studiesQuery).data?.map((study) => study.name));
   return (
     <Answer of={shipped}>
       {(experiments) => (
@@ -24,7 +27,15 @@ export function FromShipped({ name, onTaken }: { name: string; onTaken: (message
                 <Text size="sm" c="dimmed" mb="md">
                   {experiment.name}
                 </Text>
-                {experiment.clips_ready ? (
+                {name === "" && present.has(experiment.name) ? (
+                  <Text size="sm" mt="auto">
+                    It is{" "}
+                    <Anchor component={Link} to={`/studies/${experiment.name}`} underline="always">
+                      there already
+                    </Anchor>
+                    . Give a short name above for another one of it.
+                  </Text>
+                ) : experiment.clips_ready ? (
                   <Group mt="auto">
                     <Button
                       loading={create.isPending && create.variables.shipped === experiment.name}

@@ -5,11 +5,14 @@ import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
+import { onDemand } from "../ui/onDemand";
 import { PagedAnswer } from "../ui/PagedAnswer";
 import { useChange } from "../ui/useChange";
-import { NewLinks } from "./NewLinks";
 import { addressFor } from "./recruit";
 import { SigningButton } from "./SigningButton";
+import { TurnedAway } from "./TurnedAway";
+
+const NewLinks = onDemand(async () => (await import("./NewLinks")).NewLinks);
 
 export function LinksTab() {
   const { study = "" } = useParams({ strict: false });
@@ -24,6 +27,7 @@ export function LinksTab() {
   const rows = links.data?.pages.flatMap((page) => page.links) ?? [];
   return (
     <Stack>
+      <TurnedAway design={detail?.design} />
       <NewLinks study={study} />
       <PagedAnswer of={links} shown={rows.length} total={links.data?.pages.at(-1)?.total} more="More links">
         <LinkTable study={study} rows={rows} recruiter={detail?.recruiter ?? null} owns={detail?.summary.rights.includes("own") ?? false} />

@@ -7,6 +7,7 @@ import { api, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { addressFor, RECRUITER_NAMES } from "./recruit";
+import { TurnedAway } from "./TurnedAway";
 
 interface Props {
   study: string;
@@ -15,7 +16,8 @@ interface Props {
 
 export function OpenedDialog({ study, onClose }: Props) {
   const link = useQuery({ queryKey: ["links", study, "general"], queryFn: () => generalLink(study) });
-  const recruiter = useQuery(studyQuery(study)).data?.recruiter;
+  const detail = useQuery(studyQuery(study)).data;
+  const recruiter = detail?.recruiter;
   const kinds = typeof recruiter?.["kind"] === "string" ? [recruiter["kind"]] : ["prolific", "sona"];
   return (
     <Modal opened onClose={onClose} title="Participants can begin" size="lg" closeButtonProps={{ "aria-label": "Close" }}>
@@ -30,6 +32,7 @@ export function OpenedDialog({ study, onClose }: Props) {
                 url={addressFor(url, kind === recruiter?.["kind"] ? recruiter : { kind })}
               />
             ))}
+            <TurnedAway design={detail?.design} />
             <Text size="sm" c="dimmed">
               Personal links, quotas and completion codes are under{" "}
               <Link to="/studies/$study/links" params={{ study }} onClick={onClose}>

@@ -7,12 +7,12 @@ import { Answer } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { onDemand } from "../ui/onDemand";
-import { CompareVersions } from "./CompareVersions";
-import { LifeCycle } from "./LifeCycle";
 import { PageLanguages } from "./PageLanguages";
 import { RetentionCard } from "./RetentionCard";
 import { Running } from "./Running";
 
+const CompareVersions = onDemand(async () => (await import("./CompareVersions")).CompareVersions);
+const LifeCycle = onDemand(async () => (await import("./LifeCycle")).LifeCycle);
 const Sharing = onDemand(async () => (await import("./Sharing")).Sharing);
 
 export function SettingsTab() {

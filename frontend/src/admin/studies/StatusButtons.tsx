@@ -4,7 +4,10 @@ import { api, type Schemas, unwrap } from "../api";
 import { keptWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
+import { onDemand } from "../ui/onDemand";
 import { OpenedDialog } from "./OpenedDialog";
+
+const BeforeOpening = onDemand(async () => (await import("./BeforeOpening")).BeforeOpening);
 
 type Status = Schemas["StudySummary"]["status"];
 const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draft", "live", "closed"], live: ["closed"], closed: ["live"] };
@@ -50,8 +53,11 @@ export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] })
           label={WORDS[status][0]}
           question={`${WORDS[status][1]}${keptWork(summary.name) === null ? "" : " The work in the builder is not saved and not part of it."}`}
           confirm={WORDS[status][0]}
+          harmless={status !== "closed"}
           onConfirm={() => change.mutate(status)}
-        />
+        >
+          {isOpen(status) && <BeforeOpening study={summary.name} status={status} />}
+        </ConfirmButton>
       ))}
       {opened && <OpenedDialog study={summary.name} onClose={() => setOpened(false)} />}
     </Group>

@@ -28,6 +28,13 @@ export function levelsByPattern(pattern: string, files: readonly string[]): File
     .sort((a, b) => Number(a.levels !== null) - Number(b.levels !== null));
 }
 
+/** What a pattern lacks before a study can be made by it; false where nothing. */
+export function patternProblem(pattern: string, files: readonly string[]): string | false {
+  if (fieldsOf(pattern).every((field) => field === EXEMPLAR)) return "a pattern with the name of a factor in braces, such as {speed}";
+  const strays = levelsByPattern(pattern, files).filter(({ levels }) => levels === null);
+  return strays.length > 0 && `a pattern that every file name fits (${strays[0]?.file ?? ""} does not), or a table`;
+}
+
 export interface Unnamed {
   field: string;
   levels: string[];

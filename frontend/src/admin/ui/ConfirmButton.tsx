@@ -1,16 +1,21 @@
-/** A button that asks once more before something is lost. */
+/** A button that asks once more before something is lost, or begins. */
 
 import { Button, type ButtonProps, Group, Modal, Text } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
+import type { ReactNode } from "react";
 
 interface Props extends ButtonProps {
   label: string;
   question: string;
+  /** What else to know before, below the question. */
+  children?: ReactNode;
   confirm: string;
+  /** True where nothing is lost by it. */
+  harmless?: boolean;
   onConfirm: () => void;
 }
 
-export function ConfirmButton({ label, question, confirm, onConfirm, ...button }: Props) {
+export function ConfirmButton({ label, question, children, confirm, harmless = false, onConfirm, ...button }: Props) {
   const [opened, { open, close }] = useDisclosure(false);
   return (
     <>
@@ -18,13 +23,14 @@ export function ConfirmButton({ label, question, confirm, onConfirm, ...button }
         {label}
       </Button>
       <Modal opened={opened} onClose={close} title={label} closeButtonProps={{ "aria-label": "Close" }}>
-        <Text mb="md">{question}</Text>
-        <Group justify="flex-end">
+        <Text>{question}</Text>
+        {children}
+        <Group justify="flex-end" mt="md">
           <Button variant="default" onClick={close}>
             Cancel
           </Button>
           <Button
-            color="red"
+            {...(harmless ? {} : { color: "red" })}
             onClick={() => {
               close();
               onConfirm();

@@ -4,6 +4,7 @@ import { Stack, Textarea } from "@mantine/core";
 import { useState } from "react";
 import { languageName } from "../../ui/format";
 import { type Data, isTable, textAt } from "../data";
+import { editorOf } from "../schema";
 import { type FieldProps, useField } from "./useField";
 
 /** Texts in an order, each in every language: a line a text. */
@@ -59,9 +60,16 @@ export function Numbers(props: FieldProps) {
   );
 }
 
-/** Words that stand for words: `key = value`, one a line. */
+/** A number where the key holds numbers and it is one; what is none is said by the check. */
+function valueOf(entered: string, of: "text" | "number"): string | number {
+  return of === "number" && entered !== "" && Number.isFinite(Number(entered)) ? Number(entered) : entered;
+}
+
+/** Words that stand for words or numbers: `key = value`, one a line. */
 export function Dictionary(props: FieldProps) {
   const { value, label, help, problem, set } = useField(props);
+  const editor = editorOf(props.schema);
+  const of = editor.kind === "dictionary" ? editor.of : "text";
   const [text, setText] = useState(() =>
     Object.entries(isTable(value) ? value : {})
       .map(([key, word]) => `${key} = ${String(word)}`)
@@ -80,7 +88,7 @@ export function Dictionary(props: FieldProps) {
         setText(event.currentTarget.value);
         const pairs = event.currentTarget.value.split("\n").map((line) => line.split("=").map((part) => part.trim()));
         const full = pairs.filter(([key, ...rest]) => key !== undefined && key !== "" && rest.length > 0);
-        set(full.length === 0 ? undefined : Object.fromEntries(full.map(([key, ...rest]) => [key, rest.join("=")])));
+        set(full.length === 0 ? undefined : Object.fromEntries(full.map(([key, ...rest]) => [key, valueOf(rest.join("="), of)])));
       }}
     />
   );
