@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from analysis.opinion.doubts import doubts
+from analysis.opinion.people import PersonScore, person_scores
 from analysis.opinion.projection import Projection, alternating_projection
 from analysis.read.number_columns import numbers, unusual_numbers
 from analysis.read.text_table import name_lines, read_text_table, refuse_shared_roles, texts_required
@@ -33,7 +35,11 @@ class Votes:
 
 @dataclass(frozen=True)
 class ItemScore:
-    """One item. mos, sd (n - 1), se and the 95% interval (t with n - 1); `recovered` from the model."""
+    """One item. mos, sd (n - 1), se and the 95% interval (t with n - 1); `recovered` from the model.
+
+    What does not exist (an SD of one vote, a recovered score where only people of one vote rated) is NaN.
+    `group` numbers the items that raters tie together from 1; None where nothing was recovered.
+    """
 
     name: str
     mos: float
@@ -46,18 +52,7 @@ class ItemScore:
     recovered_se: float
     recovered_ci_low: float
     recovered_ci_high: float
-
-
-@dataclass(frozen=True)
-class PersonScore:
-    """One person: bias against the others, inconsistency, correlation with the MOS, and BT.500's ruling."""
-
-    name: str
-    n: int
-    bias: float
-    inconsistency: float
-    correlation: float | None
-    rejected_bt500: bool
+    group: int | None
 
 
 @dataclass(frozen=True)
@@ -69,6 +64,7 @@ class OpinionResult:
     n_votes: int
     repeats: Repeats
     iterations: int
+    n_groups: int
     decisions: tuple[str, ...]
 
 
@@ -135,12 +131,14 @@ def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
     if np.any(votes.counts > 1):
         word = "a person's mean counts once" if repeats == "mean" else "every vote counts"
         decisions.append(f"some people rated an item more than once: {word}")
+    decisions += doubts(model, votes.people, votes.items)
     return OpinionResult(
         tuple(_item(votes, model, index, repeats) for index in range(len(votes.items))),
-        _people(votes, model),
+        person_scores(votes.people, votes.scores, votes.counts, model),
         int(votes.counts.sum()),
         repeats,
         model.iterations,
+        int(model.groups.max()) + 1,
         tuple(decisions),
     )
 
@@ -166,44 +164,5 @@ def _item(votes: Votes, model: Projection, index: int, repeats: Repeats) -> Item
         error,
         recovered - wide,
         recovered + wide,
+        int(model.groups[index]) + 1 if model.groups[index] >= 0 else None,
     )
-
-
-def _people(votes: Votes, model: Projection) -> tuple[PersonScore, ...]:
-    rejected = bt500_rejects(votes.scores)
-    mos = np.nanmean(votes.scores, axis=0)
-    people = []
-    for index, name in enumerate(votes.people):
-        row = votes.scores[index]
-        seen = np.isfinite(row)
-        varied = seen.sum() > 2 and np.ptp(row[seen]) > 0 and np.ptp(mos[seen]) > 0
-        people.append(
-            PersonScore(
-                name,
-                int(votes.counts[index].sum()),
-                float(model.bias[index]),
-                float(model.inconsistency[index]),
-                float(np.corrcoef(row[seen], mos[seen])[0, 1]) if varied else None,
-                bool(rejected[index]),
-            )
-        )
-    return tuple(people)
-
-
-def bt500_rejects(scores: Array) -> NDArray[np.bool_]:
-    """Screen people by ITU-R BT.500: too many votes far from an item's mean, on both sides alike (people,).
-
-    A vote is far beyond 2 SD of the item's votes where their kurtosis is between 2 and 4, beyond sqrt(20) SD
-    elsewhere; a person goes where more than 5% of the votes are far and the sides differ by less than 30%.
-    """
-    mean, sd = np.nanmean(scores, axis=0), np.nanstd(scores, axis=0, ddof=1)
-    centred = scores - mean
-    with np.errstate(invalid="ignore", divide="ignore"):
-        kurtosis = np.nanmean(centred**4, axis=0) / np.nanmean(centred**2, axis=0) ** 2
-    limit = np.where((kurtosis >= 2) & (kurtosis <= 4), 2.0, np.sqrt(20.0)) * sd
-    varied = sd > 0
-    above = np.sum((centred >= limit) & varied, axis=1)
-    below = np.sum((centred <= -limit) & varied, axis=1)
-    share = (above + below) / np.sum(np.isfinite(scores), axis=1)
-    lean = np.abs(above - below) / np.maximum(above + below, 1)
-    return np.asarray((share > 0.05) & (lean < 0.3))

@@ -7,20 +7,22 @@ from analysis.report.numbers import DASH, fixed, share
 
 
 def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> Table:
-    """Items from the best down."""
+    """Items from the best down, within each group of items that people rated across."""
     rows = tuple(
         (
             item.name,
+            *((str(item.group or DASH),) if result.n_groups > 1 else ()),
             fixed(item.mos),
             fixed(item.sd),
             str(item.n),
-            f"{fixed(item.ci_low)} to {fixed(item.ci_high)}",
+            f"{fixed(item.ci_low)} to {fixed(item.ci_high)}" if item.n > 1 else DASH,
             fixed(item.recovered),
             fixed(item.recovered_se),
         )
-        for item in sorted(result.items, key=lambda one: (-one.mos, one.name))
+        for item in sorted(result.items, key=lambda one: (one.group or 0, -one.mos, one.name))
     )
-    header = ("Item", "MOS", "SD", "n", "95% CI", "Recovered", "SE")
+    group = ("Group",) if result.n_groups > 1 else ()
+    header = ("Item", *group, "MOS", "SD", "n", "95% CI", "Recovered", "SE")
     notes = ("Recovered: biases taken off, votes weighted by consistency (alternating projection).",)
     title = caption("Mean opinion scores", name, synthetic)
     return Table("opinion", title, header, rows, 1, notes)
@@ -32,12 +34,12 @@ def raters_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
         (
             person.name,
             str(person.n),
-            fixed(person.bias),
-            fixed(person.inconsistency),
+            DASH if person.bias is None else fixed(person.bias),
+            DASH if person.inconsistency is None else fixed(person.inconsistency),
             DASH if person.correlation is None else share(person.correlation, 2),
             "rejected" if person.rejected_bt500 else "",
         )
-        for person in sorted(result.participants, key=lambda one: (-abs(one.bias), one.name))
+        for person in sorted(result.participants, key=lambda one: (-abs(one.bias or 0.0), one.name))
     )
     header = ("Person", "Votes", "Bias", "Inconsistency", "r with MOS", "BT.500")
     title = caption("People", name, synthetic)
