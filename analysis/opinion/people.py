@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 class PersonScore:
     """One person: bias against the others, inconsistency, correlation with the MOS, and BT.500's ruling.
 
-    `bias`, `inconsistency` and `group` (the number of the items' group) are None for people of one vote;
-    `common_weight`: whose inconsistency fell to nothing and who are weighted by the common one.
+    `bias`, `inconsistency` and `group` (the number of the items' group) are None for people of one vote.
+    Whose inconsistency fell to nothing has `common_weight`: the one that all people have in common.
     """
 
     name: str

@@ -129,10 +129,10 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
     parameters = np.zeros(model.names)
     previous = -np.inf
     for _ in range(STEPS_MAX):
-        value, gradient, information, shares = step(model, counts, parameters, firth)
+        value, gradient, information, curvature, shares = step(model, counts, parameters, firth)
         if np.any(np.abs(parameters[: model.design.shape[1]]) > FAR):
-            raise no_maximum()
-        change = _solved(information, gradient)
+            raise no_maximum(firth)
+        change = _solved(curvature, gradient)
         if value - previous < TOLERANCE * (1 + abs(value)) and np.max(np.abs(change), initial=0) < 1e-9:
             covariance = np.linalg.inv(information).astype(np.float64)
             return Fit(parameters, covariance, _plain(counts, shares), shares)
@@ -140,7 +140,7 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
         while size > 1e-8 and step(model, counts, parameters + size * change, firth)[0] < value - 1e-12:
             size /= 2
         parameters, previous = parameters + size * change, value
-    raise no_maximum()
+    raise no_maximum(firth)
 
 
 def sandwich(fitted: Fit, clusters: Array) -> Array:
@@ -162,11 +162,12 @@ def sandwich(fitted: Fit, clusters: Array) -> Array:
     return robust
 
 
-def no_maximum() -> InputError:
-    """The likelihood grows without end."""
+def no_maximum(firth: bool = False) -> InputError:
+    """The likelihood grows without end, or `firth` was of no avail."""
+    remedy = "leave it out" if firth else "add --firth for finite estimates, or leave it out"
     return InputError(
         "the likelihood has no maximum: some item (or level) wins or loses every comparison with the others; "
-        "add --firth for finite estimates, or leave it out"
+        f"{remedy}"
     )
 
 
@@ -186,7 +187,8 @@ def _plain(counts: Counts, shares: Array) -> float:
 
 def _softmax_step(
     model: Model, counts: Counts, parameters: Array, firth: bool
-) -> tuple[float, Array, Array, Array]:
+) -> tuple[float, Array, Array, Array, Array]:
+    """Log-likelihood, gradient, information, the curvature that a step goes by, and shares of outcomes."""
     z = scores(model, counts.left, counts.right)
     eta = z @ parameters
     eta -= eta.max(axis=1, keepdims=True)
@@ -197,18 +199,23 @@ def _softmax_step(
     information = np.einsum("mo,mop,moq->pq", weights, centred, centred)
     gradient = np.einsum("mo,mop->p", counts.outcomes - weights, z)
     value = float(np.sum(counts.outcomes * np.log(shares)))
+    curvature = information
     if firth:
         difference = z[:, LEFT] - z[:, RIGHT]
         spread = counts.totals * shares[:, LEFT] * shares[:, RIGHT]
         leverage = spread * np.einsum("mp,pq,mq->m", difference, np.linalg.inv(information), difference)
         gradient = gradient + (leverage * (0.5 - shares[:, LEFT])) @ difference
         value += 0.5 * float(np.linalg.slogdet(information)[1])
-    return value, gradient, information, shares
+        # The penalty acts like as many more comparisons as the leverage: steps without them overshoot, and of
+        # a single comparison, whose leverage is 1, they go to and fro for ever.
+        more = spread + leverage * shares[:, LEFT] * shares[:, RIGHT]
+        curvature = np.einsum("m,mp,mq->pq", more, difference, difference)
+    return value, gradient, information, curvature, shares
 
 
 def _thurstone_step(
     model: Model, counts: Counts, parameters: Array, firth: bool
-) -> tuple[float, Array, Array, Array]:
+) -> tuple[float, Array, Array, Array, Array]:
     r"""Thurstone's case V: the difference of two impressions is normal with SD 1.
 
     .. math::
@@ -233,4 +240,4 @@ def _thurstone_step(
     weight = counts.totals * np.exp(2 * density - log_left - log_right)
     information = np.einsum("m,mp,mq->pq", weight, difference, difference)
     value = float(counts.outcomes[:, LEFT] @ log_left + counts.outcomes[:, RIGHT] @ log_right)
-    return value, (toward - away) @ difference, information, shares
+    return value, (toward - away) @ difference, information, information, shares

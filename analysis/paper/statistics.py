@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy import special
 
+from analysis.paper.clause import own_clause
 from analysis.paper.printed import Rounded
 from analysis.report.numbers import share
 from analysis.within.eta_squared import partial_eta_squared_ci
@@ -24,7 +25,7 @@ _WHOLE = r"(?![\d.]*\d|,\d)"
 """Not a part of a longer number: of one with a decimal comma the whole part would be read for all of it."""
 _STATISTIC = re.compile(
     rf"(?<![A-Za-z])(?:"
-    rf"(?P<F>F) ?[(\[] ?(?P<f1>{_NUMBER}) ?[,;/] ?(?P<f2>{_NUMBER}) ?[)\]]"
+    rf"(?P<F>F)[12]? ?[(\[] ?(?P<f1>{_NUMBER}) ?[,;/] ?(?P<f2>{_NUMBER}) ?[)\]]"
     rf"|(?P<t>t) ?[(\[] ?(?P<t1>{_NUMBER}) ?[)\]]"
     rf"|(?P<chi2>(?:χ|chi)[- ]?2|chi[- ]squared?|X2) ?[(\[] ?(?P<c1>{_NUMBER})"
     rf"(?: ?[,;] ?N ?= ?[\d,]+)? ?[)\]]"
@@ -104,7 +105,7 @@ def check_text(text: str) -> TextCheck:
     statistics, covered = [], []
     for match, following in zip_longest(matches, matches[1:]):
         end = min(match.end() + REACH, following.start() if following else len(text))
-        tail = text[match.end() : end].split("\n\n")[0]
+        tail = own_clause(text[match.end() : end].split("\n\n")[0])
         reported, used = _reported(match, tail)
         statistics.append(reported)
         covered.append((match.start(), match.end() + used))

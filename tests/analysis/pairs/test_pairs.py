@@ -99,6 +99,15 @@ def test_an_item_that_always_wins_is_named_and_firth_keeps_it_finite(tmp_path: P
     assert -6 < ability["b"] < -1
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 10])
+def test_firth_of_few_comparisons_of_one_pair_is_the_log_of_twice_their_number_and_one(
+    tmp_path: Path, n: int
+) -> None:
+    """The penalised score is w - n p + 1/2 - p, so that n of n won give p = (n + 1/2) / (n + 1)."""
+    result = fitted(table(tmp_path, [("a", "b", "right")] * n), firth=True)
+    assert result.items[1].ability == pytest.approx(np.log(2 * n + 1), rel=1e-8)
+
+
 def test_firth_on_one_pair_adds_half_a_win_to_each_side(tmp_path: Path) -> None:
     result = fitted(table(tmp_path, [("a", "b", "right")] * 5), firth=True)
     assert result.items[1].ability == pytest.approx(np.log(5.5 / 0.5), rel=1e-8)

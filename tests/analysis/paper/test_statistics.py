@@ -130,3 +130,38 @@ def test_text_without_statistics_has_none(tmp_path) -> None:
     result = CliRunner().invoke(app, ["check-paper", str(file)])
     assert result.exit_code == 0
     assert "0 statistics read" in result.output
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "The effect was large, F(1, 20) = 9.00; age did not matter, p = .40.",
+        "There was an effect, t(20) = 3.1, whereas the interaction was not significant (p = .60).",
+        "It rose, t(30) = 2.1. In a second test p = .5 was seen.",
+        "F(1, 20) = 9.00, MSE = 0.3; the group × time interaction, p = .30, was not",
+        "F(1, 20) = 9.00, the other factor being without any, p = .30",
+        "F(1, 20) = 9.00; generalised η² = .02, partial η² of the interaction with age, p = .30",
+    ],
+)
+def test_a_p_of_the_next_clause_is_not_that_of_the_statistic_before(text) -> None:
+    check = check_text(plain(text))
+    assert check.statistics[0].p is None, check.statistics
+    assert check.n_wrong == 0
+    assert any("p = ." in one for one in check.unread)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "F(1, 20) = 9.00, MSE = 2.3, p = .007",
+        "F(1, 20) = 9.00; partial eta squared = .31; p = .007",
+        "F(1, 20) = 9.00, Greenhouse-Geisser corrected p = .007",
+        "F(1, 20) = 9.00, with an effect size of η² = .31, p = .007",
+        "F1(1, 20) = 9.00, p = .007",
+        "t(18) = -2.45, d = 0.55, 95% CI [0.1, 1.0], BF10 = 2.5, p = .025",
+        "t(18) = -2.45, which was significant, p = .025",
+        "F(1, 20) = 9.00 (p = .007)",
+    ],
+)
+def test_a_p_behind_sizes_and_words_of_reports_is_its_own(text) -> None:
+    assert only(text).verdict == "consistent"
