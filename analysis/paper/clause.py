@@ -22,7 +22,7 @@ def own_clause(tail: str) -> str:
     """The beginning of `tail`, the text behind a statistic, that can hold its own p and effect size.
 
     Another clause begins with a sentence, a contrast, the first word behind a semicolon that no report of a
-    statistic has, or with more than `WORDS_MAX` such words elsewhere: what follows there is of something else.
+    statistic has, or with more than `WORDS_MAX` such words elsewhere: what follows is of something else.
     """
     ends = [found.start() for pattern in (_END_OF_SENTENCE, _CONTRAST) if (found := pattern.search(tail))]
     tail = tail[: min(ends, default=len(tail))]

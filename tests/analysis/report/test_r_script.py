@@ -1,5 +1,6 @@
 """The report's R script computes its tables anew: where R is, it agrees, and it finds a changed number."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -232,3 +233,32 @@ def test_without_a_report_there_is_nothing_to_verify() -> None:
     told = CliRunner().invoke(app, call)
     assert isinstance(told.exception, InputError)
     assert "add e.g. --out results" in str(told.exception)
+
+
+def test_a_size_that_r_has_not_differs(tmp_path) -> None:
+    needed("afex", "car", "emmeans")
+    path = report(tmp_path / "lacking", *CASES["within"])
+    script = path.read_text()
+    for line, lack in (("sizes <- as.data.frame(", "sizes$ges[1] <- NA"), ("own_dz <- ", "own_dz[1] <- NA")):
+        at = script.index("\n", script.index(f"\n{line}") + 1)
+        script = f"{script[:at]}\n{lack}{script[at:]}"
+    path.write_text(script)
+    (said,) = run_together([path])
+    differing = {" ".join(line.split()[:2]) for line in said.splitlines() if line.endswith(": DIFFER")}
+    assert differing == {"sizes general", "dz dz", "dz interval"}
+
+
+def test_bounds_beyond_what_r_can_are_counted_aloud(tmp_path) -> None:
+    needed("afex", "car", "emmeans")
+    rows = [
+        f"p{i},a{a},{5 * a + (i * (3 + a) % 7) / 900 + (a == 2) * (i % 3)}"
+        for i in range(9)
+        for a in range(3)
+    ]
+    (tmp_path / "far.csv").write_text("\n".join(["id,A,y", *rows]))
+    call = ["anova", str(tmp_path / "far.csv"), "--participant", "id", "--rating", "y", "--within", "A"]
+    told = CliRunner().invoke(app, [*call, "--out", str(tmp_path / "far")])
+    assert told.exit_code == 0, told.output
+    (said,) = run_together([tmp_path / "far" / "verify.R"])
+    assert re.search(r"[24] of 6 numbers not compared: beyond R's noncentral t", said), said
+    assert "Every number agrees with R." in said
