@@ -154,7 +154,7 @@ def refuse_shared_roles(names: Sequence[str]) -> None:
 
 def texts_required(table: TextTable, name: str) -> None:
     """Refuse empty cells in a column of names; codes of an SPSS file take the words the file has for them."""
-    table.columns[name] = _worded(table.columns[name], table.labels.get(name, {}))
+    table.columns[name] = _worded(table, table.columns[name], table.labels.get(name, {}))
     column = table.columns[name]
     if "" in column.cat.categories:
         row = int(np.argmax((column == "").to_numpy()))
@@ -166,10 +166,20 @@ def texts_required(table: TextTable, name: str) -> None:
             table.decisions.append(f"'{other}' and '{text}' of '{name}' differ in case only; kept apart")
 
 
-def _worded(column: "pd.Series[Any]", words: Mapping[str, str]) -> "pd.Series[Any]":
+def _worded(table: TextTable, column: "pd.Series[Any]", words: Mapping[str, str]) -> "pd.Series[Any]":
     if not words:
         return column
-    names = [words.get(text, text) for text in column.cat.categories]
+    codes = list(column.cat.categories)
+    names = [words.get(code, code) for code in codes]
+    twice = {name for name, times in Counter(names).items() if times > 1}
+    if twice:
+        table.decisions.append(
+            f"several codes of '{column.name}' have one word ({', '.join(sorted(twice))}); "
+            "kept apart by their codes"
+        )
+        names = [
+            f"{name} ({code})" if name in twice else name for name, code in zip(names, codes, strict=True)
+        ]
     return pd.Series(categorical(column.cat.codes.to_numpy(), names), index=column.index)
 
 

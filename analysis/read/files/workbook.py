@@ -1,5 +1,8 @@
 """Excel workbooks (.xlsx): one sheet, its first row the header."""
 
+import zlib
+from dataclasses import dataclass
+from datetime import date
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,23 +14,50 @@ from experiments.errors import InputError, did_you_mean
 Rows = list[list[Any]]
 
 
+@dataclass(frozen=True)
+class Page:
+    """A sheet from its first row that holds anything, which is row `first`, and its merged cells.
+
+    `merged` has a text like `A2:A4` and the rows and columns from and to, counted from 1.
+    """
+
+    rows: Rows
+    first: int
+    merged: tuple[tuple[str, int, int, int, int], ...]
+
+
+_UNREADABLE = (
+    *(BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError),
+    *(AttributeError, TypeError, IndexError, SyntaxError),
+)
+"""What openpyxl raises of damaged or unusual workbooks; broken XML is a SyntaxError."""
+
+
 def header(path: Path, sheet: str | None) -> list[str]:
     """Names of the columns of a sheet."""
-    return _header(path, _rows(path, sheet)[1])
+    return _header(path, _page(path, sheet)[1])
 
 
 def cells(path: Path, sheet: str | None, names: list[str]) -> Cells:
     """The columns `names` of a sheet; a formula that Excel never calculated is refused, it has no value."""
-    title, rows = _rows(path, sheet)
-    columns = _header(path, rows)
+    title, page = _page(path, sheet)
+    columns = _header(path, page)
     width = len(columns)
-    body = [(row + [None] * width)[:width] for row in rows[1:]]
+    body = [(row + [None] * width)[:width] for row in page.rows[1:]]
+    _refuse_merged(path, page, columns, names)
     _refuse_uncalculated(path, title, columns, body, names)
-    return cells_of(columns, body, names, 2, decisions=(f"read from the sheet '{title}' of {path.name}",))
+    said = (f"read from the sheet '{title}' of {path.name}", *_dates_beside(page, columns, body, names))
+    return cells_of(columns, body, names, page.first + 1, decisions=said)
 
 
-def _header(path: Path, rows: Rows) -> list[str]:
-    names = ["" if value is None else str(value).strip() for value in rows[0]] if rows else []
+def _header(path: Path, page: Page) -> list[str]:
+    for text, low, left, high, right in page.merged:
+        if low <= page.first <= high and right > left:
+            raise InputError(
+                f"{path.name}: the first row has merged cells ({text}); expected one row that names every "
+                "column: unmerge them, give each column a name of its own (blur_calm), and delete rows above"
+            )
+    names = ["" if value is None else str(value).strip() for value in page.rows[0]] if page.rows else []
     while names and not names[-1]:
         names.pop()
     if not names:
@@ -35,14 +65,41 @@ def _header(path: Path, rows: Rows) -> list[str]:
     return names
 
 
-def _rows(path: Path, sheet: str | None, formulas: bool = False) -> tuple[str, Rows]:
-    """Title and rows of the sheet named, or of the only one that holds anything."""
+def _refuse_merged(path: Path, page: Page, columns: list[str], names: list[str]) -> None:
+    """Merged cells of a column that is read: all but the first are empty, whatever the sheet looks like."""
+    for text, _, left, high, right in page.merged:
+        for name in names:
+            if high > page.first and left <= columns.index(name) + 1 <= right:
+                raise InputError(
+                    f"{path.name}: the cells {text} of '{name}' are merged, and only the first of them holds "
+                    "a value; unmerge them and fill every row"
+                )
+
+
+def _dates_beside(page: Page, columns: list[str], body: Rows, names: list[str]) -> list[str]:
+    """Say it where a few cells of a column are dates: spreadsheets make dates of text like 1-5."""
+    said = []
+    for name in names:
+        given = [(i, row[columns.index(name)]) for i, row in enumerate(body)]
+        dates = [(i, value) for i, value in given if isinstance(value, date)]
+        if dates and len(dates) < sum(value is not None for _, value in given):
+            i, value = dates[0]
+            example = f"{value.isoformat()[:10]} in row {page.first + 1 + i}"
+            said.append(
+                f"'{name}' holds dates among other values ({example}); "
+                "spreadsheets make dates of text like 1-5 or 3.4"
+            )
+    return said
+
+
+def _page(path: Path, sheet: str | None, formulas: bool = False) -> tuple[str, Page]:
+    """Title and page of the sheet named, or of the only one that holds anything."""
     pages = _pages(path, path.stat().st_mtime_ns, formulas)
     if sheet is not None:
         if sheet not in pages:
             raise InputError(f"{path.name} has no sheet '{sheet}'{did_you_mean(sheet, pages)}")
         return sheet, pages[sheet]
-    filled = [title for title, rows in pages.items() if any(any(v is not None for v in row) for row in rows)]
+    filled = [title for title, page in pages.items() if page.rows]
     if len(filled) > 1:
         raise InputError(
             f"{path.name} has {len(filled)} sheets with cells ({', '.join(filled)}); name one: "
@@ -53,18 +110,29 @@ def _rows(path: Path, sheet: str | None, formulas: bool = False) -> tuple[str, R
 
 
 @lru_cache(maxsize=2)
-def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Rows]:
-    """Rows of every sheet; read once for the header and for the cells."""
+def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
+    """Every sheet; read once for the header and for the cells."""
     from openpyxl import load_workbook
     from openpyxl.utils.exceptions import InvalidFileException
 
     try:
         book = load_workbook(path, data_only=not formulas)
-    except (BadZipFile, InvalidFileException, KeyError, ValueError, OSError) as error:
+    except (*_UNREADABLE, InvalidFileException) as error:
+        said = " ".join(str(error).split())
         raise InputError(
-            f"{path.name} is not an Excel workbook ({error}); save it as .xlsx or CSV"
+            f"{path.name} is not an Excel workbook that can be read ({said}); save it as .xlsx anew or as CSV"
         ) from error
-    return {page.title: [list(row) for row in page.iter_rows(values_only=True)] for page in book.worksheets}
+    return {sheet.title: _page_of(sheet) for sheet in book.worksheets}
+
+
+def _page_of(sheet: Any) -> Page:
+    rows = [list(row) for row in sheet.iter_rows(values_only=True)]
+    first = next((i for i, row in enumerate(rows) if any(value is not None for value in row)), len(rows))
+    merged = tuple(
+        (str(area), area.min_row, area.min_col, area.max_row, area.max_col)
+        for area in sheet.merged_cells.ranges
+    )
+    return Page(rows[first:], first + 1, merged)
 
 
 def _refuse_uncalculated(path: Path, title: str, columns: list[str], body: Rows, names: list[str]) -> None:
@@ -72,11 +140,12 @@ def _refuse_uncalculated(path: Path, title: str, columns: list[str], body: Rows,
     empty = [(i, p) for i, row in enumerate(body) for p in positions if row[p] is None]
     if not empty:
         return
-    formulas = _rows(path, title, formulas=True)[1][1:]
+    page = _page(path, title, formulas=True)[1]
+    formulas = page.rows[1:]
     for i, p in empty:
         held = formulas[i][p] if p < len(formulas[i]) else None
         if isinstance(held, str) and held.startswith("="):
             raise InputError(
-                f"{path.name}: row {i + 2} of '{columns[p]}' holds the formula {held} without its value; "
-                "open the file in a spreadsheet program and save it, or save it as CSV"
+                f"{path.name}: row {page.first + 1 + i} of '{columns[p]}' holds the formula {held} "
+                "without its value; open the file in a spreadsheet program and save it, or save it as CSV"
             )

@@ -156,7 +156,7 @@ def test_cells_that_are_no_ratings_are_refused(tmp_path, score, said) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("a.xlsx", "no zip", "is not an Excel workbook"),
+        ("a.xlsx", "no zip", "is not an Excel workbook that can be read"),
         ("a.sav", "no spss", "is not an SPSS file"),
         ("a.json", "{", "is not JSON"),
         ("a.json", f'[{{"x": {"9" * 5000}}}]', "is not JSON that can be read"),

@@ -1,0 +1,92 @@
+"""Workbooks and SPSS files as people have them: merged heads, dates, charts, words and missing values."""
+
+from datetime import datetime
+
+import openpyxl
+import pandas as pd
+import pyreadstat
+import pytest
+
+from analysis.read.long_csv import LongData, read_long_table
+from experiments.errors import InputError
+
+HEAD = ("id", "cond", "score")
+ROWS = [(f"p{i}", cond, 1 + (2 * i + 3 * k) % 7) for i in range(4) for k, cond in enumerate("abc")]
+
+
+def read(path) -> LongData:
+    return read_long_table(path, "id", "score", ["cond"])
+
+
+def workbook(path, rows, merged=()):
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    for area in merged:
+        book.active.merge_cells(area)
+    book.save(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("rows", "merged", "said"),
+    [
+        ([("My study", None, None), HEAD, *ROWS], ["A1:C1"], "first row has merged cells (A1:C1)"),
+        ([("id", "blur", None), (None, "a", "b"), ("p1", 1, 2)], ["B1:C1"], "name of its own (blur_calm)"),
+        ([HEAD, ROWS[0], (None, *ROWS[1][1:])], ["A2:A3"], "the cells A2:A3 of 'id' are merged"),
+    ],
+    ids=["title", "two rows of heads", "ids"],
+)
+def test_merged_cells_are_named(tmp_path, rows, merged, said) -> None:
+    with pytest.raises(InputError) as caught:
+        read(workbook(tmp_path / "a.xlsx", rows, merged))
+    assert said in str(caught.value)
+
+
+def test_merged_cells_beside_what_is_read_are_nothing(tmp_path) -> None:
+    rows = [(*HEAD, "note"), *[(*row, "x") for row in ROWS]]
+    assert len(read(workbook(tmp_path / "a.xlsx", rows, ["D2:D4"])).rows) == len(ROWS)
+
+
+def test_empty_rows_above_the_names_are_passed_over_and_lines_stay_true(tmp_path) -> None:
+    rows = [(None,), (None,), HEAD, *ROWS]
+    assert len(read(workbook(tmp_path / "a.xlsx", rows)).rows) == len(ROWS)
+    with pytest.raises(InputError, match="got 'x' in line 4"):
+        read(workbook(tmp_path / "b.xlsx", [(None,), (None,), HEAD, ("p0", "a", "x"), *ROWS[1:]]))
+
+
+def test_dates_among_levels_are_said(tmp_path) -> None:
+    rows = [(person, datetime(2026, 5, 1) if cond == "a" else cond, score) for person, cond, score in ROWS]
+    data = read(workbook(tmp_path / "a.xlsx", [HEAD, *rows]))
+    assert any("'cond' holds dates among other values (2026-05-01 in row 2)" in one for one in data.decisions)
+
+
+def test_a_workbook_that_openpyxl_stumbles_over_ends_in_one_line(tmp_path) -> None:
+    path = tmp_path / "a.xlsx"
+    book = openpyxl.Workbook()
+    book.active.append(HEAD)
+    book.create_chartsheet("chart")
+    book.save(path)
+    with pytest.raises(InputError, match=r"not an Excel workbook that can be read .*; save it") as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
+
+
+def spss(path, words, **more):
+    frame = pd.DataFrame([(p, float("abc".index(c) + 1), float(s)) for p, c, s in ROWS], columns=list(HEAD))
+    pyreadstat.write_sav(frame, path, variable_value_labels={"cond": words}, **more)
+    return read(path)
+
+
+def test_codes_of_one_word_are_kept_apart(tmp_path) -> None:
+    data = spss(tmp_path / "a.sav", {1: "same", 2: "same", 3: "other"})
+    assert sorted(data.rows["cond"].unique()) == ["other", "same (1)", "same (2)"]
+    assert any("several codes of 'cond' have one word (same)" in one for one in data.decisions)
+    assert sorted(spss(tmp_path / "b.sav", {1: "2", 3: "x"}).rows["cond"].unique()) == ["2 (1)", "2 (2)", "x"]
+
+
+def test_values_declared_missing_are_no_ratings(tmp_path) -> None:
+    ranges = {"score": [{"lo": 6, "hi": 7}, 1]}
+    data = spss(tmp_path / "a.sav", {1: "a"}, missing_ranges=ranges)
+    left = [score for *_, score in ROWS if score not in (1, 6, 7)]
+    assert data.rows["score"].tolist() == left
