@@ -5,7 +5,8 @@
 Prints precision, recall and F1 on generated series that trained nothing, at several rates, and how many
 squints and closed eyes were called blinks: those held for 0.25 s or more, and brief ones.
 FOLDER, where given, holds hand-labelled series: CSV files with
-the columns frame, ear and tag ('0' where no blink is), 30 frames a second, as made from the eyeblink8 videos.
+the columns frame, ear and tag ('0' where no blink is), 30 frames a second, as made from the eyeblink8 videos
+(`webcam_series.py`). Recordings of ../shared/data, where there, are compared with a table made by others.
 
 The peaks are in the style of JeFaPaTo: prominence 0.05 of an eye aspect ratio of 0.3, widths of 20 to 100 and
 distances of 50 frames at 240 frames a second.
@@ -30,7 +31,10 @@ SERIES = 20
 SLACK_S = 0.1
 HELD_S = 0.25
 """A squint that stays for less is a partial blink in its course; it is counted apart."""
+OTHERS = Path("../shared/data/blink_series")
+FAST = 120.0
 TOTALS: dict[str, Array] = {}
+OF_FAST: dict[str, list[Array]] = {}
 Method = Callable[[Sequence[Array], float], list[float]]
 
 
@@ -84,17 +88,23 @@ def generated(fps: float) -> None:
     sys.stdout.write(f"generated series, {fps:g} frames/s\n")
     series = [generate(np.random.default_rng([SEED, n, int(fps)]), 40, fps) for n in range(SERIES)]
     for name, method in METHODS.items():
-        total, called, shut = np.zeros(3), np.zeros(2, int), np.zeros(2, int)
+        totals, called, shut = [], np.zeros(2, int), np.zeros(2, int)
         for one in series:
             found = method(one.distances, fps)
-            total += counts(found, [(m.onset_s, m.end_s) for m in one.motions if m.kind == "blink"])
+            totals.append(counts(found, [(m.onset_s, m.end_s) for m in one.motions if m.kind == "blink"]))
             for m in one.motions:
                 if m.kind in ("squint", "closed_eye"):
                     brief = int(m.hold_s < HELD_S)
                     shut[brief] += 1
                     called[brief] += any(m.onset_s <= time <= m.end_s for time in found)
         TOTALS[name] = TOTALS.get(name, 0) + np.array([*called, *shut])
-        tell(name, total, f", called blinks: {called[0]} of {shut[0]} held, {called[1]} of {shut[1]} brief")
+        if fps >= FAST:
+            OF_FAST.setdefault(name, []).extend(totals)
+        tell(
+            name,
+            np.sum(totals, axis=0),
+            f", called blinks: {called[0]} of {shut[0]} held, {called[1]} of {shut[1]} brief",
+        )
 
 
 def recorded(folder: Path) -> None:
@@ -114,6 +124,26 @@ def recorded(folder: Path) -> None:
             f", standard error over recordings {jackknife(as_labelled):.3f}",
         )
         tell("  no closed eyes", np.sum(as_defined, axis=0))
+
+
+def measured_by_others() -> None:
+    """Recordings of 240 frames/s against the table of JeFaPaTo's authors, each eye for itself."""
+    table = OTHERS / "blinking_full_blinking.xlsx"
+    if not table.exists():
+        sys.stdout.write(f"{table}: not there, left out\n")
+        return
+    sys.stdout.write("two extractions of one recording, 240 frames/s, against JeFaPaTo's table\n")
+    apexes = {side: pd.read_excel(table, f"blinking {side} eye")["apex_frame"] for side in ("left", "right")}
+    for name, method in METHODS.items():
+        totals = []
+        for file, start in (("blinking_short.csv", "EAR2D6_"), ("espbm_sample_ear_short.csv", "EAR_")):
+            series = pd.read_csv(OTHERS / file)
+            eyes = {side: series[start + side[0]].to_numpy(np.float64) for side in apexes}
+            for side, other in (("left", "right"), ("right", "left")):
+                seen = apexes[side][apexes[side] < len(series)] / 240
+                found = method([eyes[side], eyes[other]], 240.0)
+                totals.append(counts(found, [(time, time) for time in seen]))
+        tell(name, np.sum(totals, axis=0))
 
 
 def hand_labelled(file: Path) -> tuple[Array, list[tuple[float, float]], list[tuple[float, float]]]:
@@ -150,6 +180,10 @@ def main() -> None:
     sys.stdout.write("called blinks, all rates: (held, brief) of (held, brief)\n")
     for name, (held, brief, all_held, all_brief) in TOTALS.items():
         sys.stdout.write(f"  {name:16} {held} of {all_held} held, {brief} of {all_brief} brief\n")
+    sys.stdout.write(f"all generated series of {FAST:g} frames/s and more\n")
+    for name, totals in OF_FAST.items():
+        tell(name, np.sum(totals, axis=0), f", standard error over series {jackknife(totals):.3f}")
+    measured_by_others()
     if len(sys.argv) > 1:
         recorded(Path(sys.argv[1]))
 

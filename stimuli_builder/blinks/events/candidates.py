@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from stimuli_builder.blinks.events.courses import COURSE, courses
 from stimuli_builder.blinks.events.levels import Depth
 from stimuli_builder.blinks.profile import Array
 
@@ -14,11 +15,14 @@ NOISES = 2.5
 RIPPLE = 0.25
 """A dip that rises by less than this part of its height above the open eye is a ripple of a larger one."""
 REACH_S = 8.0
+SHALLOWEST = 0.05
+"""Courses are divided by a dip's depth, or by this where it is less."""
 FEATURES = (
     "log depth", "depth to the recording's deep", "prominence to depth", "prominence to deep",
     "log width at half", "log width at 0.85", "log width at 0.2", "log closing time", "log opening time",
     "log prominence to noise", "step of the base", "base before", "share of like depth about",
     "roughness about", "log frames in width", "other eye", "has other eye", "log fps",
+    *(f"depth {span}" for span in COURSE), *(f"other eye {span}" for span in COURSE),
 )  # fmt: skip
 
 
@@ -90,9 +94,26 @@ def features_of(candidates: list[Candidate], depth: Depth, other: Array | None =
     other : (n,) array, optional
         Smoothed depth of the other eye, divided by its own deep level; NaN where unknown.
     """
+    if not candidates:
+        return np.empty((0, len(FEATURES)))
     deep = deep_level(candidates, depth)
-    rows = [_row(c, depth, deep, other) for c in candidates]
-    return np.array(rows, np.float64).reshape(-1, len(FEATURES))
+    rows = np.array([_row(c, depth, deep, other) for c in candidates], np.float64)
+    return np.concatenate([rows, _courses(candidates, depth, deep, other)], axis=1)
+
+
+def _courses(candidates: list[Candidate], depth: Depth, deep: float, other: Array | None) -> Array:
+    """Course of this eye and of the other about each dip, as parts of the dip's own depth.
+
+    In a gap of the other eye it is taken to do what this one does; without another eye its course is 0.
+    """
+    peaks = np.array([c.peak for c in candidates])
+    heights = np.array([max(c.depth, SHALLOWEST) for c in candidates])[:, None]
+    own = courses(depth.smooth, peaks, depth.fps) / heights
+    if other is None:
+        return np.concatenate([np.clip(own, -2, 2), np.zeros_like(own)], axis=1)
+    beside = np.where(np.isfinite(other), other * deep, depth.smooth)
+    across = courses(beside, peaks, depth.fps) / heights
+    return np.concatenate([np.clip(own, -2, 2), np.clip(across, -2, 2.5)], axis=1)
 
 
 def _row(c: Candidate, depth: Depth, deep: float, other: Array | None) -> list[float]:

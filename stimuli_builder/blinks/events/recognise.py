@@ -15,7 +15,7 @@ from stimuli_builder.blinks.series import BlinkSeries, runs
 
 SHORTEST_PIECE_S = 0.8
 LEAST_PROBABILITY = 0.5
-ONE_BLINK_S = 0.12
+ONE_BLINK_S = 0.2
 """Two dips closer than this are one blink seen twice by a noisy tracker; the likelier one stays."""
 
 

@@ -1,14 +1,17 @@
 """Train the classifier of lid events on generated series and write its weights.
 
-    python -m stimuli_builder.blinks.events.train [series, default 800]
+    python -m stimuli_builder.blinks.events.train [series, default 6000]
 
 Needs scikit-learn, which comes with pingouin. The same seed gives the same weights.
 """
 
 import json
 import sys
+import warnings
 
 import numpy as np
+from numpy.typing import NDArray
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
 from experiments.files import whole_text
@@ -25,6 +28,11 @@ from stimuli_builder.blinks.events.network import WEIGHTS
 from stimuli_builder.blinks.profile import Array
 
 SEED = 20261121
+SERIES = 6000
+UNITS = (64, 32)
+STAGES = ((2e-3, 6), (5e-4, 4), (1e-4, 3))
+"""Rate of learning and passes over the dips of each stage; the last ones settle what the first one found."""
+NEAR_HOLD_S = 0.1
 CLASSES = (*KINDS, "nothing")
 
 
@@ -38,21 +46,44 @@ def labelled_features(series: Generated) -> tuple[Array, list[str]]:
         if len(depths) == 2:
             other = depths[1 - eye].smooth / deep_level(of_eyes[1 - eye], depths[1 - eye])
         rows.append(features_of(candidates, depth, other))
-        kinds += [true_kind(candidate, depth, series.motions) for candidate in candidates]
+        kinds += true_kinds(candidates, depth, series.motions)
     return np.concatenate(rows), kinds
 
 
-def true_kind(candidate: Candidate, depth: Depth, motions: tuple[Motion, ...]) -> str:
-    """The event a dip belongs to: the one whose hold is nearest to its peak, blinks first; else nothing."""
-    time = candidate.peak / depth.fps
+def true_kinds(candidates: list[Candidate], depth: Depth, motions: tuple[Motion, ...]) -> list[str]:
+    """What each dip is: one dip of a blink is the blink, its ripples are nothing; the rest by `_event_at`.
+
+    A blink is its deepest dip about its hold, or where noise left none there the dip nearest to it. Ripples
+    on its way down or up taught as blinks would make every noisy re-opening a second blink.
+    """
     slack = 1 / depth.fps + 0.02
-    near = [
-        (abs(time - (m.onset_s + m.down_s + m.hold_s / 2)) - m.hold_s / 2, m.kind)
-        for m in motions
-        if m.onset_s - slack <= time <= m.end_s + slack
-    ]
-    blinks = [entry for entry in near if entry[1] == "blink" and entry[0] < 0.1 + slack]
-    return min(blinks or near)[1] if near else "nothing"
+    times = [candidate.peak / depth.fps for candidate in candidates]
+    kinds = [_event_at(time, motions, slack) for time in times]
+    for motion in motions:
+        if motion.kind != "blink":
+            continue
+        inside = [k for k, time in enumerate(times) if _away(motion, time, slack) is not None]
+        away = {k: _away(motion, times[k], slack) or 0.0 for k in inside}
+        near = [k for k in inside if away[k] < NEAR_HOLD_S + slack]
+        if near:
+            kinds[max(near, key=lambda k: candidates[k].depth)] = "blink"
+        elif inside:
+            kinds[min(inside, key=away.__getitem__)] = "blink"
+    return kinds
+
+
+def _away(motion: Motion, time: float, slack: float) -> float | None:
+    """Seconds from a time to an event's hold; None outside the event."""
+    if not motion.onset_s - slack <= time <= motion.end_s + slack:
+        return None
+    return max(0.0, abs(time - (motion.onset_s + motion.down_s + motion.hold_s / 2)) - motion.hold_s / 2)
+
+
+def _event_at(time: float, motions: tuple[Motion, ...], slack: float) -> str:
+    """The event other than a blink whose hold is nearest to a time; 'nothing' outside of all."""
+    distances = [(_away(m, time, slack), m.kind) for m in motions if m.kind != "blink"]
+    near = [(away, kind) for away, kind in distances if away is not None]
+    return min(near)[1] if near else "nothing"
 
 
 def training_data(count: int, seed: int) -> tuple[Array, list[str]]:
@@ -65,15 +96,28 @@ def training_data(count: int, seed: int) -> tuple[Array, list[str]]:
     return np.concatenate(rows), kinds
 
 
+def trained(features: Array, classes: NDArray[np.int64]) -> MLPClassifier:
+    """Train the network on standardised features (n, features), stage by stage."""
+    network = MLPClassifier(
+        UNITS, activation="tanh", alpha=1e-4, batch_size=512, random_state=SEED, warm_start=True
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a stage ends after its passes
+        for rate, passes in STAGES:
+            network.set_params(learning_rate_init=rate, max_iter=passes)
+            network.fit(features, classes)
+    return network
+
+
 def main() -> None:
     """Train and write."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 800
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else SERIES
     features, kinds = training_data(count, SEED)
     mean, spread = features.mean(0), features.std(0) + 1e-6
-    network = MLPClassifier((20,), activation="tanh", alpha=1e-2, random_state=SEED, early_stopping=True)
-    network.fit(np.clip((features - mean) / spread, -6, 6), np.array([CLASSES.index(k) for k in kinds]))
+    standard = np.clip((features - mean) / spread, -6, 6).astype(np.float32)
+    network = trained(standard, np.array([CLASSES.index(k) for k in kinds]))
     layers = [
-        [np.round(w, 5).tolist(), np.round(b, 5).tolist()]
+        [np.round(w.astype(np.float64), 4).tolist(), np.round(b.astype(np.float64), 4).tolist()]
         for w, b in zip(network.coefs_, network.intercepts_, strict=True)
     ]
     document = {

@@ -4,8 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from stimuli_builder.blinks.events.candidates import find_candidates
+from stimuli_builder.blinks.events.courses import COURSE, courses
 from stimuli_builder.blinks.events.generated import Motion, course, generate
+from stimuli_builder.blinks.events.levels import depth_of
 from stimuli_builder.blinks.events.recognise import recognise
+from stimuli_builder.blinks.events.train import true_kinds
 from stimuli_builder.blinks.extract import blinks_of
 from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS
 from stimuli_builder.blinks.series import BlinkSeries, read_series
@@ -41,7 +45,7 @@ def blinks_at(*onsets, hold=0.03):
 @pytest.mark.parametrize("fps", [15.0, 30.0, 120.0, 500.0])
 def test_blinks_of_held_out_series_are_told_from_the_rest(fps):
     hits = alarms = missed = squints = squint_alarms = 0
-    for number in range(4):
+    for number in range(8):
         series = generate(np.random.default_rng([HELD_OUT, number]), 40, fps)
         seen = recognise([eye(distance, fps) for distance in series.distances])[0]
         found = [event.minimum_s for event in seen.events if event.kind == "blink"]
@@ -49,12 +53,62 @@ def test_blinks_of_held_out_series_are_told_from_the_rest(fps):
         inside = [sum(m.onset_s - 0.05 <= time <= m.end_s + 0.05 for time in found) for m in true]
         hits += sum(count > 0 for count in inside)
         missed += inside.count(0)
-        alarms += sum(not any(m.onset_s - 0.05 <= time <= m.end_s + 0.05 for m in true) for time in found)
-        flat = [m for m in series.motions if m.kind in ("squint", "closed_eye")]
+        alarms += len(found) - sum(count > 0 for count in inside)  # a blink told twice is told once too often
+        flat = [m for m in series.motions if m.kind in ("squint", "closed_eye") and m.hold_s >= 0.25]
         squints += len(flat)
         squint_alarms += sum(any(m.onset_s <= time <= m.end_s for time in found) for m in flat)
-    assert 2 * hits / (2 * hits + alarms + missed) > (0.7 if fps < 20 else 0.8), (hits, alarms, missed)
-    assert squint_alarms <= 0.3 * squints
+    assert 2 * hits / (2 * hits + alarms + missed) > 0.8, (hits, alarms, missed)
+    assert squint_alarms <= 0.05 * squints
+
+
+def reopening_in_steps(fps, rng):
+    """Full blinks whose lids stop, and even sink a little, for a frame or two as they open again."""
+    distance = lids(blinks_at(2, 5, 9, 13, 16), fps, noise=0.01)
+    for onset in (2, 5, 9, 13, 16):
+        start = round((onset + 0.1 + 0.03 + rng.uniform(0.12, 0.24)) * fps)
+        distance[start : start + max(1, round(0.03 * fps))] -= 30 * rng.uniform(0.12, 0.2)
+    return distance
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0])
+def test_a_step_in_the_reopening_is_no_second_blink(fps):
+    told = [
+        kinds_of(reopening_in_steps(fps, np.random.default_rng(seed)), fps).count("blink")
+        for seed in range(8)
+    ]
+    assert told == [5] * 8
+
+
+def test_one_dip_of_a_blink_is_taught_as_the_blink_and_its_ripples_as_nothing():
+    motions = tuple(blinks_at(2, 5, 9, 13, 16))
+    distance = reopening_in_steps(60.0, np.random.default_rng(1))
+    depth = depth_of(distance, 60.0)
+    candidates = find_candidates(depth)
+    about = [
+        kind
+        for candidate, kind in zip(candidates, true_kinds(candidates, depth, motions), strict=True)
+        if any(m.onset_s <= candidate.peak / 60 <= m.end_s for m in motions)
+    ]
+    assert about.count("blink") == 5
+    assert about.count("nothing") == len(about) - 5 > 0
+
+
+def test_the_course_about_a_dip_is_the_same_at_every_rate():
+    means = {}
+    for fps in (15.0, 60.0, 300.0):
+        times = np.arange(round(6 * fps)) / fps
+        values = np.exp(-(((times - 3) / 0.4) ** 2))
+        means[fps] = courses(values, np.array([round(3 * fps)]), fps)[0]
+    assert means[15.0] == pytest.approx(means[300.0], abs=0.01)
+    assert means[60.0] == pytest.approx(means[300.0], abs=0.001)
+
+
+def test_a_course_beyond_the_series_keeps_its_last_value():
+    values = np.array([0.5, 0.5, 1.0, 0.0, 0.0])
+    means = courses(values, np.array([2]), 10.0)[0]
+    assert means[0] == pytest.approx(0.5)
+    assert means[-1] == pytest.approx(0.0)
+    assert len(means) == len(COURSE)
 
 
 @pytest.mark.parametrize("fps", [15.0, 19.0, 23.976, 27.5, 30.0])
