@@ -1,81 +1,94 @@
-"""The command `server`: it only gathers the command groups, each of which lives with its subject."""
+"""The command `server`: lists the commands; each lives with its subject and is loaded when called."""
 
 import os
 
-import typer
-from pydantic import ValidationError
-from pydantic_core import ErrorDetails
-
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
-from experiments.wrong_values import wrong_value
-from server.errors import ApiError
-from server.settings import Settings
+from experiments.lazy_commands import lazy_app
 
 PRIVATE = 0o077
-app = typer.Typer(
-    name="server",
-    help="Run rating studies: serve participants and experimenters, manage studies, take out the data.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+COMMANDS = {
+    "run": (
+        "server.cli_run",
+        "Serve participants and experimenters until stopped (Ctrl-C); what is under way is finished first.",
+    ),
+    "export": (
+        "server.export.cli",
+        "Write a study's data: as csv, the columns of experiments/columns and one column a factor.",
+    ),
+    "capsule": (
+        "server.capsules.cli",
+        "Write the capsule of a study: a Psych-DS dataset and an RO-Crate with data, materials and report.",
+    ),
+    "seal": (
+        "server.seals.cli",
+        "Seal design, exclusions, analysis plan and power before the first participant; or write the seal "
+        "again.",
+    ),
+    "methods": (
+        "server.methods.cli",
+        "Write a study's Methods paragraph; each number is followed by the query that gives it.",
+    ),
+    "simulate": (
+        "server.simulation.cli",
+        "Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.",
+    ),
+    "retention": (
+        "server.retention.cli",
+        "Erase what is due by the retention that studies declare; the server does so each hour.",
+    ),
+    "doctor": (
+        "server.operations.cli",
+        "Check the installation and say what to fix; exit code 1 where something failed.",
+    ),
+    "backup": (
+        "server.operations.cli_backups",
+        "Write database, clips and secret key of this moment into one file, while the server goes on.",
+    ),
+    "backup-key": (
+        "server.operations.cli_backups",
+        "Make a pair of keys for encrypted backups, and print the public one.",
+    ),
+    "restore": (
+        "server.operations.cli_backups",
+        "Bring a backup back into an empty database (SQLite or PostgreSQL) and clip store.",
+    ),
+    "drill": (
+        "server.operations.cli_backups",
+        "Bring the newest backup back beside the data, examine it and remove it; exit code 1 where it "
+        "failed.",
+    ),
+    "database": ("server.cli_database", "The database's tables."),
+    "study": ("server.studies.cli", "Studies on this server."),
+    "link": ("server.studies.cli", "Links for participants."),
+    "admin": ("server.accounts.cli", "Accounts of experimenters."),
+    "account": ("server.accounts.cli", "Let somebody in again who lost a password or a phone."),
+    "audit": ("server.audit.cli", "The audit log: verify its chain of hashes, export it."),
+    "workspace": ("server.workspaces.cli", "Workspaces: laboratories that share this server."),
+    "person": ("server.persons.cli", "One participant: subject access and erasure."),
+}
+"""Command -> the module whose `register` adds it, and the line of help that lists it."""
+
+app = lazy_app(
+    "server",
+    "Run rating studies: serve participants and experimenters, manage studies, take out the data.",
+    COMMANDS,
 )
-
-
-def _gather() -> None:
-    from server import cli_database, cli_run
-    from server.accounts import cli as accounts
-    from server.audit import cli as audit
-    from server.capsules import cli as capsules
-    from server.export import cli as export
-    from server.methods import cli as methods
-    from server.operations import cli as operations
-    from server.operations import cli_backups as backups
-    from server.persons import cli as persons
-    from server.retention import cli as retention
-    from server.seals import cli as seals
-    from server.simulation import cli as simulation
-    from server.studies import cli as studies
-    from server.workspaces import cli as workspaces
-
-    for group in (
-        cli_run,
-        cli_database,
-        studies,
-        export,
-        capsules,
-        seals,
-        methods,
-        simulation,
-        accounts,
-        audit,
-        workspaces,
-        persons,
-        retention,
-        operations,
-        backups,
-    ):
-        group.register(app)
-
-
-_gather()
 
 
 def _call(*, standalone_mode: bool) -> object:
     try:
         return app(standalone_mode=standalone_mode)
-    except ApiError as error:
-        raise InputError(error.message) from error
-    except ValidationError as error:
-        if error.title != Settings.__name__:
+    except InputError:
+        raise
+    except Exception as error:
+        # What these errors are is imported only where there is one.
+        from server.cli_refusals import refusal
+
+        message = refusal(error)
+        if message is None:
             raise
-        raise InputError("; ".join(map(_setting, error.errors()))) from error
-
-
-def _setting(problem: ErrorDetails) -> str:
-    name = "__".join(map(str, problem["loc"])).upper() or "a setting"
-    shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
-    return f"{shown}: {wrong_value(problem)}; see docs/settings.md"
+        raise InputError(message) from error
 
 
 def main() -> None:

@@ -1,12 +1,7 @@
 """The command `stimuli`: lists the commands; each lives with its subject and is loaded when called."""
 
-from importlib import import_module
-from typing import Any
-
-import typer
-from typer.core import TyperCommand, TyperGroup
-
 from experiments.command_line import run_command_line
+from experiments.lazy_commands import lazy_app
 
 COMMANDS = {
     "actor": (
@@ -90,38 +85,11 @@ COMMANDS = {
 """Command -> the module whose `register` adds it, and the line of help that lists it."""
 
 
-class LazyGroup(TyperGroup):
-    """Imports a command's module when the command is called; its line in `--help` needs no import."""
-
-    def __init__(self, **settings: Any):
-        super().__init__(**settings)
-        self._unloaded = set(COMMANDS)
-        self.commands = {name: TyperCommand(name, help=line) for name, (_, line) in COMMANDS.items()}
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Load the module of the command that is called."""
-        if args and args[0] in self._unloaded:
-            part = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False, add_completion=False)
-            import_module(COMMANDS[args[0]][0]).register(part)
-            loaded = typer.main.get_group(part).commands
-            self.commands.update(loaded)
-            self._unloaded -= set(loaded)
-        return super().resolve_command(ctx, args)
-
-
-app = typer.Typer(
-    name="stimuli",
-    cls=LazyGroup,
-    help="From a recorded face to rated clips: track eyelids, measure blinks, build stimuli.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+app = lazy_app(
+    "stimuli",
+    "From a recorded face to rated clips: track eyelids, measure blinks, build stimuli.",
+    COMMANDS,
 )
-
-
-@app.callback()
-def _stimuli() -> None:
-    """Make Typer build a group although no command is registered yet."""
 
 
 def main() -> None:

@@ -1,0 +1,23 @@
+"""What a command was refused for, in one line: by the server itself, or by its settings."""
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from experiments.wrong_values import wrong_value
+from server.errors import ApiError
+from server.settings import Settings
+
+
+def refusal(error: Exception) -> str | None:
+    """The line; None for what is no refusal."""
+    if isinstance(error, ApiError):
+        return error.message
+    if isinstance(error, ValidationError) and error.title == Settings.__name__:
+        return "; ".join(map(_setting, error.errors()))
+    return None
+
+
+def _setting(problem: ErrorDetails) -> str:
+    name = "__".join(map(str, problem["loc"])).upper() or "a setting"
+    shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
+    return f"{shown}: {wrong_value(problem)}; see docs/settings.md"
