@@ -45,8 +45,16 @@ def bake_face(
         int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the still frame.")
     ] = 32,
     lower_lid: Annotated[
-        bool, typer.Option(help="--no-lower-lid leaves out the 32 poses that Experiment 3 needs.")
+        bool, typer.Option(help="--no-lower-lid leaves out the poses that Experiment 3 needs (17 pictures).")
     ] = True,
+    version: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=9999,
+            help="2 or more: other pictures of a face that was given to others, named NAME@VERSION.",
+        ),
+    ] = 1,
     light: Annotated[str, typer.Option(help="Light preset: studio or window.")] = "studio",
     identities: Annotated[
         Path, typer.Option(help="Identities file, to bake a face of your own.")
@@ -92,12 +100,13 @@ def bake_face(
         samples=Samples(samples, frame_samples),
         lower_lid=lower_lid,
         light=light,
-        out=out or Path("out/characters") / character_name(name, framing),
+        out=out or Path("out/characters") / character_name(name, framing, version),
         work=work,
         blender=blender,
         device=device,
         threads=threads,
         denser_ends=denser_ends and (rendered or levels) < levels,
+        version=version,
     )
     bake = FaceBake(order, load_facekit(facekit))
     if render:

@@ -96,10 +96,11 @@ class LowerLid(_Declared):
 class Declaration(_Declared):
     """The whole of `character.toml`; lengths in mm on the screen at actual size, positions in px.
 
-    `version` counts the bakes of a name that were given to others: pictures that changed have another.
+    `version` counts the bakes of a name that were given to others: pictures that changed have another and
+    are a character of their own, `alder@2`; poses of the lower lid added to a character count further.
     """
 
-    name: str = Field(pattern="^[a-z0-9][a-z0-9_-]*$")
+    name: str = Field(pattern="^[a-z0-9][a-z0-9_-]*(@[1-9][0-9]{0,3})?$")
     version: int = Field(1, ge=1)
     label: str
     size_px: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
@@ -111,6 +112,13 @@ class Declaration(_Declared):
     levels: tuple[Level, ...] = Field(min_length=2)
     lower_lid: LowerLid | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _version_named(self) -> "Declaration":
+        _, _, named = self.name.partition("@")
+        if named and self.version < int(named):
+            raise ValueError(f"version of '{self.name}' must be {named} or more; it is {self.version}")
+        return self
 
     @model_validator(mode="after")
     def _consistent(self) -> "Declaration":

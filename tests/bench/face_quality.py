@@ -1,10 +1,14 @@
 """How true a shipped face is, against renders that it was not made from.
 
-Run: python tests/bench/face_quality.py NAME FACEKIT [WORK]. Renders what it needs into WORK
-(build/bake/truth-NAME), a minute or so a picture; needs Blender's environment, .venv-bake. Prints the PSNR
-halfway between rendered levels and halfway between the atlas's levels, and of lower lids on their way.
+Run: python tests/bench/face_quality.py NAME FACEKIT. Renders what it needs into --work, a minute or so a
+picture; needs Blender's environment (--blender, .venv-bake). Prints the PSNR halfway between rendered levels
+and halfway between the atlas's levels, and of lower lids on their way.
+
+The references have as many samples as the levels, so that their own noise counts as error too. --samples 48
+renders references with a quarter of it; --closures 0.094,0.906 leaves out the others, and the lower lid's.
 """
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -13,7 +17,9 @@ import numpy as np
 from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.facekit.assembly import STUDIO_EV
+from stimuli_builder.characters.facekit.bake import RECIPES
 from stimuli_builder.characters.facekit.development import develop, psnr_db, to_8_bit
+from stimuli_builder.characters.facekit.environment import ensure_blender
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import load_facekit
 from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, VERTICAL_MM, LidPose
@@ -61,49 +67,100 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
-def main() -> None:
-    name, facekit = sys.argv[1], Path(sys.argv[2])
-    work = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("build/bake") / f"truth-{name}"
-    work.mkdir(parents=True, exist_ok=True)
-    character = load_atlas(SHIPPED / name)
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("name", help="a shipped face")
+    parser.add_argument("facekit", type=Path, help="your copy of ICT-FaceKit")
+    parser.add_argument("--work", type=Path, help="where renders wait (build/bake/truth-NAME-SAMPLES)")
+    parser.add_argument("--samples", type=int, help="of the references (as many as the levels have)")
+    parser.add_argument("--closures", type=closure_list, help="these alone, separated by commas")
+    parser.add_argument("--blender", type=Path, default=Path(".venv-bake"), help="Blender's environment")
+    parser.add_argument("--threads", type=int, default=2, help="render threads on the CPU")
+    return parser.parse_args()
+
+
+def closure_list(text: str) -> list[float]:
+    return [float(part) for part in text.split(",")]
+
+
+def scene_of(character: Atlas, facekit: Path) -> FaceScene:
+    """The scene that the character's provenance tells of; a line where the recipe is another by now."""
     made = character.declaration.provenance
+    framing = "face" if "--framing face" in made["command"] else "eyes"
+    if made["recipe"] != RECIPES[framing]:
+        say(
+            f"{character.name} is of recipe {made['recipe']}, the references of {RECIPES[framing]}: "
+            "they differ where the lids meet"
+        )
     identity = Identity.model_validate(made["face"])
-    framing = "face" if name.endswith("-face") else "eyes"
-    scene = FaceScene(load_facekit(facekit), identity, framing, character.size_px)
-    rendered = midpoints(made["rendered_closures"])
-    between = midpoints([level.closure for level in character.declaration.levels])
-    poses = [LidPose(closure) for closure in (*rendered, *between)]
-    moved = list(MOVED) if character.has_lower_lid else []
+    return FaceScene(load_facekit(facekit), identity, framing, character.size_px)
+
+
+def references(
+    scene: FaceScene, poses: list[LidPose], samples: int, asked: argparse.Namespace
+) -> dict[LidPose, Shot]:
+    """Shots of the poses, those rendered that are missing."""
+    work = asked.work or Path("build/bake") / f"truth-{asked.name}-{samples}"
+    work.mkdir(parents=True, exist_ok=True)
     shots = {
         pose: Shot(
             work / f"true_{pose.closure:.6f}_{pose.vertical_mm}_{pose.horizontal_mm}.npz",
             pose,
             scene.boxes,
-            made["samples"],
+            samples,
         )
-        for pose in (*poses, *moved)
+        for pose in poses
     }
     missing = [shot for shot in shots.values() if not shot.file.exists()]
     if missing:
-        setup = Setup(Path(".venv-bake/bin/python"), "studio", "auto", 2, work / "blender.log")
+        python = ensure_blender(asked.blender)
+        setup = Setup(python, "studio", "auto", asked.threads, work / "blender.log")
         with Renderer(scene, setup) as renderer:
             for shot in missing:
                 renderer.render(shot)
-    for what, closures in (("rendered levels", rendered), ("the atlas's levels", between)):
-        say(f"closure  PSNR in dB (crop), halfway between {what}")
+    return shots
+
+
+def main() -> None:
+    asked = arguments()
+    character = load_atlas(SHIPPED / asked.name)
+    made = character.declaration.provenance
+    scene = scene_of(character, asked.facekit)
+    places = {"given": asked.closures or []}
+    moved: list[LidPose] = []
+    if asked.closures is None:
+        places = {
+            "halfway between rendered levels": midpoints(made["rendered_closures"]),
+            "halfway between the atlas's levels": midpoints(
+                [level.closure for level in character.declaration.levels]
+            ),
+        }
+        moved = list(MOVED) if character.has_lower_lid else []
+    samples = asked.samples or made["samples"]
+    still = [LidPose(closure) for closures in places.values() for closure in closures]
+    shots = references(scene, [*still, *moved], samples, asked)
+    say(f"{asked.name}: levels of {made['samples']} samples, references of {samples}")
+    for what, closures in places.items():
+        say(f"closure  PSNR in dB (crop), {what}")
         for closure in closures:
             truth = laid(character, scene, shots[LidPose(closure)])
             say(f"{closure:.5f} {psnr_db(linear_to_srgb(picture(character, closure)), truth):8.1f}")
     if moved:
         say("lower lid: closure, mm up, mm nasal, PSNR in dB (left as it was)")
     for pose in moved:
-        window = character.lower_lid_layer.window
-        still = picture(character, pose.closure)
-        change = lower_lid_change(character, pose.closure, pose.vertical_mm, pose.horizontal_mm)
-        truth = laid(character, scene, shots[pose])[window]
-        figures = [psnr_db(linear_to_srgb(image)[window], truth) for image in (still + change, still)]
-        place = f"{pose.closure:7.3f} {pose.vertical_mm:5.2f} {pose.horizontal_mm:5.2f}"
-        say(f"{place} {figures[0]:6.1f} ({figures[1]:.1f})")
+        say(lower_lid_line(character, laid(character, scene, shots[pose]), pose))
+
+
+def lower_lid_line(character: Atlas, truth: np.ndarray, pose: LidPose) -> str:
+    """What clips make of a pose of the lower lid against its render."""
+    window = character.lower_lid_layer.window
+    still = picture(character, pose.closure)
+    change = lower_lid_change(character, pose.closure, pose.vertical_mm, pose.horizontal_mm)
+    figures = [psnr_db(linear_to_srgb(image)[window], truth[window]) for image in (still + change, still)]
+    place = f"{pose.closure:7.3f} {pose.vertical_mm:5.2f} {pose.horizontal_mm:5.2f}"
+    return f"{place} {figures[0]:6.1f} ({figures[1]:.1f})"
 
 
 if __name__ == "__main__":

@@ -13,9 +13,16 @@ from stimuli_builder.characters.declaration import Declaration, Level, LowerLid,
 from stimuli_builder.characters.facekit.development import develop, to_8_bit
 from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM, Box, bounding_box
 from stimuli_builder.characters.facekit.inbetween import flow_mix
-from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, OPEN, VERTICAL_MM, LidPose
+from stimuli_builder.characters.facekit.lid_pose import (
+    HORIZONTAL_MM,
+    OPEN,
+    RENDERED_HORIZONTAL_MM,
+    VERTICAL_MM,
+    LidPose,
+)
 from stimuli_builder.characters.facekit.matte import MATTE_CLOSURES, upper_lid_matte
 from stimuli_builder.characters.facekit.plan import closures_of
+from stimuli_builder.characters.facekit.pose_motion import pose_between
 from stimuli_builder.characters.facekit.renderer import Shot
 from stimuli_builder.characters.facekit.scene import FaceScene
 from stimuli_builder.characters.level_video import write_level_video
@@ -58,17 +65,20 @@ class Assembly:
             for closure in closures_of(count):
                 if low < closure < high:
                     share = (closure - low) / (high - low)
-                    yield closure, linear_to_srgb(np.maximum(flow_mix(*ends, share), 0))
+                    yield closure, _encoded(flow_mix(*ends, share))
             low_picture = high_picture
         yield self._rendered[-1], low_picture
 
-    def write(self, folder: Path, name: str, count: int, provenance: dict[str, Any]) -> None:
+    def write(
+        self, folder: Path, name: str, count: int, provenance: dict[str, Any], version: int = 1
+    ) -> None:
         """Write the character, its declaration last."""
         closures, pictures = zip(*self.levels(count), strict=True)
         video = write_level_video(folder, LEVELS_FILE, pictures)
         view = self._scene.view
         declaration = Declaration(
             name=name,
+            version=version,
             label=", ".join(filter(None, (self._scene.identity.label, self._scene.framing.shows))),
             size_px=view.size_px,
             px_per_mm=view.px_per_mm,
@@ -118,19 +128,31 @@ class Assembly:
         return LowerLid(crop=self.lower_lid_crop, poses=tuple(poses), mattes=tuple(mattes))
 
     def lower_lid_poses(self) -> Iterator[tuple[LidPose, Picture]]:
-        """Poses of the open eyes: the rendered ones, and one between every two neighbouring lifts."""
+        """Poses of the open eyes: the rendered ones, slides between them, and lifts between those."""
         for h in HORIZONTAL_MM:
-            for low, high in pairwise(VERTICAL_MM):
-                ends = [self._lower_lid(LidPose(0.0, v, h)) for v in (low, high)]
-                yield LidPose(0.0, low, h), ends[0]
-                middle = flow_mix(srgb_to_linear(ends[0]), srgb_to_linear(ends[1]), 0.5)
-                yield LidPose(0.0, (low + high) / 2, h), linear_to_srgb(np.maximum(middle, 0))
-            yield LidPose(0.0, VERTICAL_MM[-1], h), self._lower_lid(LidPose(0.0, VERTICAL_MM[-1], h))
+            lifts = [(v, self._lower_lid(LidPose(0.0, v, h))) for v in VERTICAL_MM]
+            for (low, first), (high, second) in pairwise(lifts):
+                yield LidPose(0.0, low, h), first
+                middle = flow_mix(srgb_to_linear(first), srgb_to_linear(second), 0.5)
+                yield LidPose(0.0, (low + high) / 2, h), _encoded(middle)
+            yield LidPose(0.0, lifts[-1][0], h), lifts[-1][1]
 
     def _lower_lid(self, pose: LidPose) -> Picture:
-        """The lower lids' crop in a rendered pose."""
+        """The lower lids' crop in a pose: as rendered, or moved from the rendered slides on both sides."""
+        if pose != OPEN and pose not in self._lower:
+            slides = RENDERED_HORIZONTAL_MM
+            before = max(h for h in slides if h < pose.horizontal_mm)
+            after = min(h for h in slides if h > pose.horizontal_mm)
+            ends = [LidPose(pose.closure, pose.vertical_mm, h) for h in (before, after)]
+            around = {end: srgb_to_linear(self._lower_lid(end)) for end in ends}
+            return _encoded(pose_between(self._scene, pose, around, self.lower_lid_crop))
         frame = self._still if pose == OPEN else self._laid(self._still, self._lower[pose])
         return to_8_bit(_cut(frame, self.lower_lid_crop))
+
+
+def _encoded(light: NDArray[np.float32]) -> Picture:
+    """SRGB code values of light that interpolation may have taken below 0."""
+    return linear_to_srgb(np.maximum(light, 0))
 
 
 def _cut(image: NDArray[np.float32], box: Box) -> NDArray[np.float32]:

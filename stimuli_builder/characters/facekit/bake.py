@@ -34,9 +34,10 @@ RECIPES = {"eyes": 4, "face": 5}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 
-def character_name(face: str, framing: str) -> str:
-    """Name of the character that a framing of a face makes: `alder`, or `alder-face`."""
-    return face if framing == "eyes" else f"{face}-{framing}"
+def character_name(face: str, framing: str, version: int = 1) -> str:
+    """Name of the character that a framing of a face makes: `alder`, `alder-face`, or `alder@2`."""
+    framed = face if framing == "eyes" else f"{face}-{framing}"
+    return framed if version == 1 else f"{framed}@{version}"
 
 
 @dataclass(frozen=True)
@@ -64,11 +65,13 @@ class FaceOrder:
     denser_ends: bool = False
     seed: int | None = None
     """The number that drew the face whole; None for one of the identities file."""
+    version: int = 1
+    """Counts the bakes of a face that were given to others."""
 
     @property
     def character(self) -> str:
         """Name of the character."""
-        return character_name(self.name, self.framing)
+        return character_name(self.name, self.framing, self.version)
 
     def work_folder(self, kit: FaceKit) -> Path:
         """Folder of this face's shots: another face, size, quality, kit or recipe has another."""
@@ -176,16 +179,19 @@ class FaceBake:
         grid = set(closures_of(count))
         used = [closure for closure in rendered if closure in grid]
         assembly = Assembly(self.scene, self.frame, self.levels, self.lower, used)
-        assembly.write(self.order.out, self.order.character, count, self._provenance(count, used))
+        order = self.order
+        assembly.write(order.out, order.character, count, self._provenance(count, used), order.version)
 
     def _provenance(self, levels: int, rendered: list[float]) -> dict[str, Any]:
         order, width, height = self.order, *self.order.size_px
         ends = " --denser-ends" if order.denser_ends else ""
+        again = f" --version {order.version}" if order.version > 1 else ""
         face = f"--identity {order.name}" if order.seed is None else f"--seed {order.seed}"
         return {
             "command": f"stimuli bake face {face} --framing {order.framing} "
             f"--size {width}x{height} --levels {levels} --rendered {order.rendered}{ends} "
-            f"--samples {order.samples.boxes} --frame-samples {order.samples.frame} --light {order.light}",
+            f"--samples {order.samples.boxes} --frame-samples {order.samples.frame} "
+            f"--light {order.light}{again}",
             "geometry": NOTICE,
             "recipe": RECIPES[order.framing],
             "rendered_levels": len(rendered),

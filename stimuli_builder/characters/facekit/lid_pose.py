@@ -16,7 +16,8 @@ class LidPose:
 
 
 # What a blink does to the lower lid reaches 1 mm upwards and 5 mm towards the nose (blinks/lower_lid.py).
-# A slide of more than a lash's spacing cannot be followed by optical flow, so every position is rendered.
 VERTICAL_MM = (0.0, 0.5, 1.0)
 HORIZONTAL_MM = tuple(k / 2 for k in range(11))
+RENDERED_HORIZONTAL_MM = HORIZONTAL_MM[::2]
+"""Slides in between are moved from these as the mesh moves (decision 0775)."""
 OPEN, SHUT = LidPose(0.0), LidPose(1.0)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from experiments.errors import InputError
 from stimuli_builder.characters.facekit.framing import Box
-from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, OPEN, VERTICAL_MM, LidPose
+from stimuli_builder.characters.facekit.lid_pose import OPEN, RENDERED_HORIZONTAL_MM, VERTICAL_MM, LidPose
 from stimuli_builder.characters.facekit.renderer import Shot
 
 LEVEL_COUNTS = (2, 3, 5, 9, 17, 33, 65, 129)
@@ -62,8 +62,8 @@ def _level_shot(work: Path, closure: float, boxes: dict[str, Box], samples: Samp
 
 
 def lower_lid_shots(work: Path, boxes: dict[str, Box], samples: Samples) -> list[Shot]:
-    """Both lower lids of the open eyes in each position but the resting one."""
-    poses = [LidPose(0.0, v, h) for h in HORIZONTAL_MM for v in VERTICAL_MM]
+    """Both lower lids of the open eyes in each rendered position but the resting one."""
+    poses = [LidPose(0.0, v, h) for h in RENDERED_HORIZONTAL_MM for v in VERTICAL_MM]
     return [
         Shot(work / f"pose_{pose.vertical_mm:.2f}_{pose.horizontal_mm:.2f}.npz", pose, boxes, samples.boxes)
         for pose in poses

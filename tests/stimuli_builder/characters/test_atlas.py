@@ -31,6 +31,21 @@ def test_declaration_survives_a_round_trip(tiny_character: Path) -> None:
     assert read_declaration(tiny_character) == declaration
 
 
+def test_a_second_version_is_named_and_counted(tiny_character: Path) -> None:
+    file = tiny_character / "character.toml"
+    first = file.read_text()
+    assert 'name = "tiny"' in first
+    assert "version = 1" in first
+    file.write_text(first.replace('"tiny"', '"tiny@2"').replace("version = 1", "version = 3"))
+    assert read_declaration(tiny_character).name == "tiny@2"
+    file.write_text(first.replace('"tiny"', '"tiny@2"'))
+    with pytest.raises(InputError, match="version of 'tiny@2' must be 2 or more; it is 1"):
+        read_declaration(tiny_character)
+    file.write_text(first.replace('"tiny"', '"tiny@"'))
+    with pytest.raises(InputError, match="name"):
+        read_declaration(tiny_character)
+
+
 def test_every_code_value_survives_linear_light() -> None:
     codes = np.arange(256, dtype=np.uint8)
     np.testing.assert_array_equal(linear_to_srgb(srgb_to_linear(codes)), codes)

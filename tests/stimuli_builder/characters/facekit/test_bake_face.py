@@ -91,6 +91,18 @@ def test_denser_ends_are_rendered_last_and_used(kit: FaceKit, scene: FaceScene, 
     assert "--rendered 9 --denser-ends" in atlas.declaration.provenance["command"]
 
 
+def test_other_pictures_of_a_face_are_a_character_of_their_own(
+    kit: FaceKit, scene: FaceScene, tmp_path: Path
+) -> None:
+    bake = bake_of(kit, scene, replace(order(tmp_path), version=2))
+    assert bake.work == bake_of(kit, scene, order(tmp_path)).work
+    pretend_rendered(bake, 4)
+    bake.write()
+    declared = load_atlas(tmp_path / "out").declaration
+    assert (declared.name, declared.version) == ("alder@2", 2)
+    assert declared.provenance["command"].endswith(" --light studio --version 2")
+
+
 def test_boxes_hold_all_that_moves(scene: FaceScene) -> None:
     opened, shut = (scene.shapes(LidPose(closure))[0].arrays()["vertices"] for closure in (0.0, 1.0))
     moved = np.abs(opened - shut).max(1) > 0.01
@@ -148,9 +160,9 @@ def test_the_lower_lid_follows_the_ninth_level_and_makes_a_full_grid(
     wanted = FaceOrder(**(order(tmp_path, 17, 17).__dict__ | {"lower_lid": True}))
     bake = bake_of(kit, scene, wanted)
     assert [shot.file.name.split("_")[0] for shot in bake.shots] == (
-        ["frame.npz"] + ["level"] * 9 + ["pose"] * 32 + ["level"] * 8
+        ["frame.npz"] + ["level"] * 9 + ["pose"] * 17 + ["level"] * 8
     )
-    pretend_rendered(bake, 42)
+    pretend_rendered(bake, 27)
     bake.write()
     lower = load_atlas(tmp_path / "out").lower_lid_layer
     assert lower.changes.shape[:2] == (5, 11)
