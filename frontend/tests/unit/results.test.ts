@@ -1,7 +1,9 @@
 import { describe, expect, it } from "vitest";
+import { cellRows, marginRows } from "../../src/admin/results/figure-rows";
 import { labelOfOrigin } from "../../src/admin/results/origins";
 import { cellLabels, cellPlot, countTicks } from "../../src/admin/results/plots";
 import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
+import { csvText } from "../../src/admin/ui/figure-files";
 import { counted } from "../../src/admin/ui/format";
 
 const factor = (name: string, ...levels: [string, string][]) => ({
@@ -10,6 +12,28 @@ const factor = (name: string, ...levels: [string, string][]) => ({
   levels: levels.map(([level, label]) => ({ name: level, label })),
 });
 const FACTORS = [factor("character", ["a", "Anna"], ["b", "Bert"]), factor("speed", ["100", "100 ms"], ["20", "20 ms"])];
+
+describe("figures that are saved", () => {
+  it("have their numbers under the labels of the study, in declared order", () => {
+    const mean = (speed: string, value: number) => ({ levels: { speed }, mean: value, se_within: null, participants: 3 });
+    const rows = marginRows({ factors: ["speed"], means: [mean("20", 2), mean("100", 1.5)] }, FACTORS);
+    expect(csvText(rows)).toBe("speed,mean,se_within,participants\r\n100 ms,1.5,,3\r\n20 ms,2,,3\r\n");
+    const cells = [
+      { cell: "b/20", ratings: 1, counts: [1, 0] },
+      { cell: "a/20", ratings: 2, counts: [0, 2] },
+    ];
+    const labels = cellLabels(["b/20", "a/20"], FACTORS);
+    const shown = cellRows({ cells, bins: [1, 2] } as Parameters<typeof cellRows>[0], labels);
+    expect(shown.map((row) => [row["cell"], row["answer 2"]])).toEqual([
+      ["Anna", 2],
+      ["Bert", 0],
+    ]);
+  });
+
+  it("hold nothing that a spreadsheet would run, and keep commas and quotes", () => {
+    expect(csvText([{ a: "=1+1", b: 'say "so", then', c: -1.5 }])).toBe('a,b,c\r\n\'=1+1,"say ""so"", then",-1.5\r\n');
+  });
+});
 
 describe("counts", () => {
   it("have ticks at whole numbers alone, at most seven", () => {

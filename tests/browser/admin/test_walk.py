@@ -1,9 +1,12 @@
 """Every page of the admin site, opened in a real browser: it shows what it should, axe finds nothing, no
 complaint reaches the console (a blocked style or script would), in light and dark, wide and narrow."""
 
+import csv
+import io
 import os
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pyotp
 import pytest
@@ -103,6 +106,24 @@ def test_the_monitor_is_live(dashboard: Dashboard) -> None:
     page = dashboard.open("/studies/short/monitor")
     expect(page.get_by_text("finished").first).to_be_visible()
     assert page.locator("canvas").count() == 4
+
+
+def test_a_figure_is_saved_as_picture_and_numbers(dashboard: Dashboard) -> None:
+    """The picture is whole by itself: it has legend and caption, and no colour of the page."""
+    page = dashboard.open("/studies/short/results")
+    saved = {}
+    for kind in ("SVG", "CSV"):
+        with page.expect_download() as download:
+            page.get_by_role("button", name=re.compile(f"Save as {kind}: Marginal means of .* x .*")).click()
+        saved[kind] = Path(download.value.path()).read_text(encoding="utf-8")
+    picture = ElementTree.fromstring(saved["SVG"])
+    texts = {"".join(text.itertext()) for text in picture.iter("{http://www.w3.org/2000/svg}text")}
+    header, *rows = list(csv.reader(io.StringIO(saved["CSV"])))
+    assert header[2:] == ["mean", "se_within", "participants"]
+    assert {cell for row in rows for cell in row[:2]} <= texts
+    assert "Bars: one within-participant standard error up and down." in texts
+    assert float(picture.attrib["height"]) > 250
+    assert "var(--mantine" not in saved["SVG"]
 
 
 def test_the_timeline_of_a_run_shows_each_trial(dashboard: Dashboard) -> None:

@@ -2,7 +2,7 @@
 
 import { Card, Group, ScrollArea, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useState } from "react";
+import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
 import { clipsQuery } from "../queries";
 import { ClipCard } from "../clips/ClipCard";
@@ -13,11 +13,18 @@ import { useCellLabels } from "./useCellLabels";
 type Clip = Schemas["ClipResult"];
 const keyOf = (clip: Clip) => `${clip.cell} ${String(clip.exemplar)} ${clip.clip_sha256}`;
 
+/** In the order of the declaration's levels, which the labels have; clips of one cell by their exemplar. */
+function byCells(clips: readonly Clip[], labels: ReadonlyMap<string, string>): Clip[] {
+  const rank = new Map([...labels.keys()].map((cell, index) => [cell, index]));
+  return clips.toSorted((a, b) => (rank.get(a.cell) ?? 0) - (rank.get(b.cell) ?? 0) || a.exemplar - b.exemplar);
+}
+
 export function ClipResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
   const clips = useQuery(clipsQuery(study));
   const labels = useCellLabels(data.clips, factors);
   const [chosen, setChosen] = useState("");
-  const current = data.clips.find((clip) => keyOf(clip) === chosen) ?? data.clips[0];
+  const inOrder = useMemo(() => byCells(data.clips, labels), [data.clips, labels]);
+  const current = inOrder.find((clip) => keyOf(clip) === chosen) ?? inOrder[0];
   const shown = clips.data?.find((clip) => clip.clip_sha256 === current?.clip_sha256 && clip.cell === current.cell);
   return (
     <Card withBorder>
@@ -38,7 +45,7 @@ export function ClipResults({ study, data, factors }: { study: string; data: Sch
               </Table.Tr>
             </Table.Thead>
             <Table.Tbody>
-              {data.clips.map((clip) => (
+              {inOrder.map((clip) => (
                 <Table.Tr key={keyOf(clip)} bg={clip === current ? "var(--mantine-color-default-hover)" : ""}>
                   <Table.Td>
                     <button type="button" className="line-link" aria-pressed={clip === current} onClick={() => setChosen(keyOf(clip))}>

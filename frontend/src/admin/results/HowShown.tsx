@@ -5,6 +5,7 @@ import { useMemo } from "react";
 import { words } from "../ui/format";
 import { methodWords, ruleWords } from "../ui/play-words";
 import { PlotFigure } from "../ui/PlotFigure";
+import { delayRows, timeRows } from "./figure-rows";
 import { type AnyResults, delayPlot, timePlot } from "./plots";
 
 export function HowShown({ data }: { data: AnyResults }) {
@@ -16,7 +17,7 @@ export function HowShown({ data }: { data: AnyResults }) {
         <Title order={2} size="h5">
           Response times from the clip's end
         </Title>
-        <PlotFigure options={times} label="Histogram of response times" />
+        <PlotFigure options={times} label="Histogram of response times" rows={timeRows(data)} />
       </Card>
       <Card withBorder>
         <Title order={2} size="h5">
@@ -25,7 +26,7 @@ export function HowShown({ data }: { data: AnyResults }) {
         <Counts title="Verdicts" counts={data.playback.verdicts} said={words} />
         <Counts title="Reasons" counts={data.playback.rules} said={ruleWords} />
         <Counts title="Shown" counts={data.playback.methods} said={methodWords} />
-        <PlotFigure options={delays} label="Histogram of the time from key to first frame" />
+        <PlotFigure options={delays} label="Histogram of the time from key to first frame" rows={delayRows(data)} />
       </Card>
     </>
   );

@@ -6,12 +6,14 @@ import type { Schemas } from "../api";
 import { counted, when } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
+import { cellRows, marginRows } from "./figure-rows";
 import { HowShown } from "./HowShown";
 import { labelOfOrigin } from "./origins";
 import { PairResults } from "./PairResults";
 import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from "./plots";
 import { ThresholdResults } from "./ThresholdResults";
 import { TraceResults } from "./TraceResults";
+import { useCellLabels } from "./useCellLabels";
 
 interface ShownProps<Results> {
   study: string;
@@ -62,12 +64,13 @@ function Shown({ study, data, factors }: ShownProps<Schemas["Results"]>) {
 
 function CellCard({ data, factors }: { data: Schemas["Results"]; factors: Factors }) {
   const cells = useMemo(() => cellPlot(data, factors), [data, factors]);
+  const labels = useCellLabels(data.cells, factors);
   return (
     <Card withBorder>
       <Title order={2} size="h5">
         Answers in each cell
       </Title>
-      <PlotFigure options={cells} label="Distribution of answers in each cell" />
+      <PlotFigure options={cells} label="Distribution of answers in each cell" rows={cellRows(data, labels)} />
     </Card>
   );
 }
@@ -86,7 +89,11 @@ function MarginCard({ margin, data, factors }: MarginProps) {
       <Title order={2} size="h5">
         {title}
       </Title>
-      <PlotFigure options={options} label={`Marginal means of ${title} with within-participant error bars`} />
+      <PlotFigure
+        options={options}
+        label={`Marginal means of ${title} with within-participant error bars`}
+        rows={marginRows(margin, factors)}
+      />
     </Card>
   );
 }

@@ -5,6 +5,7 @@ import { useMemo } from "react";
 import type { Schemas } from "../api";
 import { type Column, DataTable } from "../ui/DataTable";
 import { PlotFigure } from "../ui/PlotFigure";
+import { choiceRows, levelRows } from "./figure-rows";
 import { HowShown } from "./HowShown";
 import { choicePlot, comparedCells, levelPlot } from "./pair-plots";
 import { type Factors, labelsOf } from "./plots";
@@ -27,7 +28,7 @@ export function PairResults({ data, factors }: { data: Data; factors: Factors })
             Share of comparisons in which the cell of the row was chosen over that of the column, which has the number of its row; a tie is
             half for each.
           </Text>
-          <PlotFigure options={choices} label="Share of choices in each pair of cells" />
+          <PlotFigure options={choices} label="Share of choices in each pair of cells" rows={choiceRows(data, labels)} />
         </Card>
         {factors.map(({ name }) => (
           <LevelCard key={name} name={name} data={data} factors={factors} />
@@ -73,7 +74,11 @@ function LevelCard({ name, data, factors }: { name: string; data: Data; factors:
       <Title order={2} size="h5">
         {title}
       </Title>
-      <PlotFigure options={options} label={`How often each level of ${title} was chosen over the others`} />
+      <PlotFigure
+        options={options}
+        label={`How often each level of ${title} was chosen over the others`}
+        rows={levelRows(name, data, factors)}
+      />
     </Card>
   );
 }

@@ -6,6 +6,7 @@ import type { Schemas } from "../api";
 import { type Column, DataTable } from "../ui/DataTable";
 import { fixed } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
+import { seriesRows } from "./figure-rows";
 import { HowShown } from "./HowShown";
 import { type Factors, labelsOf } from "./plots";
 import { type Along, seriesLabels, seriesPlot } from "./threshold-plots";
@@ -122,7 +123,11 @@ function SeriesCard({ series, label, along, positive }: SeriesProps) {
         Share of {positive === "yes" ? "yes" : "right answers"} at each stimulus, larger where there are more answers.{" "}
         {along.second ? "Cross: mean of people\u2019s thresholds." : "Ticks: people\u2019s thresholds; dashed: their mean."}
       </Text>
-      <PlotFigure options={options} label={`Share of positive answers along ${titles}, ${label}`} />
+      <PlotFigure
+        options={options}
+        label={`Share of positive answers along ${titles}, ${label}`}
+        rows={seriesRows(series, along.title, along.second?.title)}
+      />
     </Card>
   );
 }

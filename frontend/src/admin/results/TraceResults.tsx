@@ -6,6 +6,7 @@ import type { Schemas } from "../api";
 import { type Column, DataTable } from "../ui/DataTable";
 import { fixed } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
+import { traceRows } from "./figure-rows";
 import { HowShown } from "./HowShown";
 import type { Factors } from "./plots";
 import { cellTracePlot, tracesPlot } from "./trace-plots";
@@ -27,7 +28,7 @@ export function TraceResults({ data, factors }: { data: Data; factors: Factors }
           Each person&apos;s clips of a cell are averaged first, then people. People answer what they see about a second later; how much
           later is in the report.
         </Text>
-        <PlotFigure options={together} label="Mean rating over time in every cell" />
+        <PlotFigure options={together} label="Mean rating over time in every cell" rows={traceRows(data.cells, labels)} />
       </Card>
       <SimpleGrid cols={{ base: 1, md: 2 }}>
         {data.cells.map((cell) => (
@@ -59,7 +60,11 @@ function CellCard({ cell, data, label }: { cell: Cell; data: Data; label: string
         {blinks}
         {cell.left_out > 0 && ` ${cell.left_out} traces of another sampling rate are left out.`}
       </Text>
-      <PlotFigure options={options} label={`Mean rating over time with its interval, ${label}`} />
+      <PlotFigure
+        options={options}
+        label={`Mean rating over time with its interval, ${label}`}
+        rows={traceRows([cell], new Map([[cell.cell, label]]))}
+      />
     </Card>
   );
 }

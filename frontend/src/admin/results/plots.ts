@@ -48,6 +48,14 @@ export function labelAxis(text: (name: string) => string): Plot.Markish {
   return Plot.axisY({ lineWidth: LABEL_EMS, label: null, tickFormat: text });
 }
 
+/** Width of labels below a figure, in ems, and the room of their lines. */
+const belowEms = (labels: readonly string[]) => 24 / Math.max(3, labels.length);
+
+function belowOf(labels: readonly string[]): number {
+  const lines = Math.max(1, ...labels.map((label) => Math.ceil((0.6 * label.length) / belowEms(labels))));
+  return 24 + 14 * (lines === 1 ? 1 : lines + 1);
+}
+
 /** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
 export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
@@ -63,13 +71,14 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
   const colour = crossed ? "colour" : "currentColor";
   return {
     height: 250,
-    marginBottom: 52,
+    marginBottom: belowOf(across.all),
+    caption: "Bars: one within-participant standard error up and down.",
     x: { type: "point", padding: 0.6, label: null, domain: across.all.length > 0 ? across.all : rows.map((row) => row.x) },
     y: { domain: [scale.minimum, scale.maximum], grid: true, label: `mean ${scale.name}` },
     color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: beside.all } : {}) },
     marks: [
       // Long labels break into lines.
-      Plot.axisX({ lineWidth: 24 / Math.max(3, across.all.length), label: null }),
+      Plot.axisX({ lineWidth: belowEms(across.all), label: null }),
       ...(crossed ? [Plot.line(rows, { x: "x", y: "mean", stroke: "colour", z: "colour", strokeOpacity: 0.5 })] : []),
       Plot.ruleX(rows, { x: "x", y1: "low", y2: "high", stroke: colour, strokeWidth: 1.5 }),
       Plot.dot(rows, { x: "x", y: "mean", fill: colour, r: 3, tip: true }),

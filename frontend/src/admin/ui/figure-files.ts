@@ -1,0 +1,81 @@
+/** A figure of the page as a file of its own: its picture as SVG, its numbers as CSV. */
+
+import * as Plot from "@observablehq/plot";
+
+export type Cell = string | number | null | undefined;
+export type Row = Record<string, Cell>;
+
+const SVG = "http://www.w3.org/2000/svg";
+const WIDTH_PX = 640;
+const LINE_PX = 20;
+const GLYPH_PX = 7;
+const INK = { background: "white", color: "black", fontFamily: "sans-serif", fontSize: "12px" };
+
+/** The picture, dark on white whatever the page's colours are; its legend and caption, which the page has as HTML, are drawn into it. */
+export function svgText(options: Plot.PlotOptions, label: string): string {
+  const drawn = Plot.plot({ ...options, width: WIDTH_PX, style: INK });
+  const parts = drawn instanceof SVGSVGElement ? [drawn] : [...drawn.querySelectorAll<SVGSVGElement>(":scope > svg")];
+  const whole = element("svg", { xmlns: SVG, "font-family": "sans-serif", "font-size": 12 });
+  whole.append(element("title", {}, label));
+  const paper = element("rect", { width: WIDTH_PX, fill: "white" });
+  whole.append(paper);
+  let top = 0;
+  for (const line of [...swatches(drawn)]) {
+    line.setAttribute("transform", `translate(8 ${top})`);
+    whole.append(line);
+    top += LINE_PX;
+  }
+  for (const part of parts) {
+    part.setAttribute("y", String(top));
+    top += Number(part.getAttribute("height"));
+    whole.append(part);
+  }
+  if (typeof options.caption === "string") {
+    whole.append(element("text", { x: 8, y: top + 14 }, options.caption));
+    top += LINE_PX;
+  }
+  for (const [name, value] of Object.entries({ width: WIDTH_PX, height: top, viewBox: `0 0 ${WIDTH_PX} ${top}` }))
+    whole.setAttribute(name, String(value));
+  paper.setAttribute("height", String(top));
+  return `<?xml version="1.0" encoding="UTF-8"?>\n${new XMLSerializer().serializeToString(whole)}\n`;
+}
+
+/** A legend of colours by name, in lines no longer than the figure. */
+function swatches(drawn: ReturnType<typeof Plot.plot>): Element[] {
+  const colours = drawn.querySelector(":scope > div") === null ? undefined : drawn.scale("color");
+  const lines: Element[] = [];
+  let x = WIDTH_PX;
+  for (const value of (colours?.domain ?? []) as readonly unknown[]) {
+    const name = String(value);
+    const room = 26 + GLYPH_PX * name.length;
+    if (x + room > WIDTH_PX - 16) {
+      lines.push(element("g", {}));
+      x = 0;
+    }
+    const fill = String(colours?.apply(value));
+    lines.at(-1)?.append(element("rect", { x, y: 4, width: 12, height: 12, fill }), element("text", { x: x + 16, y: 14 }, name));
+    x += room;
+  }
+  return lines;
+}
+
+function element(name: string, attributes: Record<string, string | number>, text = ""): Element {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
+  if (text !== "") made.textContent = text;
+  return made;
+}
+
+/** The numbers of a figure, a line a row; a text that a spreadsheet would run begins with an apostrophe. */
+export function csvText(rows: readonly Row[]): string {
+  const names = [...new Set(rows.flatMap((row) => Object.keys(row)))];
+  const lines = [names, ...rows.map((row) => names.map((name) => row[name]))];
+  return lines.map((line) => `${line.map(cellText).join(",")}\r\n`).join("");
+}
+
+function cellText(cell: Cell): string {
+  if (cell === null || cell === undefined || Number.isNaN(cell)) return "";
+  if (typeof cell === "number") return String(cell);
+  const safe = /^[=+\-@\t\r]/.test(cell) ? `'${cell}` : cell;
+  return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
+}
