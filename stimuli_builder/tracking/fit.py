@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from stimuli_builder.tracking import kernels
 from stimuli_builder.tracking.kernel_arrays import Buffers, MeshArrays, ModelArrays
+from stimuli_builder.tracking.light import light_between
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.video import Picture
 
@@ -33,6 +34,8 @@ class Fit:
         Root mean square grey levels.
     iterations : int
         0 if the fit broke down.
+    light : (float, float)
+        Gain and offset that would bring the picture's grey levels nearest to the model's.
     """
 
     c: Values
@@ -40,6 +43,7 @@ class Fit:
     vertices: NDArray[np.float32]
     residuals: Values
     iterations: int
+    light: tuple[float, float] = (1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -152,4 +156,5 @@ class Fitter:
         limit = max_iterations or self.max_iterations
         iterations = run(picture, c, pose, limit, self.stop_px, self._mesh, self._arrays, self._buffers)
         residuals = np.sqrt(self._buffers.squares)
-        return Fit(c, pose, self._buffers.vertices.copy(), residuals, int(iterations))
+        light = light_between(self._buffers.look, self._buffers.sampled, self.model.weights)
+        return Fit(c, pose, self._buffers.vertices.copy(), residuals, int(iterations), light)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
 from stimuli_builder.tracking.fit import Fit, Fitter
+from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.picture import (
     reduced,
@@ -109,6 +110,7 @@ class Tracker:
         self._lost_frames = 0
         self._started = False
         self._picture: Picture | None = None
+        self._light = Light()
         self._before: Points | None = None
         self._loss = ""
         low, high = SCALE_RANGE
@@ -132,10 +134,13 @@ class Tracker:
             return TrackedFrame("lost", blank, None, None, None, 0)
         frozen = self._picture is not None and same_picture(picture, self._picture)
         self._picture = picture
+        raw, picture = picture, self._light.evened(picture)
         if self._last is not None and not self._lost_frames:
             fit = self._fitter.fit(picture, self._last.c, self._last.pose)
             fault = self._fault(fit, picture)
             fit, fault = self._with_hint(picture, fit, fault, hint)
+            if fault:
+                fit, fault = self._in_other_light(raw, self._last, fit, fault)
             if not fault:
                 return self._accepted(fit, "tracked", FROZEN if frozen else "", hint)
             self._loss = fault
@@ -145,7 +150,20 @@ class Tracker:
                 started, loss = self._started, self._loss
                 again = f"found again after {loss}" if started else ""
                 return self._accepted(fit, "reinitialised" if started else "tracked", again, hint)
-        return self._search(picture)
+        return self._search(raw, picture)
+
+    def _in_other_light(self, raw: Picture, start: Fit, fit: Fit, fault: str) -> tuple[Fit, str]:
+        """A failed fit, or where it passes one from the same start in the light of the picture there."""
+        begun = self._fitter.fit(self._light.evened(raw), start.c, start.pose, 1)
+        light = self._light.then(*begun.light)
+        if not light.believable or Light().then(*begun.light).steady:
+            return fit, fault
+        picture = light.evened(raw)
+        other = self._fitter.fit(picture, start.c, start.pose)
+        if self._fault(other, picture):
+            return fit, fault
+        self._light = light
+        return other, ""
 
     def _blank(self, picture: Picture) -> str:
         """Why a picture cannot show an eye, or an empty string."""
@@ -176,20 +194,33 @@ class Tracker:
         count = EYE_POINTS * self.model.eyes
         return restored_points(fit.vertices[:count].astype(np.float64), self.model.reduction)
 
-    def _search(self, picture: Picture) -> TrackedFrame:
-        best: Fit | None = None
-        fault = ""
-        for attempt in self._attempts(picture):
-            fault = self._fault(attempt, picture)
-            if not fault:
-                if self._started:
-                    return self._accepted(attempt, "reinitialised", f"found again after {self._loss}")
-                return self._accepted(attempt, "tracked", "")
-            best = attempt
+    def _search(self, raw: Picture, picture: Picture) -> TrackedFrame:
+        best, fault = self._searched(picture)
+        if best is not None and fault:
+            # Where the light is another one, what was found without it tells roughly which.
+            light = self._light.then(*best.light)
+            if light.believable and not light.steady:
+                other, fault_there = self._searched(light.evened(raw))
+                if other is not None and not fault_there:
+                    best, fault, self._light = other, "", light
+        if best is not None and not fault:
+            if self._started:
+                return self._accepted(best, "reinitialised", f"found again after {self._loss}")
+            return self._accepted(best, "tracked", "")
         self._lost_frames += 1
         self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
         residual = _overall(best) if best is not None and best.iterations else None
         return TrackedFrame("lost", self._loss, None, None, residual, best.iterations if best else 0)
+
+    def _searched(self, picture: Picture) -> tuple[Fit | None, str]:
+        """The first attempt that passes, or the last one with its fault; None where no start was likely."""
+        best: Fit | None = None
+        fault = ""
+        for attempt in self._attempts(picture):
+            best, fault = attempt, self._fault(attempt, picture)
+            if not fault:
+                break
+        return best, fault
 
     def _attempts(self, picture: Picture) -> Iterator[Fit]:
         """Fits from likely starts: near the last place often, over the whole picture now and then."""
@@ -211,6 +242,8 @@ class Tracker:
         errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
         why = doubt(self.model, fit, points, errors, difference, before)
         self._before = points
+        if not why:
+            self._light = self._light.following(*fit.light)
         if why or reason == FROZEN:
             status, reason = "doubtful", why or reason
         distances = inter_eyelid_distances(points, self.model.markers)
