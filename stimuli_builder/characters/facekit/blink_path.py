@@ -11,7 +11,7 @@ from scipy.interpolate import RBFInterpolator
 from stimuli_builder.characters.facekit.identity import Movement
 from stimuli_builder.characters.facekit.kit import Array, FaceKit, Index
 from stimuli_builder.characters.facekit.lid_loops import SIDES, chains, globe_of, lid_loops
-from stimuli_builder.characters.facekit.lower_lid import lower_lid_weight, moved_lower_lid
+from stimuli_builder.characters.facekit.lower_lid import lower_lid_weight, moved_lower_lid, turned_about
 from stimuli_builder.characters.facekit.sphere import cartesian, slerp, smooth, spherical, surface_radius
 
 CAMERA_Z_CM = 74.0
@@ -97,10 +97,28 @@ class BlinkPath:
         out = out + self.expression
         for side in SIDES:
             if any(lower_cm):
-                near, weight = self._lower_lids[side]
-                out[near] = moved_lower_lid(out[near], weight, self.globes[side], side, *lower_cm)
+                out = self._lower_lid_moved(out, side, *lower_cm)
             out = self._off_the_eye(out, side, strokes[side])
         return np.asarray(out)
+
+    def _lower_lid_moved(self, vertices: Array, side: int, up_cm: float, nasal_cm: float) -> Array:
+        """The lower lid moved on the globe; where it would pass the upper lid's edge it stops there."""
+        near, weight = self._lower_lids[side]
+        globe, out, edge_weight = self.globes[side], vertices.copy(), np.zeros(len(vertices))
+        upper, lower = chains(self.kit, self.loops[side][3], side)
+        edge_weight[near] = weight
+        out[near] = moved_lower_lid(vertices[near], weight, globe, side, up_cm, nasal_cm)
+        # Heights in the picture, since the upper lid's edge lies before the lower one's.
+        edge, height = out[lower, 0], out[lower, 1]
+        ceiling = _profile(edge, vertices[upper, 0], vertices[upper, 1])
+        # Shut edges overlap a little: there the lid may stay as high as it was.
+        ceiling = np.maximum(ceiling, _profile(edge, vertices[lower, 0], vertices[lower, 1]))
+        at, passed = out[near, 0], np.clip(height - ceiling, 0, None)
+        if not passed.any():
+            return out
+        share = np.clip(weight / np.maximum(_profile(at, edge, edge_weight[lower]), 0.1), 0, 1)
+        angle = share * _profile(at, edge, passed) / globe.radius
+        return turned_about(out, near, globe, -angle)
 
     def _along(self, side: int, stroke: float) -> Array:
         """Where a side's moved vertices are: on great circles near the globe, else straight."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stimuli_builder.characters.facekit.kit import Array
+from stimuli_builder.characters.facekit.kit import Array, Index
 from stimuli_builder.characters.facekit.lid_loops import Globe
 from stimuli_builder.characters.facekit.sphere import cartesian, smooth, spherical
 
@@ -34,3 +34,11 @@ def moved_lower_lid(
     turned = azimuth - side * weight * nasal_cm / edge
     lifted = elevation + weight * up_cm / edge
     return np.asarray(globe.centre + cartesian(radius, turned, lifted))
+
+
+def turned_about(points: Array, chosen: Index, globe: Globe, up: Array) -> Array:
+    """(n, 3) points, those chosen turned upwards about the globe by radians of their own."""
+    out = points.copy()
+    radius, azimuth, elevation = spherical(points[chosen] - globe.centre)
+    out[chosen] = globe.centre + cartesian(radius, azimuth, elevation + up)
+    return out

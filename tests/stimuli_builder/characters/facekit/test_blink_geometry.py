@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.identity import Movement, identity_of_seed
 from stimuli_builder.characters.facekit.kit import FaceKit
+from stimuli_builder.characters.facekit.lid_loops import chains
 from stimuli_builder.characters.facekit.lid_skin import FaceSkin, lid_skin
 from stimuli_builder.characters.facekit.sphere import CORNEA_CM, IRIS_CM
 
@@ -123,3 +124,27 @@ def test_the_lower_lid_goes_as_far_as_told_on_the_globe(kit: FaceKit, up: float,
         assert deepest_cm(skin, moved, side) > 0
     corners = np.abs(moved - still).max(1)[at.upper > 0.99]
     assert corners.max() < 0.03
+
+
+def passed_cm(path: BlinkPath, vertices: Array, side: int) -> float:
+    """How far the lower lid's edge lies above the upper one's in the picture, between the corners."""
+    upper, lower = (vertices[chain] for chain in chains(path.kit, path.loops[side][3], side))
+    first, last = np.sort(upper[:, 0])[[0, -1]]
+    at = np.linspace(first + 0.15 * (last - first), last - 0.15 * (last - first), 80)
+    heights = []
+    for edge in (lower, upper):
+        order = np.argsort(edge[:, 0])
+        heights.append(np.interp(at, edge[order, 0], edge[order, 1]))
+    return float((heights[0] - heights[1]).max())
+
+
+@pytest.mark.parametrize("seed", [3, 12, 19])
+@pytest.mark.parametrize("nasal_cm", [0.0, 0.25, 0.5])
+def test_a_raised_lower_lid_does_not_pass_the_upper_one(kit: FaceKit, seed: int, nasal_cm: float) -> None:
+    identity = identity_of_seed(seed)
+    path = BlinkPath(kit, identity.rest(kit), identity.movement)
+    for stroke in (0.0, 0.5, 0.9, 1.0):
+        strokes = {1: stroke, -1: stroke}
+        shut, moved = path.at(strokes), path.at(strokes, (0.1, nasal_cm))
+        for side in (1, -1):
+            assert passed_cm(path, moved, side) < max(passed_cm(path, shut, side), 0) + 0.015
