@@ -95,7 +95,12 @@ def _names_to_read(
 ) -> list[str]:
     for name in needed:
         if name not in header:
-            hint = wide_hint(header) or _lines_above(header) or _columns_there(name, header)
+            # columns that are asked for are no cells of a wide table
+            hint = (
+                wide_hint([one for one in header if one not in needed])
+                or _lines_above(header)
+                or _columns_there(name, header)
+            )
             raise InputError(f"{source} has no column '{name}'{hint}")
     # counted once for all: a header may have 100,000 names
     there, asked = Counter(header), {*needed, *optional}

@@ -52,9 +52,24 @@ def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) ->
     notes = (
         "Mean of the thresholds of single people, weighed by their errors (random effects by REML, Hartung "
         "and Knapp's interval). SD: how far people's own thresholds differ.",
+        *_without_threshold(result),
     )
     title = caption("Thresholds, mean over people", name, synthetic)
     return Table("threshold-means", title, header, rows, 1, notes)
+
+
+def _without_threshold(result: ThresholdsResult) -> list[str]:
+    """Who is in no mean: it then is of people whose thresholds lie among what was shown, and may be far off."""
+    said = []
+    for mean in result.means:
+        everybody = [one.participant for one in result.people if one.condition == mean.condition]
+        if lacking := len(everybody) - mean.people:
+            said.append(
+                f"{mean.condition}: {lacking} of {len(everybody)} people have no threshold of their own and are "
+                "not in the mean, which differs from that of all where theirs lie outside the levels shown; "
+                "--hierarchical counts everybody."
+            )
+    return said
 
 
 def population_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:

@@ -133,3 +133,16 @@ def test_bad_input_is_one_line(tmp_path: Path, text: str, options: list[str], to
     done = CliRunner().invoke(app, ["thresholds", str(path), *options])
     assert isinstance(done.exception, InputError)
     assert told in str(done.exception)
+
+
+def test_people_without_a_threshold_of_their_own_are_counted_beside_the_mean(tmp_path: Path) -> None:
+    path = tmp_path / "trials.csv"
+    rows = [f"p{p},{x},{int(k < (x - p) / 4)}" for p in range(4) for x in (10, 20, 30, 40) for k in range(10)]
+    rows += [f"q,{x},1" for x in (10, 20, 30, 40) for _ in range(10)]
+    path.write_text("\n".join(["id,x,r", *rows]))
+    call = ["thresholds", str(path), "--x", "x", "--response", "r", "--participant", "id"]
+    done = CliRunner().invoke(app, call)
+    said = " ".join(done.output.split())
+    assert "all: 1 of 5 people have no threshold of their own and are not in the mean" in said
+    path.write_text("\n".join(["id,x,r", *rows[:160]]))
+    assert "no threshold of their own" not in CliRunner().invoke(app, call).output
