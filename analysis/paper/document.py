@@ -4,6 +4,7 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+from analysis.paper.word_text import word_text
 from experiments.errors import InputError
 
 KINDS = (".txt", ".md", ".html", ".htm", ".tex", ".docx", ".pdf")
@@ -23,6 +24,8 @@ _TEX_WORDS = {
     r"\times": "×",
     r"\pm": "±",
 }
+_TEX_DF = re.compile(r"(?<![A-Za-z])(F|t|r|\\chi(?:\^\{?2\}?))_(?:\{([\d., ]+)\}|(\d))(?= *\$? *=)")
+"""Degrees of freedom as many journals set them: F_{1,20}, t_{28}, \\chi^2_2."""
 _SIGNS = str.maketrans(
     {
         **dict.fromkeys("\u00a0\u2009\u202f\u2002\u2003\u2005\u2006\u2007\u200a\t", " "),
@@ -118,6 +121,8 @@ def tex_text(tex: str) -> str:
     """TeX source without comments, mathematics signs and formatting; names of Greek letters as letters."""
     text = re.sub(r"(?<!\\)%.*", "", tex)
     text = re.sub(r"\\[,;:! ]|~", " ", text)
+    text = re.sub(r"\\(?:left|right|[bB]ig+[lr]?)(?![A-Za-z])", "", text)
+    text = _TEX_DF.sub(r"\1(\2\3)", text)
     text = re.sub(r"\\([%&#_$])", r"\1", text)
     for word, sign in sorted(_TEX_WORDS.items(), key=lambda item: -len(item[0])):
         text = re.sub(re.escape(word) + r"(?![A-Za-z])", sign, text)
@@ -135,9 +140,7 @@ def _docx(path: Path) -> str:
         document = Document(str(path))
     except (OpcError, KeyError, ValueError) as error:
         raise InputError(f"{path.name} is not a readable DOCX file: {error}") from error
-    lines = [paragraph.text for paragraph in document.paragraphs]
-    lines += [cell.text for table in document.tables for row in table.rows for cell in row.cells]
-    return "\n".join(lines)
+    return word_text(document)
 
 
 def _pdf(path: Path) -> str:

@@ -59,14 +59,14 @@ def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) ->
 
 
 def _without_threshold(result: ThresholdsResult) -> list[str]:
-    """Who is in no mean: it then is of people whose thresholds lie among what was shown, and may be far off."""
+    """Who is in no mean: it then is of people whose thresholds lie among what was shown, and may be off."""
     said = []
     for mean in result.means:
         everybody = [one.participant for one in result.people if one.condition == mean.condition]
         if lacking := len(everybody) - mean.people:
             said.append(
-                f"{mean.condition}: {lacking} of {len(everybody)} people have no threshold of their own and are "
-                "not in the mean, which differs from that of all where theirs lie outside the levels shown; "
+                f"{mean.condition}: {lacking} of {len(everybody)} people have no threshold of their own and "
+                "are not in the mean, which is off where theirs lie outside the levels shown; "
                 "--hierarchical counts everybody."
             )
     return said

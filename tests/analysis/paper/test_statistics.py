@@ -165,3 +165,47 @@ def test_a_p_of_the_next_clause_is_not_that_of_the_statistic_before(text) -> Non
 )
 def test_a_p_behind_sizes_and_words_of_reports_is_its_own(text) -> None:
     assert only(text).verdict == "consistent"
+
+
+@pytest.mark.parametrize(
+    ("tex", "read"),
+    [
+        ("$F_{1,20}=9.00$, $p=.007$", "F(1,20)=9.00, p=.007"),
+        ("$t_{28} = 2.10$, $p = .045$", "t(28) = 2.10, p = .045"),
+        (r"$\chi^2_2 = 9.21$, $p = .010$", "χ2(2) = 9.21, p = .010"),
+        (r"$F\left(1,20\right)=9.00, p=.007$", "F(1,20)=9.00, p=.007"),
+    ],
+)
+def test_degrees_of_freedom_below_the_line_are_read(tex, read) -> None:
+    statistic = only(tex_text(tex))
+    assert (statistic.text, statistic.verdict) == (read, "consistent")
+
+
+def test_a_word_file_is_read_as_its_reader_sees_it(tmp_path) -> None:
+    """Insertions, formulas, Word's symbols and merged cells once; nothing that was deleted."""
+    from docx import Document
+    from docx.oxml import parse_xml
+    from docx.oxml.ns import nsdecls
+
+    namespaces = nsdecls("w") + ' xmlns:m="http://schemas.openxmlformats.org/officeDocument/2006/math"'
+    document = Document()
+    for part in (
+        f'<w:ins {namespaces} w:id="1" w:author="x"><w:r><w:t>t(30) = 2.10, p = .044</w:t></w:r></w:ins>',
+        f'<w:del {namespaces} w:id="2" w:author="x"><w:r><w:delText>t(31) = 2</w:delText></w:r></w:del>',
+        f"<m:oMath {namespaces}><m:r><m:t>F(1, 33)=9.1, p=.005</m:t></m:r></m:oMath>",
+        f'<w:r {namespaces}><w:sym w:font="Symbol" w:char="F063"/><w:t>2(2) = 7.5, p = .024</w:t></w:r>',
+    ):
+        document.add_paragraph("").add_run("")
+        document.paragraphs[-1]._p.append(parse_xml(part))
+    table = document.add_table(2, 3)
+    table.cell(0, 0).merge(table.cell(0, 2)).text = "F(2, 40) = 3.0, p = .061"
+    document.save(tmp_path / "a.docx")
+    check = check_text(read_document(tmp_path / "a.docx"))
+    assert [one.text for one in check.statistics] == [
+        "t(30) = 2.10, p = .044",
+        "F(1, 33)=9.1, p=.005",
+        "χ2(2) = 7.5, p = .024",
+        "F(2, 40) = 3.0, p = .061",
+    ]
+    assert {one.verdict for one in check.statistics} == {"consistent"}
+    assert check.unread == ()
