@@ -357,10 +357,18 @@ def version_text(session: Session, name: str, number: int, identity: Identity) -
 
 
 def clips(session: Session, name: str, identity: Identity) -> list[ClipOut]:
-    """Every clip of the active version with the closure curve it shows."""
+    """Every clip of the active version with the closure curve it shows, in the declared order of levels."""
     version = active_version(session, find_study(session, name, identity, "view"))
     told = {clip["sha256"]: clip for clip in version.manifest["clips"]}
-    rows = repository.clips_of_design(session, version)
+    experiment = definition_of(version)
+    names = [factor.name for factor in experiment.factors]
+    declared = {cell: number for number, cell in enumerate(design.cells(experiment))}
+
+    def order(row: VersionClip) -> tuple[int, int]:
+        cell = tuple((name, row.levels.get(name, "")) for name in names)
+        return declared.get(cell, len(declared)), row.exemplar
+
+    rows = sorted(repository.clips_of_design(session, version), key=order)
     return [_clip_out(row, told[row.clip_sha256]) for row in rows]
 
 

@@ -179,6 +179,7 @@ describe("words of the builder", () => {
   it("reads keys as words with their units", () => {
     expect(labelOf("failed_longest_gap_ms")).toBe("Failed longest gap (ms)");
     expect(labelOf("name")).toBe("Name");
+    expect(labelOf("break_seconds_min")).toBe("Shortest break (seconds)");
     expect(freeName("form", ["form", "form_2"])).toBe("form_3");
   });
 

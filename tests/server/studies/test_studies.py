@@ -49,6 +49,20 @@ def test_own_clips_become_a_study_by_a_file_name_pattern(experimenter: Admin) ->
     assert made.json()["summary"]["status"] == "draft"
 
 
+def test_clips_are_listed_in_the_declared_order_of_their_levels(experimenter: Admin) -> None:
+    names = [f"{speed}_{number}.mp4" for speed in ("fast", "middle", "slow") for number in (2, 1)]
+    found = upload(experimenter, ("clips.zip", zipped(video_files(*names)))).json()
+    levels = {"pattern": "{speed}_{exemplar}.mp4"}
+    body = {"name": "speeds", "upload": found["id"], "levels": levels, "own_clips": {"title": "A"}}
+    assert experimenter.send("POST", "/studies", body).status_code == 201
+    factors = experimenter.get("/studies/speeds").json()["design"]["factors"]
+    declared = [level["name"] for level in factors[0]["levels"]]
+    clips = experimenter.get("/studies/speeds/clips").json()
+    listed = [(clip["cell"], clip["exemplar"]) for clip in clips]
+    assert listed == [(speed, number) for speed in declared for number in (1, 2)]
+    assert declared == ["slow", "middle", "fast"]
+
+
 OTHER_SCRIPTS = ["Ärm_x.mp4", "Örm_x.mp4", "腕, links_x.mp4"]
 
 
