@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { sizeRemark } from "../../src/admin/clips/sizes";
-import { levelsByPattern, patternProblem, unnamedFactors, withNames } from "../../src/admin/studies/file-pattern";
+import { declaredPattern, levelsByPattern, patternProblem, unnamedFactors, withNames } from "../../src/admin/studies/file-pattern";
 
 const FILES = ["rosie_slow_1.mp4", "hal_slow_1.webm", "hal_fast_2.mp4"];
 
@@ -20,6 +20,15 @@ describe("levels by the names of files", () => {
     expect(patternProblem("{exemplar}.mp4", FILES)).toContain("such as {speed}");
     expect(patternProblem("{robot}_{speed}_{exemplar}.mp4", [...FILES, "notes.mp4"])).toContain("notes.mp4 does not");
     expect(patternProblem("{robot}_{speed}_{exemplar}.mp4", FILES)).toBe(false);
+  });
+
+  it("of a study that is there are known by its own levels, also for one clip alone", () => {
+    const factor = (name: string, ...levels: string[]) => ({ name, levels: levels.map((level) => ({ name: level })) });
+    const factors = [factor("robot", "rosie", "tin"), factor("speed", "slow", "fast")];
+    expect(declaredPattern(factors, ["rosie_slow_1.mp4"])).toBe("{robot}_{speed}_{exemplar}.mp4");
+    expect(declaredPattern(factors, ["tin-fast.webm"])).toBe("{robot}-{speed}.mp4");
+    expect(declaredPattern(factors, ["rosie_slow_1.mp4", "rosie_quick_1.mp4"])).toBe("");
+    expect(declaredPattern(factors, [])).toBe("");
   });
 
   it("ask what a factor without a name is", () => {

@@ -9,13 +9,17 @@ import { UploadClips } from "../clips/UploadClips";
 import { useUpload } from "../clips/useUpload";
 import { studyQuery } from "../queries";
 import { useChange } from "../ui/useChange";
+import { declaredPattern, patternProblem } from "./file-pattern";
+import { StillNeeded } from "./StillNeeded";
 
 export function AddClips({ study }: { study: string }) {
   const detail = useQuery(studyQuery(study)).data;
   const sent = useUpload(`study ${study}`);
   const upload = sent.received;
   const [typed, setPattern] = useState<string | null>(null);
-  const pattern = typed ?? upload?.suggested_pattern ?? "";
+  const files = upload?.files.map(({ name }) => name) ?? [];
+  const pattern = typed ?? (declaredPattern(detail?.design.factors ?? [], files) || (upload?.suggested_pattern ?? ""));
+  const needed = upload?.has_manifest === true ? false : patternProblem(pattern, files);
   const kept = keptWork(study);
   const save = useChange(
     () => {
@@ -55,9 +59,10 @@ export function AddClips({ study }: { study: string }) {
                 w={340}
               />
             )}
-            <Button loading={save.isPending} disabled={detail === undefined} onClick={() => save.mutate(undefined)}>
+            <Button loading={save.isPending} disabled={detail === undefined || needed !== false} onClick={() => save.mutate(undefined)}>
               Save as a new version
             </Button>
+            <StillNeeded parts={[needed]} />
           </Group>
         )}
       </Stack>

@@ -35,6 +35,21 @@ export function patternProblem(pattern: string, files: readonly string[]): strin
   return strays.length > 0 && `a pattern that every file name fits (${strays[0]?.file ?? ""} does not), or a table`;
 }
 
+interface Declared {
+  name: string;
+  levels: readonly { name: string }[];
+}
+
+/** The pattern by which these names are the study's own levels, where one is plain: for a clip alone nothing else tells. */
+export function declaredPattern(factors: readonly Declared[], files: readonly string[]): string {
+  const known = factors.map(({ levels }) => new Set(levels.map(({ name }) => name)));
+  const fits = (pattern: string) =>
+    levelsByPattern(pattern, files).every(({ levels }) => levels !== null && known.every((names, index) => names.has(levels[index] ?? "")));
+  const fields = factors.map(({ name }) => `{${name}}`);
+  const tried = ["_", "-"].flatMap((sign) => [[...fields, `{${EXEMPLAR}}`].join(sign), fields.join(sign)]);
+  return files.length === 0 ? "" : (tried.map((stem) => `${stem}.mp4`).find(fits) ?? "");
+}
+
 export interface Unnamed {
   field: string;
   levels: string[];
