@@ -1,14 +1,21 @@
 """The text of a manuscript or report: plain text, Markdown, HTML, TeX, DOCX, or the text layer of a PDF."""
 
 import re
+import zlib
 from html.parser import HTMLParser
 from pathlib import Path
+from zipfile import BadZipFile
 
 from analysis.paper.word_text import word_text
 from experiments.errors import InputError
 
 KINDS = (".txt", ".md", ".html", ".htm", ".tex", ".docx", ".pdf")
 
+_DAMAGED = (
+    *(BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError),
+    *(AttributeError, TypeError, IndexError, SyntaxError, RecursionError),
+)
+"""What the packages raise of damaged files beside errors of their own; broken XML is a SyntaxError."""
 _HIDDEN = frozenset({"script", "style", "head", "svg", "template"})
 _BLOCKS = frozenset({"p", "li", "tr", "td", "th", "div", "h1", "h2", "h3", "h4", "figcaption", "br", "table"})
 _TEX_WORDS = {
@@ -137,10 +144,13 @@ def _docx(path: Path) -> str:
     from docx.opc.exceptions import OpcError
 
     try:
-        document = Document(str(path))
-    except (OpcError, KeyError, ValueError) as error:
-        raise InputError(f"{path.name} is not a readable DOCX file: {error}") from error
-    return word_text(document)
+        return word_text(Document(str(path)))
+    except (OpcError, *_DAMAGED) as error:
+        raise InputError(f"{path.name} is not a readable DOCX file: {_line(error)}") from error
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _pdf(path: Path) -> str:
@@ -149,8 +159,8 @@ def _pdf(path: Path) -> str:
 
     try:
         text = "\n".join(page.extract_text() for page in PdfReader(path).pages)
-    except (PyPdfError, ValueError, KeyError) as error:
-        raise InputError(f"{path.name} is not a readable PDF file: {error}") from error
+    except (PyPdfError, *_DAMAGED) as error:
+        raise InputError(f"{path.name} is not a readable PDF file: {_line(error)}") from error
     if not text.strip():
         raise InputError(f"{path.name} has no text layer (a scan?); save it as text first")
     return text

@@ -1,5 +1,6 @@
 """Statistics in running text: read, recomputed, and told when they do not fit."""
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -209,3 +210,24 @@ def test_a_word_file_is_read_as_its_reader_sees_it(tmp_path) -> None:
     ]
     assert {one.verdict for one in check.statistics} == {"consistent"}
     assert check.unread == ()
+
+
+def test_a_damaged_word_file_ends_in_one_line(tmp_path) -> None:
+    from docx import Document
+
+    path = tmp_path / "a.docx"
+    Document().save(path)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(2)
+    said = set()
+    for _ in range(30):
+        damaged = bytearray(whole)
+        for at in rng.integers(len(whole), size=20):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_document(path)
+        except InputError as error:
+            said.add(str(error))
+    assert len(said) > 1
+    assert all("a.docx is not a readable DOCX file: " in one and "\n" not in one for one in said)
