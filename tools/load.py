@@ -26,8 +26,11 @@ from rich.table import Table
 from tools.load_measures import Row
 from tools.load_otree import peer
 from tools.load_scenarios import burst, export, starts, steady, under_fire
+from tools.load_snapshots import snapshots
 
 EXPORTED_ROWS, EXPORTED_PER_S = 1_000_000, 60_000
+STORED_ROWS = 500_000
+"""Before snapshots of them are taken."""
 MARKS = {True: "yes", False: "NO", None: ""}
 
 
@@ -38,10 +41,11 @@ def scenarios(share: float, seconds: float, workers: int) -> dict[str, Callable[
         "sqlite": lambda: steady("sqlite", int(300 * share), seconds, 1, 40, math.inf),
         "postgres": lambda: steady("postgres", int(1000 * share), seconds, workers, 60, math.inf),
         "starts": lambda: starts("sqlite", int(300 * share), int(300 * share), seconds / 2, 1, 150),
+        "snapshots": lambda: snapshots(int(300 * share), seconds, int(STORED_ROWS * share), 150),
         "burst": lambda: burst("sqlite", begin_at_once, 1) + burst("postgres", begin_at_once, workers),
         "many": lambda: steady("postgres", int(5000 * share), seconds, workers, math.inf, math.inf),
         "kill": lambda: under_fire(int(200 * share), seconds, workers),
-        "otree": lambda: peer(int(100 * share), seconds / 2),
+        "otree": lambda: peer(int(300 * share), seconds / 2),
         "export": lambda: export(int(EXPORTED_ROWS * share), EXPORTED_PER_S),
     }
 

@@ -32,6 +32,7 @@ class Clocks:
         self.server = server
         self.used: dict[str, float] = {}
         self.cores_s = 0.0
+        self.memory_mb: list[float] = []
         self.began, self._then = time.monotonic(), self._now()
 
     def _now(self) -> dict[str, float]:
@@ -44,7 +45,8 @@ class Clocks:
         }
 
     def stop(self) -> None:
-        """Read them for the last time."""
+        """Read them for the last time, and the memory of each process of the server."""
+        self.memory_mb = [process.memory_info().rss / 1e6 for process in self.server.processes()]
         self.used = {name: value - self._then[name] for name, value in self._now().items()}
         self.used["others"] = max(0.0, 2 * self.used["machine"] - sum(self.used.values()))
         self.cores_s = (time.monotonic() - self.began) * (os.cpu_count() or 1)
@@ -54,10 +56,12 @@ class Clocks:
         each = [self.used[process] / max(1, ratings) for process in ("server", "database", "raters")]
         shares = [self.used[process] / self.cores_s for process in ("server", "database", "raters", "others")]
         said = " / ".join(f"{1000 * cost:.2f}" for cost in each)
+        memory = ", ".join(f"{one:.0f}" for one in self.memory_mb)
         split = " / ".join(f"{100 * share:.0f}" for share in shares)
         return [
             Row("", "CPU per rating with its clip: server / database / raters (ms)", said),
             Row("", "share of the cores: server / database / raters / others (%)", split),
+            Row("", "memory of each process of the server (MB)", memory),
         ]
 
 

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -33,8 +33,10 @@ CLIP_BYTES = 250_000
 class LoadServer:
     """`server run` on a free port."""
 
-    def __init__(self, settings: Settings, database: LoadDatabase, workers: int) -> None:
-        self.settings, self.database = settings, database
+    def __init__(
+        self, settings: Settings, database: LoadDatabase, workers: int, further: Mapping[str, str]
+    ) -> None:
+        self.settings, self.database, self.further = settings, database, further
         self.workers, self.port = workers, free_port()
         self.services: Services = open_services(settings)
         self.link = ""
@@ -51,6 +53,7 @@ class LoadServer:
             "PALPEBRA_EVIDENCE": "record",
             "PALPEBRA_LOG_REQUESTS": "none",
             "PALPEBRA_LOG_FORMAT": "text",
+            **self.further,
         }
         command = [
             sys.executable,
@@ -112,13 +115,13 @@ class LoadServer:
 
 
 @contextmanager
-def load_server(kind: str, workers: int) -> Iterator[LoadServer]:
-    """A started server with a live study on `sqlite` or `postgres`."""
+def load_server(kind: str, workers: int, **further: str) -> Iterator[LoadServer]:
+    """A started server with a live study on `sqlite` or `postgres`; `further` are settings of its own."""
     folder = Path(tempfile.mkdtemp(prefix="palpebra-load-"))
     try:
         with load_database(kind, folder) as database:
             settings = Settings(data_folder=folder / "data", database_url=database.url)
-            server = LoadServer(settings, database, workers)
+            server = LoadServer(settings, database, workers, further)
             try:
                 upgrade(server.services.database)
                 study = add_study(server.services, folder / "clips", STUDY, frames=45, clip_bytes=CLIP_BYTES)

@@ -12,6 +12,7 @@ from tools.load_client import Tally
 from tools.load_measures import stored
 from tools.load_scenarios import begin, prepare, run
 from tools.load_server import LoadServer, load_server
+from tools.load_snapshots import divided
 
 RATERS, SECONDS, EVERY_S = 4, 3.0, 0.5
 STATUSES = {
@@ -58,6 +59,11 @@ def test_the_raters_of_load_rate_and_everything_is_stored(server: LoadServer) ->
 
 def test_a_rating_that_was_acknowledged_and_is_not_there_is_told(server: LoadServer) -> None:
     assert stored(server, Tally(acknowledged={"00000000-0000-4000-8000-000000000000": 4})) == (1, 0)
+
+
+def test_a_rating_counts_for_a_snapshot_that_it_was_under_way_with() -> None:
+    tally = Tally(rating_at=[0.5, 0.9, 1.5, 2.1], rating_ms=[100.0, 200.0, 5.0, 7.0])
+    assert divided(tally, [(1.0, 2.0)]) == ([200.0, 5.0], [100.0, 7.0])
 
 
 @pytest.mark.parametrize("name", attacks.ATTACKS)
