@@ -196,13 +196,11 @@ class Tracker:
 
     def _search(self, raw: Picture, picture: Picture) -> TrackedFrame:
         best, fault = self._searched(picture)
-        if best is not None and fault:
-            # Where the light is another one, what was found without it tells roughly which.
-            light = self._light.then(*best.light)
-            if light.believable and not light.steady:
-                other, fault_there = self._searched(light.evened(raw))
-                if other is not None and not fault_there:
-                    best, fault, self._light = other, "", light
+        for light in self._other_lights(best) if fault else ():
+            other, fault_there = self._searched(light.evened(raw))
+            if other is not None and not fault_there:
+                best, fault, self._light = other, "", light
+                break
         if best is not None and not fault:
             if self._started:
                 return self._accepted(best, "reinitialised", f"found again after {self._loss}")
@@ -211,6 +209,14 @@ class Tracker:
         self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
         residual = _overall(best) if best is not None and best.iterations else None
         return TrackedFrame("lost", self._loss, None, None, residual, best.iterations if best else 0)
+
+    def _other_lights(self, best: Fit | None) -> Iterator[Light]:
+        """The labelled light, where another was followed to the loss, and the one that a fit tells."""
+        if self._light != Light():
+            yield Light()
+        told = Light() if best is None else self._light.then(*best.light)
+        if told.believable and not told.steady:
+            yield told
 
     def _searched(self, picture: Picture) -> tuple[Fit | None, str]:
         """The first attempt that passes, or the last one with its fault; None where no start was likely."""

@@ -57,6 +57,14 @@ def test_a_covered_eye_is_lost_in_other_light_too(lesson, recording):
     assert set(statuses[40:]) <= {"lost", "doubtful"}
 
 
+def test_eyes_lost_in_a_light_followed_wrongly_are_found_in_that_of_the_labels(lesson, recording):
+    tracker = Tracker(lesson.model)
+    tracker.step(recording.pictures[0])
+    tracker.step(np.zeros_like(recording.pictures[0]))
+    tracker._light = Light(1.7, -30.0)  # as a bad frame may have left it
+    assert tracker.step(recording.pictures[2]).status == "reinitialised"
+
+
 @pytest.mark.parametrize(("gain", "offset"), [(0.6, 0.0), (1.4, -20.0), (0.8, 30.0)])
 def test_gain_and_offset_are_found_beside_what_no_model_explains(gain, offset):
     rng = np.random.default_rng(2)
