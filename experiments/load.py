@@ -76,6 +76,11 @@ def locate(name_or_path: str) -> Path:
     raise InputError(f"no experiment '{name_or_path}'{near}{path_too}")
 
 
+MAX_DEPTH = 32
+"""Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
+TOO_DEEP = "not valid TOML: lists or tables are nested too deeply"
+
+
 def parse_experiment(text: str, source: str = "definition", *, has_data: bool = False) -> Experiment:
     """Parse and validate TOML text; DefinitionError lists every problem with its line.
 
@@ -89,9 +94,13 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
     except tomllib.TOMLDecodeError as error:
         line = getattr(error, "lineno", None) or _line_in(str(error))
         raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
-    except RecursionError as error:
-        problem = Problem(None, "", "not valid TOML: lists or tables are nested too deeply")
+    except ValueError as error:  # of a number longer than Python reads
+        problem = Problem(None, "", "not valid TOML: a number has too many digits")
         raise DefinitionError(source, [problem]) from error
+    except RecursionError as error:
+        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)]) from error
+    if _is_deeper(data, MAX_DEPTH):
+        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
     number = data.pop("format", 1)
     try:
         data = upgraded(data, number)
@@ -107,6 +116,19 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         details = sorted(causes, key=lambda detail: detail["type"] == "missing")
         problems = [_problem(detail, text) for detail in details]
         raise DefinitionError(source, problems) from error
+
+
+def _is_deeper(data: Any, depth: int) -> bool:
+    """Whether tables and lists stand in one another more than `depth` times."""
+    level = [data]
+    for _ in range(depth + 1):
+        level = [
+            inner
+            for one in level
+            for inner in (one.values() if isinstance(one, dict) else one)
+            if isinstance(inner, dict | list)
+        ]
+    return bool(level)
 
 
 def _with_tuples(data: Any) -> Any:

@@ -12,12 +12,12 @@ from pathlib import PurePosixPath
 from experiments.errors import InputError, did_you_mean
 from experiments.factor_names import TAKES, name_and_prefix
 from experiments.level_order import in_order
+from experiments.name_patterns import FIELD, NamePattern
 from experiments.trials import reserved_names
 
 Placed = dict[str, tuple[dict[str, str], int]]
 """File name -> (levels by factor, exemplar)."""
 FIRST_FIELD = "exemplar"
-_FIELD = re.compile(r"\{([A-Za-z][A-Za-z0-9_]*)\}")
 
 
 def one_form(name: str) -> str:
@@ -27,6 +27,13 @@ def one_form(name: str) -> str:
 
 def levels_from_table(text: str, files: Iterable[str]) -> Placed:
     """Read levels from CSV text; each clip needs one row, each row a clip, every level a value."""
+    try:
+        return _read_table(text, files)
+    except csv.Error as error:
+        raise InputError(f"the table is no CSV that can be read ({error}); write it anew") from error
+
+
+def _read_table(text: str, files: Iterable[str]) -> Placed:
     reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")), delimiter=_delimiter(text))
     columns = [name for name in (reader.fieldnames or []) if name]
     if "file" not in columns or len(columns) < 2:
@@ -59,29 +66,22 @@ def _delimiter(text: str) -> str:
 
 def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
     """Read levels from file names by a pattern such as `{character}_{speed}_{exemplar}.mp4`."""
-    fields = _FIELD.findall(pattern)
+    fields = FIELD.findall(pattern)
     if not [name for name in fields if name != FIRST_FIELD] or len(set(fields)) != len(fields):
         raise InputError(
             "expected a pattern with factors in braces, each once, such as {character}_{exemplar}.mp4"
         )
-    matcher, by_stem = _matcher(pattern, fields), _matcher(_stem(pattern), fields)
+    whole, by_stem = (NamePattern.read(one_form(text)) for text in (pattern, _stem(pattern)))
     rows = {}
     for name in files:
-        fit = matcher.fullmatch(name)
+        fit = whole.fit(name)
         if fit is None and _stem(pattern) != pattern:
-            fit = by_stem.fullmatch(_stem(name))  # files of several formats follow one pattern
+            fit = by_stem.fit(_stem(name))  # files of several formats follow one pattern
         if fit is None:
             raise InputError(f"the file name '{name}' does not follow the pattern {pattern}")
         levels = {field: fit[field] for field in fields if field != FIRST_FIELD}
         rows[name] = (levels, fit[FIRST_FIELD] if FIRST_FIELD in fields else "")
     return _numbered(rows)
-
-
-def _matcher(pattern: str, fields: Sequence[str]) -> re.Pattern[str]:
-    escaped = re.escape(one_form(pattern))
-    for name in fields:
-        escaped = escaped.replace(re.escape("{" + name + "}"), f"(?P<{name}>[^/]+?)", 1)
-    return re.compile(escaped)
 
 
 def _stem(name: str) -> str:

@@ -6,7 +6,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from server.db import open_database
-from server.migrate import migrating
+from server.migrate import migrating, with_wall, without_wall
 from server.models import Base, UtcDateTime
 from server.settings import Settings
 
@@ -35,5 +35,7 @@ else:
     database = open_database(Settings())
     context.config.attributes["secret_key"] = database.secret_key
     with migrating(database) as connection:
+        without_wall(connection)
         migrate(connection)
+        with_wall(connection)
     database.close()

@@ -12,6 +12,7 @@ from server import health, pages
 from server.accounts import endpoints as accounts
 from server.accounts import people
 from server.capsules import endpoints as capsules
+from server.changes import ChangesTold
 from server.clips import endpoints as clips
 from server.context import open_services
 from server.door import Door
@@ -22,7 +23,7 @@ from server.lane import ExperimentersLane
 from server.library import endpoints as library
 from server.library import strips
 from server.methods import endpoints as methods
-from server.middleware import SecurityHeaders
+from server.middleware import RowSecurity, SecurityHeaders
 from server.monitor import endpoints as monitor
 from server.operations import endpoints as operations
 from server.operations.drill_schedule import weekly_drill
@@ -110,11 +111,12 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
         async with (
             weekly_drill(services.settings),
             snapshots_taken(services.settings),
-            hourly_retention(services.database, services.settings),
+            hourly_retention(services.database, services.settings, services.locks),
             digests_judged_later(services.database, services.intake),
             results_counted_ahead(services.database, services.results),
         ):
             yield
+        served.state.services.changes.close()
         served.state.services.preparing.close()
         served.state.services.passwords.close()
         served.state.services.intake.clips.close()
@@ -135,8 +137,10 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     for router in _routers():
         app.include_router(router)
     install_error_handlers(app)
+    app.add_middleware(ChangesTold, changes=services.changes)
     app.add_middleware(ExperimentersLane)  # inside the door: a body that comes slowly holds no place
     app.add_middleware(Door, settings=services.settings)
+    app.add_middleware(RowSecurity)  # outside the door, which recognises accounts too
     app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)
     return app

@@ -8,16 +8,19 @@ from fastapi import Depends, Request
 
 from server.accounts.passwords import PasswordWork
 from server.accounts.throttle import SignInThrottle
+from server.changes import Changes
 from server.clock import now
 from server.db import REQUEST_BUSY_S, Database, open_database
 from server.evidence.clip_bytes import ClipBytes
 from server.evidence.intake import Intake
 from server.group_commit import GroupCommit
+from server.locks import Locks, open_locks
 from server.open_streams import OpenStreams
 from server.providers.clients import Providers
 from server.rate_limit import RateLimit
 from server.results.cache import ResultsCache
 from server.settings import Settings
+from server.shared_counts_repository import SharedCounts
 from server.stopping import Stopping
 from server.storage.clips import ClipStore, FolderStore
 from server.storage.s3 import open_s3
@@ -26,7 +29,7 @@ from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
 RESUME_CODES_PER_MINUTE = 10
-"""Resume codes that may be tried for one visit a minute, per worker."""
+"""Resume codes that may be tried for one visit a minute."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class Services:
     preparing: Preparing
     providers: Providers
     streams: OpenStreams
+    locks: Locks
+    changes: Changes
 
     def time_of(self, request: Request) -> datetime:
         """When a participant's request came in: now, but where simulated people say when they act."""
@@ -66,23 +71,27 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
     """
     database = open_database(settings, REQUEST_BUSY_S)
     clips = open_s3(settings) if settings.s3_bucket else FolderStore(settings.clip_folder)
+    shared = None if database.is_sqlite else SharedCounts(database, lambda: settings.key)
+    locks = open_locks(settings, database)
     return Services(
         settings=settings,
         database=database,
         clips=clips,
-        run_starts=RateLimit(settings.run_starts_per_minute),
-        unsupported=RateLimit(settings.unsupported_per_minute),
+        run_starts=RateLimit(settings.run_starts_per_minute, name="run starts", shared=shared),
+        unsupported=RateLimit(settings.unsupported_per_minute, name="unsupported", shared=shared),
         versions=Versions(),
         group_commit=GroupCommit(database),
-        sign_ins=SignInThrottle(settings),
+        sign_ins=SignInThrottle(settings, shared),
         passwords=PasswordWork(),
         stopping=Stopping(),
         results=ResultsCache(),
         intake=Intake(settings, ClipBytes(clips), rehearses=rehearses),
-        resume_codes=RateLimit(RESUME_CODES_PER_MINUTE),
-        preparing=Preparing(settings.upload_folder),
+        resume_codes=RateLimit(RESUME_CODES_PER_MINUTE, name="resume codes", shared=shared),
+        preparing=Preparing(settings.upload_folder, locks),
         providers=Providers(settings),
         streams=OpenStreams(),
+        locks=locks,
+        changes=Changes(database),
     )
 
 

@@ -4,6 +4,7 @@ import sqlite3
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
+from server.row_policies_repository import wall_stands
+from server.row_security_repository import kind_of_session
 from server.settings import Settings
 from server.sqlite import sqlite_engines
 
@@ -70,16 +73,28 @@ class Database:
         # SQLite lets one writer in and makes the others poll; queueing them here keeps the wait short.
         self._writer = _Turns(busy_s) if self.is_sqlite else nullcontext()
 
+    @cached_property
+    def keeps_rows_apart(self) -> bool:
+        """Whether what a member asks is narrowed to her laboratories' rows."""
+        if self.is_sqlite:
+            return False
+        with self.engine.connect() as connection:
+            return wall_stands(connection)
+
+    @cached_property
+    def _session(self) -> type[Session]:
+        return kind_of_session(self.keeps_rows_apart)
+
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session that only reads; rolled back at the end."""
-        with Session(self.engine, autoflush=False, info=self.carried) as session:
+        with self._session(self.engine, autoflush=False, info=self.carried) as session:
             yield session
 
     @contextmanager
     def snapshot(self) -> Iterator[Session]:
         """As `read()`, but seeing one moment of the database, however long it reads."""
-        with Session(self.engine, autoflush=False, info=self.carried) as session:
+        with self._session(self.engine, autoflush=False, info=self.carried) as session:
             if not self.is_sqlite:  # SQLite's transactions are snapshots in themselves
                 session.connection(execution_options={"isolation_level": "REPEATABLE READ"})
             yield session
@@ -87,7 +102,10 @@ class Database:
     @contextmanager
     def write(self) -> Iterator[Session]:
         """A session committed at the end, rolled back where an exception leaves the block."""
-        with self._writer, Session(self.write_engine, expire_on_commit=False, info=self.carried) as session:
+        with (
+            self._writer,
+            self._session(self.write_engine, expire_on_commit=False, info=self.carried) as session,
+        ):
             yield session
             session.commit()
 

@@ -1,4 +1,4 @@
-"""What every answer passes through: security headers.
+"""What every request passes through: security headers, and for whom it acts.
 
 Written as plain ASGI because Starlette's BaseHTTPMiddleware costs as much as a whole rating.
 """
@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from server.row_security_repository import acting
 from server.settings import Settings
 
 NONCE_PLACEHOLDER = "__CSP_NONCE__"
@@ -69,3 +70,15 @@ class SecurityHeaders:
             await send(message)
 
         await self.app(scope, receive, send_with_headers)
+
+
+class RowSecurity:
+    """Each request acts for nobody until an account is recognised (`server.row_security_repository`)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        with acting():
+            await self.app(scope, receive, send)

@@ -13,6 +13,7 @@ from sqlalchemy import Connection
 import migrations
 from server.db import Database
 from server.repository import wait_for_other_migrations
+from server.row_policies_repository import raise_wall, take_down_wall
 
 
 def alembic_config(
@@ -43,22 +44,42 @@ def migrating(database: Database) -> Iterator[Connection]:
 def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str | None]:
     """Run the missing migrations in one transaction; return the revision before and after."""
     with migrating(database) as connection:
-        before = MigrationContext.configure(connection).get_current_revision()
+        before = revision_of(connection)
+        if before != newest_revision():
+            without_wall(connection)
         command.upgrade(alembic_config(connection, database.secret_key), revision)
-        after = MigrationContext.configure(connection).get_current_revision()
-    return before, after
+        with_wall(connection)
+        return before, revision_of(connection)
+
+
+def without_wall(connection: Connection) -> None:
+    """Take down the policies of rows: they hold on to columns that migrations change."""
+    if connection.dialect.name == "postgresql":
+        take_down_wall(connection)
+
+
+def with_wall(connection: Connection) -> None:
+    """Put up the policies of rows where the database has the newest revision."""
+    if connection.dialect.name == "postgresql" and revision_of(connection) == newest_revision():
+        raise_wall(connection)
+
+
+def revision_of(connection: Connection) -> str | None:
+    """The revision of a connection's database; None where it is empty."""
+    return MigrationContext.configure(connection).get_current_revision()
 
 
 def downgrade(database: Database, revision: str = "-1") -> None:
     """Undo migrations down to `revision`."""
     with migrating(database) as connection:
+        without_wall(connection)
         command.downgrade(alembic_config(connection, database.secret_key), revision)
 
 
 def current_revision(database: Database) -> str | None:
     """The revision of the database; None where it is empty."""
     with database.engine.connect() as connection:
-        return MigrationContext.configure(connection).get_current_revision()
+        return revision_of(connection)
 
 
 def newest_revision() -> str:

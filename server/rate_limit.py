@@ -1,21 +1,40 @@
-"""A limit on how often something may happen, kept in the memory of one worker and nowhere else."""
+"""How often something may happen: in the memory of one process, and in PostgreSQL for all together."""
 
 import threading
 import time
 from collections.abc import Callable
 
 from server.errors import TooManyRequests
+from server.shared_counts_repository import SharedCounts
 
 WINDOW_S = 60.0
 _MAX_KEYS = 10_000
 
 
 class RateLimit:
-    """At most `per_minute` events a key, refilled steadily (a token bucket)."""
+    """At most `per_minute` events a key, refilled steadily (a token bucket).
 
-    def __init__(self, per_minute: int, clock: Callable[[], float] = time.monotonic) -> None:
-        self.per_minute = per_minute
+    Parameters
+    ----------
+    name : str, optional
+        Tells its keys from those of other limits where they are shared.
+    shared : SharedCounts, optional
+        Where the processes of a server count together; each by itself where not given.
+    window_s : float, optional
+        How long it takes until a share that was used up is whole again, where that is no minute.
+    """
+
+    def __init__(
+        self,
+        per_minute: int,
+        clock: Callable[[], float] = time.monotonic,
+        name: str = "",
+        shared: SharedCounts | None = None,
+        window_s: float = WINDOW_S,
+    ) -> None:
+        self.per_minute, self._window_s = per_minute, window_s
         self._clock = clock
+        self._name, self._shared = name, shared
         self._lock = threading.Lock()
         self._buckets: dict[str, tuple[float, float]] = {}
 
@@ -31,13 +50,15 @@ class RateLimit:
         with self._lock:
             moment = self._clock()
             left, seen = self._buckets.pop(key, (float(self.per_minute), moment))
-            left = min(self.per_minute, left + (moment - seen) * self.per_minute / WINDOW_S)
+            left = min(self.per_minute, left + (moment - seen) * self.per_minute / self._window_s)
             # Put back at the end: the dictionary's first key is then the one unused for longest.
             self._buckets[key] = (left - number if left >= 1 else left, moment)
             if len(self._buckets) > _MAX_KEYS:
                 del self._buckets[next(iter(self._buckets))]
+        if left >= 1 and self._shared is not None:
+            left = self._shared.hit(f"{self._name}:{key}", self.per_minute, number, self._window_s)
         if left < 1:
-            wait = max(1, round((1 - left) * WINDOW_S / self.per_minute))
+            wait = max(1, round((1 - left) * self._window_s / self.per_minute))
             raise TooManyRequests(
                 f"Too many requests; please try again in {wait} s.", headers={"retry-after": str(wait)}
             )

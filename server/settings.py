@@ -31,6 +31,11 @@ class Settings(BaseSettings):
         default=Path("data"),
         description="Folder of everything the server keeps: database, clips, secret key.",
     )
+    shared_folder: Path | None = Field(
+        default=None,
+        description="Folder that every host of a server mounts, for what one makes and another hands out: "
+        "uploads, reports, capsules, rehearsals, the ledger of erasures; empty: the data folder.",
+    )
     database_url: str = Field(
         default="",
         validation_alias=AliasChoices("DATABASE_URL", "PALPEBRA_DATABASE_URL"),
@@ -57,7 +62,7 @@ class Settings(BaseSettings):
         default=2 * 1024**3, ge=1024, description="Largest request of an experimenter, clip uploads included."
     )
     run_starts_per_minute: int = Field(
-        default=3000, ge=1, description="Runs that may be started by one link a minute, per worker."
+        default=3000, ge=1, description="Runs that may be started by one link a minute."
     )
     audit_syslog: str = Field(
         default="",
@@ -85,7 +90,7 @@ class Settings(BaseSettings):
         description="Sign-in attempts a minute from one range of addresses (/24, /64), or one known browser.",
     )
     logins_per_minute_overall: int = Field(
-        default=120, ge=1, description="Sign-in attempts a minute from browsers not seen before, per worker."
+        default=120, ge=1, description="Sign-in attempts a minute from browsers not seen before."
     )
     oidc: dict[ProviderId, Provider] = Field(
         default={},
@@ -231,9 +236,14 @@ class Settings(BaseSettings):
         return self.stimuli_folder / "strips"
 
     @property
+    def common_folder(self) -> Path:
+        """Folder that all hosts of this server have in common."""
+        return self.shared_folder or self.data_folder
+
+    @property
     def upload_folder(self) -> Path:
         """Folder of uploads that wait to become studies."""
-        return self.data_folder / "uploads"
+        return self.common_folder / "uploads"
 
     @property
     def resolved_database_url(self) -> str:

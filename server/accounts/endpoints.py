@@ -151,28 +151,28 @@ async def attempt(
     device = known_device(services.settings.key, body.name, device_cookie)
     throttle = services.sign_ins
     key = throttle.key(body.name, address, device)
-    throttle.enter(key, address, device)
+    await run_in_threadpool(throttle.enter, key, address, device)
     stored = await run_in_threadpool(service.stored_password, services, body.name)
     fits = await services.passwords.run(lambda: password_fits(body.password, stored))
     if fits and not device:
-        throttle.codes.check(body.name.casefold())
+        await run_in_threadpool(throttle.codes.check, body.name.casefold())
     token, failure = await run_in_threadpool(
         service.open_session, services, body.name, stored if fits else None, body.code, user_agent
     )
     if token is not None:
-        throttle.names.succeeded(key)
-        throttle.codes.succeeded(body.name.casefold())
+        await run_in_threadpool(throttle.names.succeeded, key)
+        await run_in_threadpool(throttle.codes.succeeded, body.name.casefold())
         return token
     if not isinstance(failure, service.SecondFactorRequired):
-        throttle.names.failed(key)
+        await run_in_threadpool(throttle.names.failed, key)
         if fits and not device:
             # Whoever knows the password could else try codes from everywhere.
-            throttle.codes.failed(body.name.casefold())
+            await run_in_threadpool(throttle.codes.failed, body.name.casefold())
     raise failure or service.WrongCredentials("Name or password are wrong.")
 
 
 def address_of(request: Request) -> str:
-    """The client's address as the proxy says; it is neither stored nor logged."""
+    """The client's address as the proxy says; neither stored nor logged but as a keyed hash of its range."""
     return request.client.host if request.client else ""
 
 
@@ -213,9 +213,8 @@ async def accept_invitation(
 ) -> Me:
     """Use a one-time link: make the account and sign in."""
     check_origin(request, services)
-    services.sign_ins.enter(
-        services.sign_ins.key(body.name, address_of(request), None), address_of(request), None
-    )
+    key = services.sign_ins.key(body.name, address_of(request), None)
+    await run_in_threadpool(services.sign_ins.enter, key, address_of(request), None)
     await run_in_threadpool(invitations.check_invitation, services, token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, body.name))
     cookie = await run_in_threadpool(
@@ -263,14 +262,14 @@ async def change_password(
 async def must_fit(services: Services, me: Identity, password: str) -> None:
     """Ask for the present password; a stolen session may not try many."""
     key = f"session {me.session_id}"
-    services.sign_ins.names.check(key)
+    await run_in_threadpool(services.sign_ins.names.check, key)
     stored = await run_in_threadpool(service.own_password, services, me)
     try:
         await services.passwords.run(lambda: service.must_fit(password, stored))
     except service.WrongCredentials:
-        services.sign_ins.names.failed(key)
+        await run_in_threadpool(services.sign_ins.names.failed, key)
         raise
-    services.sign_ins.names.succeeded(key)
+    await run_in_threadpool(services.sign_ins.names.succeeded, key)
 
 
 async def must_prove(services: Services, me: Identity, proof: str) -> None:
@@ -279,12 +278,12 @@ async def must_prove(services: Services, me: Identity, proof: str) -> None:
         await must_fit(services, me, proof)
         return
     key = f"session {me.session_id}"
-    services.sign_ins.names.check(key)
+    await run_in_threadpool(services.sign_ins.names.check, key)
     failure = await run_in_threadpool(service.own_code_failure, services, me, proof)
     if failure is not None:
-        services.sign_ins.names.failed(key)
+        await run_in_threadpool(services.sign_ins.names.failed, key)
         raise failure
-    services.sign_ins.names.succeeded(key)
+    await run_in_threadpool(services.sign_ins.names.succeeded, key)
 
 
 @router.post("/second-factor")

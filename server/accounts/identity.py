@@ -14,6 +14,7 @@ from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ApiError
 from server.models import ROLES, Account, AdminSession, Role
+from server.row_security_repository import act_for
 from server.tokens import hash_token
 
 Scope = Literal["read", "personal", "write", "export"]
@@ -108,7 +109,13 @@ def _address_of(origin: str) -> str:
 
 
 def identify(request: Request, services: Services) -> Identity:
-    """The identity of a request; NotSignedIn where there is none."""
+    """The identity of a request, which acts for it from here on; NotSignedIn where there is none."""
+    identity = _recognised(request, services)
+    act_for(identity.account_id)
+    return identity
+
+
+def _recognised(request: Request, services: Services) -> Identity:
     authorization = request.headers.get("authorization", "")
     if authorization.startswith("Bearer "):
         return _by_token(services, authorization.removeprefix("Bearer ").strip())

@@ -1,4 +1,4 @@
-"""Who may try to sign in how often: known in the memory of one worker, and by no internet address in clear.
+"""Who may try to sign in how often: by no internet address in clear; on PostgreSQL in all processes together.
 
 Nobody's wrong passwords keep another out: waiting times hold for a name *from one range of addresses*.
 A browser that signed in before carries a device cookie and is counted by itself, whatever others do to
@@ -11,12 +11,15 @@ import ipaddress
 import secrets
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from fastapi.concurrency import run_in_threadpool
 
 from server.errors import ApiError, TooManyRequests
 from server.rate_limit import RateLimit
 from server.settings import Settings
+from server.shared_counts_repository import SharedCounts
 from server.tokens import derived_token, new_token
 
 DEVICE_COOKIE = "palpebra_device"
@@ -25,6 +28,8 @@ FREE_FAILURES = 5
 LONGEST_WAIT_S = 900.0
 FORGOTTEN_S = 6 * 3600.0
 RECORDS_PER_MINUTE = 20
+LETTERS_FROM_A_RANGE = 3
+"""Letters to one account for a new password that a range of addresses may ask for within `FORGOTTEN_S`."""
 _MAX_KEYS = 20_000
 _EVERYBODY, _EVERYBODY_BACK = "everybody", "everybody who comes back"
 
@@ -50,8 +55,15 @@ class TooManyFailures(TooManyRequests):
 class BackOff:
     """Waiting times by key that double with each failure after the first few."""
 
-    def __init__(self, free: int = FREE_FAILURES, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        free: int = FREE_FAILURES,
+        clock: Callable[[], float] = time.monotonic,
+        name: str = "",
+        shared: SharedCounts | None = None,
+    ) -> None:
         self.free, self._clock = free, clock
+        self._name, self._shared = name, shared
         self._lock = threading.Lock()
         self._failures: dict[str, tuple[int, float]] = {}
 
@@ -59,16 +71,24 @@ class BackOff:
         """TooManyFailures where `key` has to wait still."""
         with self._lock:
             number, last = self._failures.get(key, (0, 0.0))
-            over = number - self.free
-            left = last + min(LONGEST_WAIT_S, 2.0 ** min(over, 20)) - self._clock() if over >= 0 else 0.0
+        left = self._left(number, self._clock() - last)
+        if left <= 0 and self._shared is not None:
+            left = self._left(*self._shared.failures(f"{self._name}:{key}"))
         if left > 0:
             wait = max(1, round(left))
             raise TooManyFailures(
                 f"Too many wrong attempts; please try again in {wait} s.", headers={"retry-after": str(wait)}
             )
 
+    def _left(self, number: int, ago_s: float) -> float:
+        """How long one has to wait after so many failures, the last so long ago; nothing where 0 or less."""
+        over = number - self.free
+        return min(LONGEST_WAIT_S, 2.0 ** min(over, 20)) - ago_s if over >= 0 else 0.0
+
     def failed(self, key: str) -> None:
         """Count one failure."""
+        if self._shared is not None:
+            self._shared.failed(f"{self._name}:{key}")
         with self._lock:
             number, last = self._failures.pop(key, (0, self._clock()))
             number = 0 if self._clock() - last > FORGOTTEN_S else number
@@ -80,20 +100,28 @@ class BackOff:
         """Forget the failures of `key`."""
         with self._lock:
             self._failures.pop(key, None)
+        if self._shared is not None:
+            self._shared.forget(f"{self._name}:{key}")
 
 
 class SignInThrottle:
     """The limits of everything that costs a password's hash."""
 
-    def __init__(self, settings: Settings) -> None:
-        self._salt = secrets.token_bytes(16)
-        self.names = BackOff()
-        self.codes = BackOff()
-        self.per_range = RateLimit(settings.logins_per_minute)
-        self.overall = RateLimit(settings.logins_per_minute_overall)
+    def __init__(self, settings: Settings, shared: SharedCounts | None = None) -> None:
+        # Shared counts are known by a key of the installation's instead, the same in every process.
+        self._salt = secrets.token_bytes(16) if shared is None else b""
+        self.names = BackOff(name="names", shared=shared)
+        self.codes = BackOff(name="codes", shared=shared)
+
+        def limit(name: str, per_minute: int) -> RateLimit:
+            return RateLimit(per_minute, name=name, shared=shared)
+
+        self.per_range = limit("range", settings.logins_per_minute)
+        self.overall = limit("overall", settings.logins_per_minute_overall)
+        self._letters = RateLimit(LETTERS_FROM_A_RANGE, name="letters", shared=shared, window_s=FORGOTTEN_S)
         self._records, self._unwritten = RateLimit(RECORDS_PER_MINUTE), 0
-        self.per_device = RateLimit(settings.logins_per_minute)
-        self.logouts = RateLimit(settings.logins_per_minute)
+        self.per_device = limit("device", settings.logins_per_minute)
+        self.logouts = limit("logouts", settings.logins_per_minute)
 
     def key(self, name: str, address: str, device: str | None) -> str:
         """What failures are counted by: the name, and the device or the range of addresses; unreadable."""
@@ -117,16 +145,24 @@ class SignInThrottle:
         self.per_range.hit(self._hidden(f"back at {address_range(address)}"))
         self.overall.hit(_EVERYBODY_BACK)
 
-    @contextmanager
-    def logout(self, provider: str, address: str) -> Iterator[None]:
+    @asynccontextmanager
+    async def logout(self, provider: str, address: str) -> AsyncIterator[None]:
         """Count refused logout tokens of a provider; TooManyRequests where too many came before."""
         key = self._hidden(f"logout {provider} from {address_range(address)}")
-        self.logouts.check(key)
+        await run_in_threadpool(self.logouts.check, key)
         try:
             yield
         except ApiError:
-            self.logouts.hit(key)
+            await run_in_threadpool(self.logouts.hit, key)
             raise
+
+    def may_have_letter(self, account_id: int, address: str) -> bool:
+        """Count a letter to an account that is asked for from an address; False where that is too often."""
+        try:
+            self._letters.hit(self._hidden(f"letter to {account_id} from {address_range(address)}"))
+        except TooManyRequests:
+            return False
+        return True
 
     def written(self) -> int | None:
         """How many failed sign-ins were not written down since the last; None: do not write this one.

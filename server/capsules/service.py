@@ -96,7 +96,7 @@ def remove_old(services: Services, name: str) -> None:
 
 
 def _zip_of(services: Services, public_id: str) -> Path:
-    return services.settings.data_folder / "capsules" / f"{public_id}.zip"
+    return services.settings.common_folder / "capsules" / f"{public_id}.zip"
 
 
 def _capsule_out(services: Services, job: Job) -> CapsuleOut:

@@ -12,6 +12,7 @@ from server.models.accounts import (
 )
 from server.models.base import Base, UtcDateTime
 from server.models.evidence import AnswerEvidence
+from server.models.limits import SharedCount
 from server.models.logins import AccountLogin, LoginAttempt, Purpose
 from server.models.mail import LetterPurpose, MailedLink
 from server.models.runs import NO_SLOT, RUN_STATUSES, STAGES, IdentityKey, RecruiterIdentity, StudyRun
@@ -65,6 +66,7 @@ __all__ = [
     "SeriesAnswer",
     "SeriesOffer",
     "SeriesTrial",
+    "SharedCount",
     "Study",
     "StudyGrant",
     "StudyRun",

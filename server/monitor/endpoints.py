@@ -19,8 +19,11 @@ from server.workspaces.rights import SecondFactorNeeded
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
 EVERY_S = 2.0
+"""How often a stream looks at its study at most; so often it does where it hears of no changes."""
+QUIET_S = 10.0
+"""How often it looks where nothing was written: people who do nothing are away after a while."""
 LOOK_S = 0.2
-"""How often a stream that waits looks whether the server is to end."""
+"""How often a stream that waits looks whether the server is to end, or something was written."""
 RETRY_MS = 1000
 """After so long a browser whose stream ended connects again."""
 
@@ -50,13 +53,22 @@ def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
     return after.model_copy(update={"runs": changed}).model_dump_json()
 
 
-async def _waited(services: Services) -> bool:
-    """Wait for the next look at the study; False, at once, where the server is to end."""
-    for _ in range(round(EVERY_S / LOOK_S)):
-        if services.stopping:
-            return False
+async def _waited(services: Services, seen: int | None) -> bool:
+    """Wait for the next look at the study; False, at once, where the server is to end.
+
+    Parameters
+    ----------
+    seen : int or None
+        The number of the change before the last look.
+    """
+    began = time.monotonic()
+    while not services.stopping:
+        waited = time.monotonic() - began
+        is_quiet = seen is not None and services.changes.number == seen
+        if waited >= (QUIET_S if is_quiet else EVERY_S):
+            return True
         await asyncio.sleep(LOOK_S)
-    return not services.stopping
+    return False
 
 
 @router.get("/monitor/stream", response_class=StreamingResponse)
@@ -69,13 +81,18 @@ async def stream_monitor(
     when the session ends or the server does; the browser then connects again by itself.
     """
     services.streams.check(identity.account_id)
+    seen = services.changes.number
     with services.streams.one(identity.account_id):  # of hundreds asked for at once, most cost no look
         first = await run_in_threadpool(_snapshot, services, study, identity, origin)
 
     async def changing() -> AsyncIterator[MonitorSnapshot]:
+        nonlocal seen
         yield first
         until = time.monotonic() + 60 * services.settings.monitor_stream_minutes
-        while await _waited(services) and not await request.is_disconnected() and time.monotonic() < until:
+        while await _waited(services, seen) and time.monotonic() < until:
+            if await request.is_disconnected():
+                return
+            seen = services.changes.number
             try:
                 anew = await run_in_threadpool(identify, request, services)
                 yield await run_in_threadpool(_snapshot, services, study, anew, origin)

@@ -24,9 +24,9 @@ from experiments.errors import InputError
 from experiments.files import whole_private_file
 from server.clock import iso, now
 from server.context import Services
+from server.file_locks import locked
 from server.operations import erasures, keys_apart
 from server.operations.keys_apart import KeyFile
-from server.operations.locking import locked
 from server.operations.repository import clip_hashes
 from server.operations.rows import Content, Digest
 from server.operations.rows_repository import read_rows, snapshot, tables_of
@@ -73,7 +73,7 @@ def back_up(
 def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
     """Key file and ledger, by one backup of the installation at a time."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with locked(services.settings.data_folder / "backup-keys.lock"):
+    with locked(services.settings.common_folder / "backup-keys.lock"):
         keys_apart.check_replaceable(path, services.settings.key)
         keys_apart.write_keys(path, kept)
         _write_ledger(services, path.parent / erasures.NAME)

@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import islice
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from experiments.counted import counted
@@ -17,9 +18,16 @@ from server.migrate import current_revision, newest_revision
 from server.operations import repository
 from server.operations.backup_checks import backups, snapshots
 from server.operations.findings import Finding
-from server.operations.modes import open_to_others
+from server.operations.modes import open_to_others, own_folders
+from server.row_policies_repository import OLDEST_POSTGRES as OLDEST_WITH_WALL
+from server.row_security_repository import ROLE
 from server.tallies.recount import Recount
 
+RAISE_THE_WALL = (
+    f"the server's own checks are the only wall: take PostgreSQL {OLDEST_WITH_WALL // 10000} or newer, as an "
+    f"administrator of it CREATE ROLE {ROLE} NOLOGIN and GRANT it to the server's user, then run: "
+    "server database upgrade"
+)
 LEAST_FREE_BYTES = 2 * 1024**3
 OLDEST_PYTHON, OLDEST_SQLITE, OLDEST_POSTGRES = (3, 11), (3, 38, 0), 130000
 
@@ -34,33 +42,38 @@ def python(_services: Services) -> Iterator[Finding]:
 
 
 def data_folder(services: Services) -> Iterator[Finding]:
-    """The data folder can be written and has room."""
-    folder = services.settings.data_folder
+    """The data folder can be written and has room, and so can the one that hosts share."""
+    yield from _folder("data folder", services.settings.data_folder, "PALPEBRA_DATA_FOLDER")
+    if (shared := services.settings.shared_folder) is not None:
+        yield from _folder("shared folder", shared, "PALPEBRA_SHARED_FOLDER")
+
+
+def _folder(subject: str, folder: Path, setting: str) -> Iterator[Finding]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / f".doctor-{os.getpid()}"
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
-        advice = "give the user that runs the server the right to write there, or set PALPEBRA_DATA_FOLDER"
-        yield Finding("data folder", "failed", f"{folder}: {error.strerror}", advice)
+        advice = "give the user that runs the server the right to write there, or set " + setting
+        yield Finding(subject, "failed", f"{folder}: {error.strerror}", advice)
         return
     free = shutil.disk_usage(folder).free
     fine = free >= LEAST_FREE_BYTES
     advice = "" if fine else "make room: a full disk stops every rating"
-    yield Finding("data folder", "ok" if fine else "warning", f"{folder}, {free / 1e9:.1f} GB free", advice)
+    yield Finding(subject, "ok" if fine else "warning", f"{folder}, {free / 1e9:.1f} GB free", advice)
 
 
 def file_modes(services: Services) -> Iterator[Finding]:
     """Nothing in the data folder can be read by other users."""
-    folder = services.settings.data_folder
-    open_files = list(islice(open_to_others(folder), 1000))
+    folders = own_folders(services.settings)
+    open_files = list(islice((path for folder in folders for path in open_to_others(folder)), 1000))
     if not open_files:
         yield Finding("file modes", "ok", "for this user alone")
         return
     more = "or more " if len(open_files) == 1000 else ""
     said = f"{len(open_files)} {more}open to other users, such as {open_files[0]}"
-    yield Finding("file modes", "failed", said, f"run: chmod -R go= {folder}")
+    yield Finding("file modes", "failed", said, f"run: chmod -R go= {' '.join(map(str, folders))}")
 
 
 def secret_key(services: Services) -> Iterator[Finding]:
@@ -119,6 +132,10 @@ def _postgres(services: Services) -> Iterator[Finding]:
     advice = f"set {' and '.join(off)} on: a power cut could lose acknowledged ratings" if off else ""
     said = ", ".join(f"{name} {value}" for name, value in durable.items())
     yield Finding("durability", "warning" if off else "ok", said, advice)
+    apart = services.database.keeps_rows_apart
+    advice = "" if apart else RAISE_THE_WALL
+    said = "kept apart by PostgreSQL too" if apart else "kept apart by the server alone"
+    yield Finding("laboratories' rows", "ok" if apart else "warning", said, advice)
     needed = 2 * services.settings.database_pool
     advice = f"a worker may use {needed}: raise max_connections or lower PALPEBRA_DATABASE_POOL"
     tight = needed + 5 > allowed

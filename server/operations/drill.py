@@ -19,6 +19,10 @@ from experiments.errors import InputError
 from experiments.files import whole_file
 from server.clock import now
 from server.context import Services, open_services
+from server.db import open_database
+from server.file_locks import locked
+from server.locks import open_locks
+from server.locks_repository import LockTaken
 from server.operations.backup import TABLES, Description
 from server.operations.backup_stores import backup_store
 from server.operations.checks import counts, database, identities
@@ -26,7 +30,6 @@ from server.operations.encryption import ENDING, identity_in
 from server.operations.erasures import ledger
 from server.operations.findings import Finding
 from server.operations.keys_apart import beside
-from server.operations.locking import locked
 from server.operations.off_host import KeptBackup, brought_here
 from server.operations.restore import restore
 from server.operations.watched_backups import DrillResult, drill_file, last_drill, newest_backup
@@ -173,6 +176,7 @@ def _beside(settings: Settings, folder: Path) -> Settings:
         **settings.model_dump()
         | {
             "data_folder": folder,
+            "shared_folder": None,
             "database_url": f"sqlite:///{folder / 'palpebra.sqlite'}",
             "secret_key": "",
             "s3_bucket": "",
@@ -207,7 +211,7 @@ def drill_when_due(settings: Settings) -> DrillResult | None:
     if backup is None or (backup.name.endswith(ENDING) and settings.backup_identity is None):
         return None
     try:
-        with _alone(settings):
+        with _alone(settings), _alone_of_all_hosts(settings):
             if not is_due(last_drill(settings), now()):
                 return None
             return _drill(settings, backup, identity_of(settings))
@@ -227,6 +231,19 @@ def sweep(settings: Settings) -> None:
             pass
     except DrillUnderWayError:
         pass
+
+
+@contextmanager
+def _alone_of_all_hosts(settings: Settings) -> Iterator[None]:
+    """Let one host of a server make the drill that is due."""
+    opened = open_database(settings)
+    try:
+        with open_locks(settings, opened).held("restore drill"):
+            yield
+    except LockTaken:
+        raise DrillUnderWayError("another host makes the drill") from None
+    finally:
+        opened.close()
 
 
 @contextmanager

@@ -19,7 +19,7 @@ NAME = "erasures.ndjson"
 
 def ledger(settings: Settings) -> Path:
     """The file; it may be missing where nobody was erased yet."""
-    return settings.data_folder / NAME
+    return settings.common_folder / NAME
 
 
 def note(settings: Settings, runs: list[str]) -> None:

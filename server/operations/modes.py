@@ -11,6 +11,11 @@ OTHERS = 0o077
 """The rights of group and everybody."""
 
 
+def own_folders(settings: Settings) -> list[Path]:
+    """The folders that a server keeps things in: its own, and the one its hosts share."""
+    return list(dict.fromkeys((settings.data_folder, settings.common_folder)))
+
+
 def open_to_others(folder: Path) -> Iterator[Path]:
     """The folder and everything in it that others than its owner have a right to; links are not followed."""
     if folder.is_dir() and _is_open(folder):
@@ -34,7 +39,7 @@ def close_to_others(settings: Settings) -> None:
 
     What belongs to another user stays as it is; the doctor tells.
     """
-    for path in open_to_others(settings.data_folder):
+    for path in (one for folder in own_folders(settings) for one in open_to_others(folder)):
         try:
             path.chmod(stat.S_IMODE(path.lstat().st_mode) & ~OTHERS)
         except OSError:

@@ -19,7 +19,7 @@ from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 from experiments.counted import counted
 from experiments.errors import InputError
 from server.context import Services
-from server.migrate import alembic_config, known_revision
+from server.migrate import alembic_config, known_revision, with_wall, without_wall
 from server.operations import erasures
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
 from server.operations.erasures import ledger
@@ -147,6 +147,7 @@ def _restore_rows(
 ) -> None:
     with services.database.write_connection() as connection:
         refuse_unless_empty(connection, "the database", ELSEWHERE)
+        without_wall(connection)
         command.upgrade(alembic_config(connection), described.revision)
         known = {table.name: table for table in tables_of(connection)}
         for name in _in_order(known, described):
@@ -161,6 +162,7 @@ def _restore_rows(
         if described.keys_apart:
             _put_keys_back(connection, keys, told)
         command.upgrade(alembic_config(connection, lambda: keys.secret), "head")
+        with_wall(connection)
 
 
 def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], None]) -> None:

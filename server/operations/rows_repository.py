@@ -15,7 +15,8 @@ from server.operations.rows import Content, Digest, Row, time_of, time_text
 from server.text import visible
 
 BATCH = 500
-REVISION_TABLE = "alembic_version"
+LEFT_OUT = frozenset(("alembic_version", "shared_counts"))
+"""The revision, which is told apart; limits, which are no data."""
 
 
 @contextmanager
@@ -31,7 +32,7 @@ def tables_of(connection: Connection) -> list[Table]:
     """The tables, each after those it refers to."""
     metadata = MetaData()
     metadata.reflect(connection)
-    tables = [table for table in metadata.sorted_tables if table.name != REVISION_TABLE]
+    tables = [table for table in metadata.sorted_tables if table.name not in LEFT_OUT]
     for table in tables:
         for column in table.columns:
             if isinstance(column.type, JSON):

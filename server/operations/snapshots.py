@@ -11,9 +11,9 @@ from pathlib import Path
 from experiments.errors import InputError
 from server.clock import now
 from server.db import Database, checked_url, open_database
+from server.file_locks import locked
 from server.migrate import upgrade
 from server.operations.erasures import ledger
-from server.operations.locking import locked
 from server.operations.snapshot_repository import copied, put_into_one_file
 from server.runs.erasure import replay
 from server.settings import Settings

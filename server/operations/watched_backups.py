@@ -126,7 +126,7 @@ def newest_backup(store: BackupStore, secret: bytes | None = None) -> KeptBackup
 
 def drill_file(settings: Settings) -> Path:
     """Where the result of the last drill is kept."""
-    return settings.data_folder / "restore-drill.json"
+    return settings.common_folder / "restore-drill.json"
 
 
 def last_drill(settings: Settings) -> DrillResult | None:

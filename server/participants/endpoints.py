@@ -3,6 +3,7 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
@@ -64,7 +65,7 @@ async def start_run(
     services: ServicesDep, link_token: str, start: RunStart, response: Response
 ) -> RunStarted:
     """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
-    services.run_starts.hit(hash_token(link_token))
+    await run_in_threadpool(services.run_starts.hit, hash_token(link_token))
 
     def begin(connection: Connection) -> RunStarted:
         with Session(connection, expire_on_commit=False, info=services.database.carried) as session:

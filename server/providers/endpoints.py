@@ -47,9 +47,10 @@ def _set_login_cookie(response: Response, services: Services, token: str) -> Non
     )
 
 
-def _enter(services: Services, request: Request, what: str) -> None:
+async def _enter(services: Services, request: Request, what: str) -> None:
     address = address_of(request)
-    services.sign_ins.enter(services.sign_ins.key(what, address, None), address, None)
+    key = services.sign_ins.key(what, address, None)
+    await run_in_threadpool(services.sign_ins.enter, key, address, None)
 
 
 @router.get("/session/ways")
@@ -67,7 +68,7 @@ async def begin_sign_in(
     """Begin to sign in with a provider: where the browser goes, and a cookie by which it is known again."""
     check_origin(request, services)
     attempts.provider_of(services, provider)
-    _enter(services, request, f"provider {provider}")
+    await _enter(services, request, f"provider {provider}")
     begun = await run_in_threadpool(attempts.begin, services, provider, "sign in", body.next)
     _set_login_cookie(response, services, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
@@ -80,7 +81,7 @@ async def begin_invited(
     """Begin to make an invited account that signs in with a provider: where the browser goes."""
     check_origin(request, services)
     attempts.provider_of(services, provider)
-    _enter(services, request, f"provider {provider}")
+    await _enter(services, request, f"provider {provider}")
     begun = await run_in_threadpool(service.begin_invited, services, provider, token)
     _set_login_cookie(response, services, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
@@ -120,7 +121,7 @@ async def come_back(
         attempts.provider_of(services, provider)
         if not browser or not state:
             raise NotRecognised("This sign-in was begun in another browser.")
-        services.sign_ins.come_back(address_of(request))
+        await run_in_threadpool(services.sign_ins.come_back, address_of(request))
         attempt = await run_in_threadpool(attempts.take, services, provider, state, browser)
         page = "/account" if attempt.purpose == "link" else page
         if not code:
@@ -148,7 +149,7 @@ async def finish_with_code(
 ) -> BeginSignIn:
     """Enter the second factor after a provider signed one in; gives the page to go on with."""
     check_origin(request, services)
-    _enter(services, request, "code after a provider")
+    await _enter(services, request, "code after a provider")
     finished = await run_in_threadpool(service.finish_with_code, services, browser, body.code, user_agent)
     _go_on(response, services, finished, after)
     return BeginSignIn(next=finished.page)
@@ -168,7 +169,7 @@ async def end_by_provider(
     """
     attempts.provider_of(services, provider)
     client = services.providers.of(provider)
-    with services.sign_ins.logout(provider, address_of(request)):
+    async with services.sign_ins.logout(provider, address_of(request)):
         ended = await client.signed_out(logout_token)
     if not client.has_handled(ended):
         await run_in_threadpool(service.sign_out, services, provider, ended)

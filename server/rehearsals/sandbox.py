@@ -23,6 +23,7 @@ from server.export.extract import Extract
 from server.export.formats import runs_csv
 from server.export.pieces import csv_pieces, rating_table
 from server.export.tables import answers_table, runs_table
+from server.locks import LONGEST_S
 from server.models import Study
 from server.rehearsals import repository
 from server.rehearsals.power import SIMULATIONS, plan_command
@@ -41,7 +42,7 @@ from server.rehearsals.schemas import (
     Step,
     example_of,
 )
-from server.reports.process import LONGEST_S, run_analysis
+from server.reports.process import run_analysis
 from server.settings import Settings
 from server.simulation.http import JsonClient, Refused, running_server
 from server.simulation.people import link_and_raters

@@ -22,8 +22,9 @@ from server.accounts.identity import OPERATOR, Identity
 from server.clock import now
 from server.context import Services
 from server.errors import NotFound
+from server.file_locks import locked
+from server.locks import LONGEST_S
 from server.models import Job
-from server.operations.locking import locked
 from server.rehearsals.schemas import (
     DEFINITION,
     MANIFEST,
@@ -38,7 +39,6 @@ from server.rehearsals.schemas import (
 )
 from server.reports import repository
 from server.reports.jobs import begun, in_background, is_under_way, note, shown
-from server.reports.process import LONGEST_S
 from server.studies.lookup import active_version, find_study
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
@@ -98,7 +98,7 @@ def report_file(
 
 
 def _folder(services: Services, public_id: str) -> Path:
-    return services.settings.data_folder / "rehearsals" / public_id
+    return services.settings.common_folder / "rehearsals" / public_id
 
 
 def _out(services: Services, job: Job) -> RehearsalOut:

@@ -5,9 +5,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
-from datetime import timedelta
-from pathlib import Path
+from contextlib import ExitStack
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -19,9 +17,7 @@ from server.clock import now
 from server.context import Services
 from server.errors import ApiError, Conflict
 from server.models import Job, Study
-from server.operations.locking import is_left, locked
 from server.reports import repository
-from server.reports.process import LONGEST_S
 from server.reports.repository import JobKind
 from server.tokens import new_public_id
 
@@ -62,11 +58,10 @@ def begun(
 def in_background(services: Services, public_id: str, work: Callable[[], None]) -> None:
     """Do a job's work in a thread of its own; an error in it, foreseen or not, ends the job as failed.
 
-    While it goes on a lock file is held: where a process dies with its jobs, others see it by that.
+    While it goes on a lock is held: where a process dies with its jobs, others see it by that.
     """
     held = ExitStack()
-    with suppress(ImportError):  # a system without such locks: the job's age alone tells
-        held.enter_context(locked(_lock_of(services, public_id)))
+    held.enter_context(services.locks.of_job(public_id))
     threading.Thread(target=_run, args=(services, public_id, work, held), daemon=True).start()
 
 
@@ -79,7 +74,6 @@ def _run(services: Services, public_id: str, work: Callable[[], None], held: Exi
         except Exception:
             LOG.exception("job %s", public_id)
             _fail(services, public_id, UNFORESEEN)
-        _lock_of(services, public_id).unlink(missing_ok=True)
 
 
 def _fail(services: Services, public_id: str, message: str) -> None:
@@ -90,10 +84,6 @@ def _fail(services: Services, public_id: str, message: str) -> None:
             LOG.warning("the end of job %s could not be written; again in %d s", public_id, wait_s)
             time.sleep(wait_s)
     return note(services, public_id, status="failed", message=message, finished_at=now())
-
-
-def _lock_of(services: Services, public_id: str) -> Path:
-    return services.settings.data_folder / "jobs" / public_id
 
 
 def shown(services: Services, job: Job, stopped: str) -> dict[str, Any]:
@@ -123,10 +113,5 @@ def is_under_way(services: Services, job: Job) -> bool:
 
 
 def is_abandoned(services: Services, job: Job) -> bool:
-    """Whether its process has ended; where that was another computer's, no job takes as long."""
-    if job.status not in UNDER_WAY:
-        return False
-    lock = _lock_of(services, job.public_id)
-    if lock.exists():
-        return is_left(lock)
-    return now() - (job.started_at or job.created_at) > timedelta(seconds=2 * LONGEST_S)
+    """Whether the process that did its work has ended before it."""
+    return job.status in UNDER_WAY and services.locks.job_is_left(job)

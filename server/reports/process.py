@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-LONGEST_S = 1800
+from server.locks import LONGEST_S
 
 
 def run_analysis(

@@ -80,7 +80,7 @@ def _origin_of_older(parameters: dict[str, Any]) -> str:
 
 def report_folder(services: Services, public_id: str) -> Path:
     """Where the files of a report lie."""
-    return services.settings.data_folder / "reports" / public_id
+    return services.settings.common_folder / "reports" / public_id
 
 
 def report_file(

@@ -1,6 +1,8 @@
 """Endpoints of reset by mail: forgotten passwords, and the address of the own account."""
 
-from fastapi import APIRouter, BackgroundTasks, Request
+from typing import Annotated
+
+from fastapi import APIRouter, BackgroundTasks, Cookie, Request
 from fastapi.concurrency import run_in_threadpool
 
 from server import mail
@@ -8,17 +10,20 @@ from server.accounts.endpoints import address_of, must_fit, must_prove
 from server.accounts.identity import Myself, account_of, check_origin
 from server.accounts.passwords import hash_password
 from server.accounts.schemas import ConfirmPassword
+from server.accounts.throttle import DEVICE_COOKIE
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.resets import service
 from server.resets.schemas import ConfirmAddress, ForgottenPassword, NewAddress, NewPassword, OwnAddress
+from server.resets.service import Asking
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
 
 
-def _enter(services: Services, request: Request, what: str) -> None:
+async def _enter(services: Services, request: Request, what: str) -> None:
     address = address_of(request)
-    services.sign_ins.enter(services.sign_ins.key(what, address, None), address, None)
+    key = services.sign_ins.key(what, address, None)
+    await run_in_threadpool(services.sign_ins.enter, key, address, None)
 
 
 def _must_send(services: Services) -> None:
@@ -28,13 +33,19 @@ def _must_send(services: Services) -> None:
 
 @router.post("/session/forgotten", status_code=202)
 async def forgot_password(
-    request: Request, services: ServicesDep, body: ForgottenPassword, after: BackgroundTasks
+    request: Request,
+    services: ServicesDep,
+    body: ForgottenPassword,
+    after: BackgroundTasks,
+    device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
 ) -> None:
     """Ask for a link by mail for a new password; the answer is the same whether there is such an account."""
     check_origin(request, services)
     _must_send(services)
-    _enter(services, request, "forgotten password")
-    after.add_task(service.write_to_who_forgot, services, body.name)
+    await _enter(services, request, "forgotten password")
+    after.add_task(
+        service.write_to_who_forgot, services, body.name, Asking(address_of(request), device_cookie)
+    )
 
 
 @router.post("/session/new-password", status_code=204)
@@ -43,7 +54,7 @@ async def set_password(
 ) -> None:
     """Choose a new password by a link; every session and every API token of the account ends."""
     check_origin(request, services)
-    _enter(services, request, "new password")
+    await _enter(services, request, "new password")
     name = await run_in_threadpool(service.name_of, services, body.token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, name))
     letter = await run_in_threadpool(service.set_password, services, body.token, fresh)
@@ -82,6 +93,6 @@ async def confirm_address(
 ) -> None:
     """Confirm an address of mail by the link that went there; the address before it is told."""
     check_origin(request, services)
-    _enter(services, request, "confirm an address")
+    await _enter(services, request, "confirm an address")
     letter = await run_in_threadpool(service.confirm_address, services, body.token)
     after.add_task(service.post, services.settings, letter)

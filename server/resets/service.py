@@ -10,6 +10,7 @@ from server.accounts import repository as accounts
 from server.accounts.audit import NOBODY, record
 from server.accounts.identity import Identity, NotSignedIn, account_of
 from server.accounts.service import identity_of, renew
+from server.accounts.throttle import known_device
 from server.clock import now
 from server.context import Services
 from server.errors import Conflict
@@ -23,12 +24,31 @@ MAX_OPEN_LINKS = 3
 """Of one account and purpose at a time: nobody's box is filled by whoever knows a name."""
 MAX_RESET_LETTERS_A_DAY = 10
 """Of one account, until one of them is used."""
+RESERVED_LETTERS, RESERVED_LINKS = 4, 1
+"""Of these, and of the open links, what only a browser gets that the account signed in by before: whoever
+knows a name and has many addresses uses up all the others."""
 
 
 class LinkOver(Conflict):
     """The link was used, is too old, or was never made."""
 
     code = "link_over"
+
+
+@dataclass(frozen=True)
+class Asking:
+    """Who asks for a letter.
+
+    Attributes
+    ----------
+    address : str
+        Where from; counted by its range, and not kept.
+    device : str or None
+        The cookie of a browser that signed in before.
+    """
+
+    address: str
+    device: str | None
 
 
 @dataclass(frozen=True)
@@ -46,7 +66,7 @@ def post(settings: Settings, letter: Letter | None) -> None:
         mail.send(settings, letter.to, letter.subject, letter.text)
 
 
-def write_to_who_forgot(services: Services, name: str) -> None:
+def write_to_who_forgot(services: Services, name: str, asking: Asking) -> None:
     """Send links for a new password to the accounts of this name or address; nothing where there are none.
 
     Runs after the answer, which so says nothing of whether there are any, by its words or its time.
@@ -55,7 +75,7 @@ def write_to_who_forgot(services: Services, name: str) -> None:
     with services.database.write() as session:
         repository.forget_old(session)
         for account in repository.accounts_to_write_to(session, name):
-            if account.email is None or _has_enough(session, account):
+            if account.email is None or not _may_have_one(services, session, account, asking):
                 continue
             token = _keep(session, account, "new password", account.email)
             record(session, NOBODY, "password reset asked for", "account", account.name)
@@ -64,10 +84,15 @@ def write_to_who_forgot(services: Services, name: str) -> None:
         post(services.settings, letter)
 
 
-def _has_enough(session: Session, account: Account) -> bool:
+def _may_have_one(services: Services, session: Session, account: Account, asking: Asking) -> bool:
+    """Whether one more letter goes out: a share is kept for browsers of the account's own."""
+    own = known_device(services.settings.key, account.name, asking.device) is not None
+    links = MAX_OPEN_LINKS + (RESERVED_LINKS if own else 0)
+    letters = MAX_RESET_LETTERS_A_DAY - (0 if own else RESERVED_LETTERS)
     return (
-        repository.open_links(session, account.id, "new password") >= MAX_OPEN_LINKS
-        or repository.links_of_a_day(session, account.id, "new password") >= MAX_RESET_LETTERS_A_DAY
+        repository.open_links(session, account.id, "new password") < links
+        and repository.links_of_a_day(session, account.id, "new password") < letters
+        and (own or services.sign_ins.may_have_letter(account.id, asking.address))
     )
 
 

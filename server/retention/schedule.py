@@ -2,9 +2,11 @@
 
 import asyncio
 import logging
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, suppress
 
 from server.db import Database
+from server.locks import Locks
+from server.locks_repository import LockTaken
 from server.retention.service import carry_out, names
 from server.settings import Settings
 from server.watching import Stopped, watched
@@ -14,20 +16,28 @@ FIRST_LOOK_S, LOOK_EVERY_S = 120.0, 3600.0
 
 
 def hourly_retention(
-    database: Database, settings: Settings, first_look_s: float = FIRST_LOOK_S
+    database: Database, settings: Settings, locks: Locks, first_look_s: float = FIRST_LOOK_S
 ) -> AbstractAsyncContextManager[None]:
-    """Carry out the periods of every study each hour while the server runs."""
-    return watched(lambda stopped: _watch(database, settings, first_look_s, stopped))
+    """Carry out the periods of every study each hour while the server runs; one process at a time."""
+    return watched(lambda stopped: _watch(database, settings, locks, first_look_s, stopped))
 
 
-async def _watch(database: Database, settings: Settings, first_look_s: float, stopped: Stopped) -> None:
+async def _watch(
+    database: Database, settings: Settings, locks: Locks, first_look_s: float, stopped: Stopped
+) -> None:
     await asyncio.sleep(first_look_s)
     while True:
         try:
-            await asyncio.to_thread(every_study, database, settings, stopped)
+            await asyncio.to_thread(alone, database, settings, locks, stopped)
         except Exception:  # the next look comes, whatever went wrong with this one
             LOG.exception("retention")
         await asyncio.sleep(LOOK_EVERY_S)
+
+
+def alone(database: Database, settings: Settings, locks: Locks, stopped: Stopped) -> None:
+    """Carry out what is due unless another process is at it."""
+    with suppress(LockTaken), locks.held("retention"):
+        every_study(database, settings, stopped)
 
 
 def every_study(database: Database, settings: Settings, stopped: Stopped) -> None:

@@ -18,6 +18,7 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.errors import Conflict
 from server.models import Study, StudyVersion, Workspace
+from server.row_security_repository import every_row
 from server.storage.clips import ClipStore
 from server.studies import repository
 from server.studies.series import series_for
@@ -90,7 +91,9 @@ def create_study(
     workspace: Workspace | None = None,
 ) -> Study:
     """A new draft, in the default workspace where none is given; NameTaken where another has the name."""
-    if repository.study_called(session, name) is not None:
+    with every_row(session):
+        is_taken = repository.study_called(session, name) is not None
+    if is_taken:
         raise NameTaken(f"There is already a study called '{name}' on this server; choose another name.")
     study = Study(
         name=name,

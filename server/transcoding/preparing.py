@@ -7,12 +7,17 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+from sqlalchemy.exc import SQLAlchemyError
+
+from server.locks import Locks
+from server.locks_repository import LockTaken
 from server.transcoding.records import uploads_in, waiting_in
 
 LOG = logging.getLogger(__name__)
 LOOK_AGAIN_S = 0.5
 MAX_IDLE_STARTS = 12
 END_S = 5.0
+LOCK = "transcoding"
 
 
 class Preparing:
@@ -22,10 +27,12 @@ class Preparing:
     ----------
     root : Path
         Folder of uploads.
+    locks : Locks
+        Of the server: where the folder is shared by several hosts, one of them is at it.
     """
 
-    def __init__(self, root: Path) -> None:
-        self.root = root
+    def __init__(self, root: Path, locks: Locks) -> None:
+        self.root, self._locks = root, locks
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._asked = False
@@ -64,14 +71,17 @@ class Preparing:
         idle, before = 0, -1
         while self._goes_on() and idle < MAX_IDLE_STARTS:
             try:
-                self._work()
-            except OSError:
+                with self._locks.held(LOCK):
+                    self._work()
+            except LockTaken:  # another process is at it
+                pass
+            except (OSError, SQLAlchemyError):
                 LOG.exception("preparing clips")
             waiting = self._waiting()
             idle = idle + 1 if waiting == before else 0
             before = waiting
             if waiting:
-                # Another server process is at it, or the worker ended at a file that it will refuse in time.
+                # Another process is at it, or the worker ended at a file that it will refuse in time.
                 self._closed.wait(LOOK_AGAIN_S * 2 ** min(idle, 4))
 
     def _goes_on(self) -> bool:

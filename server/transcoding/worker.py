@@ -7,6 +7,7 @@ refused, and left out by the next one.
 import os
 import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from server.transcoding.records import BEGUN, CLIPS, asked_rate, uploads_in, waiting_in, write_record
@@ -91,7 +92,9 @@ def _alarm(seconds: int) -> None:
 
 
 def _bounded() -> None:
-    """Stand back behind ratings, and take no more memory than a machine can spare."""
+    """Stand back behind ratings, take no more memory than a machine can spare, and be the first to go."""
+    with suppress(OSError):  # Linux: where memory runs out all the same, this process ends and not the server
+        Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     try:

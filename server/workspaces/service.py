@@ -11,6 +11,7 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity, NotAllowed, Operator, account_of, must_be_fresh
 from server.errors import Conflict, Invalid, NotFound
 from server.models import DEFAULT_WORKSPACE, Account, Right, Role, Study, Workspace
+from server.row_security_repository import every_row
 from server.workspaces import repository
 from server.workspaces.rights import ordered
 from server.workspaces.schemas import GrantOut, MemberOut, WorkspaceOut
@@ -100,7 +101,9 @@ def own_workspaces(session: Session, account_id: int) -> list[tuple[Workspace, R
 
 def listed(session: Session, identity: Identity) -> list[WorkspaceOut]:
     """The workspaces she belongs to; all of them where she manages the server."""
-    roles, counts = repository.roles_of(session, identity.account_id), repository.counts(session)
+    roles = repository.roles_of(session, identity.account_id)
+    with every_row(session):  # numbers alone; of workspaces that are not shown they are not used
+        counts = repository.counts(session)
     return [
         WorkspaceOut(
             name=one.name,
@@ -198,7 +201,9 @@ def change(
 
 def delete(session: Session, workspace: Workspace, identity: Identity) -> None:
     """Remove a workspace that holds no study."""
-    if repository.counts(session).get(workspace.id, (0, 0))[1]:
+    with every_row(session):
+        _, studies = repository.counts(session).get(workspace.id, (0, 0))
+    if studies:
         raise Conflict("The workspace holds studies; move them to another one first.")
     if workspace.name == DEFAULT_WORKSPACE:
         raise Conflict("The default workspace stays; give it another title if you like.")

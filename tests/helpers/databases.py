@@ -12,7 +12,7 @@ import tempfile
 import uuid
 import warnings
 from collections.abc import Iterator
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -112,7 +112,13 @@ def empty_database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterat
     if request.param == "sqlite":
         yield f"sqlite:///{tmp_path / 'empty.sqlite'}"
         return
-    server = request.getfixturevalue("postgres_server")
+    with database_of_its_own(request.getfixturevalue("postgres_server")) as url:
+        yield url
+
+
+@contextmanager
+def database_of_its_own(server: URL) -> Iterator[str]:
+    """Address of a database without tables on a PostgreSQL server."""
     name = f"test_{uuid.uuid4().hex[:12]}"
     _admin(server, f"CREATE DATABASE {name}")
     yield _with_name(server, name)

@@ -19,11 +19,11 @@ from sqlalchemy import func, select
 
 from server.clock import now
 from server.context import Services, open_services
+from server.file_locks import locked
 from server.identities.repository import keep
 from server.identities.sealing import KnownAs
 from server.models import AuditEntry, IdentityKey, Rating, StudyRun
 from server.operations import backup_checks, erasures
-from server.operations.locking import locked
 from server.operations.snapshot_schedule import look, snapshots_taken
 from server.operations.snapshots import (
     ALL_OF,

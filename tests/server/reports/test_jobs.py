@@ -5,24 +5,30 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Any
 
 import pytest
+from sqlalchemy import update
 from sqlalchemy.exc import OperationalError
 
 from server.accounts.identity import OPERATOR
+from server.clock import now
 from server.context import Services
 from server.models import Job
 from server.reports import jobs
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
+from tests.helpers.databases import server_environment
 from tests.helpers.studies import StudyInDatabase
 
 HOLDS = """
 import sys
-from pathlib import Path
-from server.operations.locking import locked
-with locked(Path(sys.argv[1])):
+from server.db import open_database
+from server.locks import open_locks
+from server.settings import Settings
+settings = Settings()
+with open_locks(settings, open_database(settings)).of_job(sys.argv[1]):
     print(flush=True)
     sys.stdin.read()
 """
@@ -91,9 +97,10 @@ def test_what_has_ended_stays_as_it_ended(services: Services, job: str) -> None:
 def test_a_job_whose_process_was_killed_is_over_at_once(
     services: Services, job: str, experimenter: Admin
 ) -> None:
-    lock = services.settings.data_folder / "jobs" / job
-    holder = [sys.executable, "-c", HOLDS, str(lock)]
-    with subprocess.Popen(holder, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+    with services.database.write() as session:  # long enough ago that its process has its lock, or none
+        session.execute(update(Job).values(created_at=now() - timedelta(minutes=1)))
+    holder, environment = [sys.executable, "-c", HOLDS, job], server_environment(services.settings)
+    with subprocess.Popen(holder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) as other:
         assert other.stdout is not None
         other.stdout.readline()
         [shown] = experimenter.get("/studies/short/reports").json()

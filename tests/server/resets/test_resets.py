@@ -22,6 +22,7 @@ from server.accounts import repository
 from server.accounts import service as accounts
 from server.accounts.identity import Identity, NotSignedIn
 from server.accounts.passwords import hash_password
+from server.accounts.throttle import DEVICE_COOKIE, LETTERS_FROM_A_RANGE
 from server.accounts.tokens import end_everything
 from server.app import create_app
 from server.clock import now
@@ -29,7 +30,13 @@ from server.context import Services
 from server.models import Account, AdminSession, AuditEntry, MailedLink
 from server.resets import service as resets
 from server.resets.schemas import Address
-from server.resets.service import LINK_MINUTES, MAX_OPEN_LINKS, MAX_RESET_LETTERS_A_DAY
+from server.resets.service import (
+    LINK_MINUTES,
+    MAX_OPEN_LINKS,
+    MAX_RESET_LETTERS_A_DAY,
+    RESERVED_LETTERS,
+    Asking,
+)
 from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, signed_in
 from tests.helpers.mail import ADDRESS, Letterbox, smtp_server
@@ -382,11 +389,52 @@ def _hours_pass(services: Services, hours: float) -> None:
             row.expires_at -= datetime.timedelta(hours=hours)
 
 
+def asking_from(number: int, device: str | None = None) -> Asking:
+    """Somebody at an address that shares its range with no other number's."""
+    return Asking(f"198.51.{number}.7", device)
+
+
 def test_an_account_gets_so_many_letters_a_day(ada: Admin, services: Services, box: Letterbox) -> None:
-    for _ in range(MAX_RESET_LETTERS_A_DAY + 2):
-        resets.write_to_who_forgot(services, "ada")
+    own = ada.client.cookies[DEVICE_COOKIE]
+    for number in range(MAX_RESET_LETTERS_A_DAY + 2):
+        resets.write_to_who_forgot(services, "ada", asking_from(number, own))
         _hours_pass(services, 1)
     assert len(box.letters) == MAX_RESET_LETTERS_A_DAY
     _hours_pass(services, 24)
-    resets.write_to_who_forgot(services, "ada")
+    resets.write_to_who_forgot(services, "ada", asking_from(1))
     assert len(box.letters) == MAX_RESET_LETTERS_A_DAY + 1
+
+
+def test_strangers_do_not_use_up_the_letters_of_a_day(
+    ada: Admin, services: Services, box: Letterbox, stranger: TestClient
+) -> None:
+    for number in range(3 * MAX_RESET_LETTERS_A_DAY):
+        resets.write_to_who_forgot(services, "ada", asking_from(number, "made.up"))
+        _hours_pass(services, 0.55)
+    assert len(box.letters) == MAX_RESET_LETTERS_A_DAY - RESERVED_LETTERS
+    ada.client.post(
+        "/api/admin/session/forgotten", json={"name": ADDRESS}
+    )  # by the address: the same browser
+    assert len(box.letters) == MAX_RESET_LETTERS_A_DAY - RESERVED_LETTERS + 1
+    assert renew(stranger, box.token()).status_code == 204
+
+
+def test_a_range_of_addresses_gets_an_account_so_many_letters(
+    ada: Admin, services: Services, box: Letterbox
+) -> None:
+    for last in range(2 * LETTERS_FROM_A_RANGE):
+        resets.write_to_who_forgot(services, "ada", Asking(f"198.51.100.{last}", None))
+        _hours_pass(services, 1)
+    assert len(box.letters) == LETTERS_FROM_A_RANGE
+    resets.write_to_who_forgot(services, "ada", asking_from(1))
+    assert len(box.letters) == LETTERS_FROM_A_RANGE + 1
+
+
+def test_open_links_of_strangers_leave_one_for_an_own_browser(
+    ada: Admin, services: Services, box: Letterbox
+) -> None:
+    for number in range(MAX_OPEN_LINKS + 2):
+        resets.write_to_who_forgot(services, "ada", asking_from(number))
+    assert len(box.letters) == MAX_OPEN_LINKS
+    resets.write_to_who_forgot(services, "ada", asking_from(9, ada.client.cookies[DEVICE_COOKIE]))
+    assert len(box.letters) == MAX_OPEN_LINKS + 1

@@ -208,7 +208,9 @@ class TestOnSqlite:
         run = came(client, kept, 91)
 
         async def serve() -> None:
-            async with hourly_retention(services.database, services.settings, first_look_s=0.0):
+            async with hourly_retention(
+                services.database, services.settings, services.locks, first_look_s=0.0
+            ):
                 while state(services)[run] != "unnamed":
                     await asyncio.sleep(0.02)
 

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from server.context import Services
+from server.locks import FileLocks
 from server.transcoding.preparing import Preparing
 from server.transcoding.records import BEGUN, records_of
 from tests.helpers.admins import Admin
@@ -183,7 +184,7 @@ def test_a_file_at_which_the_worker_ended_twice_is_refused_and_the_others_are_pr
     for name, content in videos:
         (folder / name).write_bytes(content)
     (folder / BEGUN).write_text("slow_2.mp4\nslow_2.mp4\n")
-    preparing = Preparing(folder.parent)
+    preparing = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
     preparing.begin()
     wait_for_end(preparing)
     records = records_of(folder)
@@ -200,7 +201,7 @@ def test_an_error_on_the_way_stops_no_later_upload(
     folder = tmp_path / "uploads" / "a"
     folder.mkdir(parents=True)
     (folder / "slow_2.mp4").write_bytes(dict(videos)["slow_2.mp4"])
-    preparing = Preparing(folder.parent)
+    preparing = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
 
     def refuses(_: Path) -> list[Path]:
         raise error
@@ -220,11 +221,11 @@ def test_what_a_server_left_is_done_by_the_next(tmp_path: Path, videos: list[tup
     folder = tmp_path / "uploads" / "a"
     folder.mkdir(parents=True)
     (folder / "slow_2.mp4").write_bytes(dict(videos)["slow_2.mp4"])
-    first = Preparing(folder.parent)
+    first = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
     first.close()
     first.begin()
     assert records_of(folder) == {}
-    second = Preparing(folder.parent)
+    second = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
     second.begin()
     wait_for_end(second)
     assert list(records_of(folder)) == ["slow_2.mp4"]

@@ -1,0 +1,102 @@
+"""Locks that PostgreSQL keeps for all processes of a server: each ends with the process that holds it.
+
+One connection of a process holds all of its locks, however many there are; another lets others see whether a
+lock is held. A host that goes without a word lets go of its locks within a minute.
+"""
+
+import hashlib
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import Connection, NullPool, create_engine, text
+from sqlalchemy.exc import DBAPIError
+
+from server.db import Database
+
+_ALIVE = "SET tcp_keepalives_idle = 20; SET tcp_keepalives_interval = 10; SET tcp_keepalives_count = 3"
+
+
+class LockTaken(Exception):
+    """Another process, or another thread of this one, holds the lock."""
+
+
+class DatabaseLocks:
+    """The locks of one process; each has a name."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._engine = create_engine(
+            database.url, poolclass=NullPool, isolation_level="AUTOCOMMIT", hide_parameters=True
+        )
+        self._changing = threading.Lock()
+        self._held: set[int] = set()
+        self._connection: Connection | None = None
+
+    @contextmanager
+    def held(self, name: str) -> Iterator[None]:
+        """Hold a lock.
+
+        Raises
+        ------
+        LockTaken
+            It is held by another.
+        """
+        number = _number(name)
+        with self._changing:
+            # PostgreSQL gives a lock again to the connection that has it: threads are told apart here.
+            if number in self._held or not self._taken(number):
+                raise LockTaken(name)
+            self._held.add(number)
+        try:
+            yield
+        finally:
+            with self._changing:
+                self._held.discard(number)
+                self._let_go(number)
+
+    def is_held(self, name: str) -> bool:
+        """Whether any process holds a lock."""
+        query = text("SELECT pg_try_advisory_xact_lock_shared(:number)")
+        with self._database.engine.connect() as connection:
+            return not connection.scalar(query, {"number": _number(name)})
+
+    def _taken(self, number: int) -> bool:
+        for _ in range(2):
+            try:
+                return bool(
+                    self._open().scalar(text("SELECT pg_try_advisory_lock(:number)"), {"number": number})
+                )
+            except DBAPIError as error:
+                if not error.connection_invalidated:
+                    raise
+                self._close()  # PostgreSQL was started anew: the locks went with the connection
+        return False
+
+    def _open(self) -> Connection:
+        if self._connection is None:
+            self._connection = self._engine.connect()
+            self._connection.exec_driver_sql(_ALIVE)
+            for number in self._held:
+                self._connection.execute(text("SELECT pg_try_advisory_lock(:number)"), {"number": number})
+        return self._connection
+
+    def _let_go(self, number: int) -> None:
+        try:
+            if self._connection is not None:
+                # By word, too, where the connection is closed next: its end is noticed a little later.
+                self._connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": number})
+        except DBAPIError:
+            self._close()
+        if not self._held:
+            self._close()
+
+    def _close(self) -> None:
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
+
+
+def _number(name: str) -> int:
+    digest = hashlib.blake2b(name.encode(), digest_size=8, person=b"palpebra locks").digest()
+    return int.from_bytes(digest, "big", signed=True)

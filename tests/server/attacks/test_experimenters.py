@@ -1,0 +1,66 @@
+"""What one experimenter may send to keep a server busy or make it fail: refused in words, at once."""
+
+import time
+from typing import Any
+
+import pytest
+
+from server.context import Services
+from server.studies.uploads import new_upload
+from tests.helpers.admins import Admin
+from tests.helpers.studies import StudyInDatabase
+
+SOON_S = 5.0
+"""Milliseconds' work on an idle machine; as a regular expression some of it took minutes."""
+
+
+@pytest.mark.parametrize(
+    ("toml", "said"),
+    [
+        ("a" + ".a" * 20_000 + " = 1", "nested too deeply"),
+        ("a = " + "[" * 40 + "]" * 40, "nested too deeply"),
+        ("a = " + "9" * 5_000, "too many digits"),
+    ],
+)
+def test_a_definition_that_no_program_reads_is_refused_in_words(
+    experimenter: Admin, study: StudyInDatabase, toml: str, said: str
+) -> None:
+    for path, body in (
+        ("/studies/short/versions/check", {"toml": toml}),
+        ("/studies", {"name": "other", "shipped": "exp1", "toml": toml}),
+    ):
+        answer = experimenter.send("POST", path, body)
+        assert (answer.status_code, said in answer.json()["error"]["message"]) == (422, True), answer.text
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "_".join(f"{{{letter}}}" for letter in "abcdefghijklmnop") + "!",
+        "".join(f"{{{letter}}}" for letter in "abcdefghijklmnop") + "!",
+    ],
+)
+def test_a_pattern_of_many_fields_is_tried_in_no_time(
+    experimenter: Admin, services: Services, study: StudyInDatabase, pattern: str
+) -> None:
+    account = experimenter.get("/session").json()["account"]["id"]
+    upload, folder = new_upload(services.settings.upload_folder, account, None)
+    (folder / ("a_" * 120 + ".mp4")).write_bytes(b"no video")
+    own: dict[str, Any] = {"title": "t", "question": "q", "low": "a", "high": "b"}
+    began = time.monotonic()
+    answer = experimenter.send(
+        "POST", "/studies", {"name": "x", "upload": upload, "levels": {"pattern": pattern}, "own_clips": own}
+    )
+    assert (answer.status_code, "does not follow the pattern" in answer.text) == (422, True), answer.text
+    assert time.monotonic() - began < SOON_S
+
+
+def test_a_table_with_a_cell_without_end_is_refused_in_words(
+    experimenter: Admin, services: Services, study: StudyInDatabase
+) -> None:
+    account = experimenter.get("/session").json()["account"]["id"]
+    upload, folder = new_upload(services.settings.upload_folder, account, None)
+    (folder / "a.mp4").write_bytes(b"no video")
+    csv = 'file,a\n"' + "x" * 200_000
+    answer = experimenter.send("POST", "/studies", {"name": "x", "upload": upload, "levels": {"csv": csv}})
+    assert answer.status_code == 422, answer.text

@@ -1,0 +1,166 @@
+"""Locks, limits and changes in PostgreSQL: for all processes and threads, and gone with their process."""
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+import pytest
+from sqlalchemy import text
+
+from server.changes import Changes
+from server.context import Services
+from server.errors import TooManyRequests
+from server.locks_repository import DatabaseLocks, LockTaken
+from server.rate_limit import RateLimit
+from server.settings import Settings
+from server.shared_counts_repository import SharedCounts
+from tests.helpers.databases import server_environment
+
+PATIENCE_S = 20.0
+HOLDS = """
+import sys
+from server.locks_repository import DatabaseLocks
+from server.db import open_database
+from server.settings import Settings
+with DatabaseLocks(open_database(Settings())).held("one"):
+    print(flush=True)
+    sys.stdin.read()
+"""
+pytestmark = pytest.mark.parametrize(
+    "database_url", [pytest.param("postgres", marks=pytest.mark.postgres)], indirect=True
+)
+
+
+@pytest.fixture
+def locks(services: Services) -> DatabaseLocks:
+    return DatabaseLocks(services.database)
+
+
+def soon(holds: Callable[[], bool]) -> None:
+    until = time.monotonic() + PATIENCE_S
+    while not holds():
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def test_a_lock_is_held_against_other_processes_and_ones_own_threads(
+    services: Services, locks: DatabaseLocks
+) -> None:
+    other = DatabaseLocks(services.database)
+    assert not other.is_held("one")
+    with locks.held("one"), locks.held("two"):
+        assert other.is_held("one")
+        for one in (other, locks):
+            with pytest.raises(LockTaken), one.held("one"):
+                pass
+        with other.held("three"):
+            pass
+    assert not other.is_held("one")
+    with other.held("one"):
+        pass
+
+
+def test_a_lock_ends_with_a_process_that_is_killed(
+    settings: Settings, services: Services, locks: DatabaseLocks
+) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDS],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=server_environment(settings),
+    ) as holder:
+        assert holder.stdout is not None
+        holder.stdout.readline()
+        assert locks.is_held("one")
+        holder.kill()
+    soon(lambda: not locks.is_held("one"))
+    with locks.held("one"):
+        pass
+
+
+def test_locks_are_taken_again_where_the_connection_was_cut(services: Services, locks: DatabaseLocks) -> None:
+    other = DatabaseLocks(services.database)
+    with locks.held("one"):
+        with services.database.write() as session:
+            cut = (
+                "SELECT pg_terminate_backend(pid) FROM pg_locks "
+                "WHERE locktype = 'advisory' AND pid <> pg_backend_pid()"
+            )
+            assert session.execute(text(cut)).all()
+        soon(lambda: not other.is_held("one"))
+        with locks.held("two"):
+            assert other.is_held("one")
+    assert not other.is_held("one")
+
+
+def test_a_share_is_one_for_all_processes(services: Services) -> None:
+    counts = SharedCounts(services.database, lambda: b"key")
+    one, other = (RateLimit(3, name="x", shared=counts) for _ in range(2))
+    one.hit("a")
+    other.hit("a")
+    one.hit("a")
+    with pytest.raises(TooManyRequests):
+        other.hit("a")
+    RateLimit(3, name="y", shared=counts).hit("a")
+    with services.database.write() as session:
+        session.execute(text("UPDATE shared_counts SET at = at - interval '21 seconds'"))
+    other.hit("a")
+    with pytest.raises(TooManyRequests) as refused:
+        other.hit("a")
+    assert 15 <= int((refused.value.headers or {})["retry-after"]) <= 20
+
+
+def test_nothing_is_counted_twice_however_many_ask_at_once(services: Services) -> None:
+    counts, passed = SharedCounts(services.database, lambda: b"key"), []
+    limits = [RateLimit(10, name="x", shared=counts) for _ in range(8)]
+
+    def hit(limit: RateLimit) -> None:
+        for _ in range(5):
+            try:
+                limit.hit("a")
+            except TooManyRequests:
+                continue
+            passed.append(1)
+
+    threads = [threading.Thread(target=hit, args=(limit,)) for limit in limits]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert 10 <= len(passed) <= 11  # one comes back in six seconds
+
+
+def test_counts_that_nobody_needs_go(services: Services) -> None:
+    counts = SharedCounts(services.database, lambda: b"key")
+    counts.failed("long ago")
+    with services.database.write() as session:
+        session.execute(text("UPDATE shared_counts SET at = at - interval '7 hours'"))
+    counts.failed("long ago")
+    assert counts.failures("long ago")[0] == 1
+    with services.database.write() as session:
+        session.execute(text("UPDATE shared_counts SET at = at - interval '7 hours'"))
+    for number in range(1000):
+        counts.hit(f"{number % 3}", 1e6, 1, 60)
+    assert counts.failures("long ago") == (0, 0.0)
+
+
+def test_a_change_is_heard_of_by_another_process_and_after_a_cut_line(services: Services) -> None:
+    here, there = Changes(services.database), Changes(services.database)
+    try:
+        soon(lambda: there.number is not None)
+        before = there.number
+        here.tell()
+        soon(lambda: there.number != before)
+        with services.database.write() as session:
+            cut = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE 'LISTEN palpebra%'"
+            assert session.execute(text(cut)).all()
+        soon(lambda: there.number is None)
+        soon(lambda: there.number is not None)
+        before = there.number
+        here.tell()
+        soon(lambda: there.number not in (before, None))
+    finally:
+        here.close()
+        there.close()

@@ -1,0 +1,205 @@
+"""The second wall: with the server's own checks taken out, PostgreSQL alone keeps laboratories apart."""
+
+import pytest
+from fastapi import FastAPI
+from sqlalchemy import Connection, select, text, true
+from sqlalchemy.orm import Session
+
+from server import row_policies_repository as row_policies
+from server import row_security_repository as row_security
+from server.context import Services
+from server.db import Database
+from server.migrate import downgrade, newest_revision, upgrade
+from server.models import RIGHTS, Base, Study
+from server.workspaces import repository
+from tests.helpers.admins import Admin
+from tests.helpers.older_databases import load_older_database
+from tests.server.workspaces.test_isolation import (  # noqa: F401 - fixtures
+    ADMIN,
+    OWN,
+    Laboratory,
+    application,
+    ask,
+    endpoints,
+    foreign,
+    names_in,
+    outsiders,
+)
+
+on_postgres = pytest.mark.parametrize(
+    "database_url", [pytest.param("postgres", marks=pytest.mark.postgres)], indirect=True
+)
+empty_postgres = pytest.mark.parametrize(
+    "empty_database_url", [pytest.param("postgres", marks=pytest.mark.postgres)], indirect=True
+)
+OF_EVERYBODY = ("accounts", "invitations", "workspaces", "audit", "backups", "tokens", "sessions", "session")
+"""Addresses of objects that hang on no study: the server's own checks are their only wall."""
+
+
+@pytest.fixture
+def without_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What asks whose a study is lets everybody do everything with every study."""
+
+    def everything(_session: Session, studies: list[Study], _identity: object) -> dict[int, frozenset[str]]:
+        return {study.id: frozenset(RIGHTS) for study in studies}
+
+    monkeypatch.setattr(repository, "seen_by", lambda _identity: true())
+    monkeypatch.setattr(repository, "rights_on", everything)
+
+
+@on_postgres
+@pytest.mark.parametrize("outsider", ["owner elsewhere", "nowhere", "administrator"])
+def test_without_the_servers_own_checks_a_foreign_study_is_neither_read_nor_changed(
+    application: FastAPI,  # noqa: F811
+    services: Services,
+    foreign: Laboratory,  # noqa: F811
+    outsiders: dict[str, Admin],  # noqa: F811
+    outsider: str,
+    without_checks: None,
+) -> None:
+    known, before, asked = application.openapi()["components"]["schemas"], rows_of(services.database), 0
+    for endpoint, about in endpoints(application):
+        _, path = endpoint
+        short = path.removeprefix(f"{ADMIN}/")
+        if not names_in(path) or path.startswith(tuple(OWN)) or short.startswith(OF_EVERYBODY):
+            continue
+        answer = ask(outsiders[outsider], endpoint, about, foreign.addresses, known)
+        assert answer.status_code in (403, 404), (endpoint, answer.text[:300])
+        assert not [secret for secret in foreign.secrets if secret in answer.text], endpoint
+        asked += 1
+    assert asked > 40
+    assert rows_of(services.database) == before
+
+
+@pytest.mark.parametrize("outsider", ["owner elsewhere"])
+def test_the_checks_that_are_taken_out_are_those_that_refuse(
+    application: FastAPI,  # noqa: F811
+    services: Services,
+    foreign: Laboratory,  # noqa: F811
+    outsiders: dict[str, Admin],  # noqa: F811
+    outsider: str,
+    without_checks: None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(row_security, "act_for", lambda _account: None)
+    monkeypatch.setattr("server.accounts.identity.act_for", lambda _account: None)
+    answer = outsiders[outsider].get(f"/studies/{foreign.study.name}")
+    assert answer.status_code == 200, "the test above would pass for another reason"
+
+
+def rows_of(database: Database) -> dict[str, list[tuple[object, ...]]]:
+    """Every row of the tables that hang on studies, as the owner of the tables sees them."""
+    with database.engine.connect() as connection:
+        return {
+            name: sorted(
+                tuple(map(str, row)) for row in connection.execute(select(Base.metadata.tables[name]))
+            )
+            for name in row_policies.tables_apart()
+        }
+
+
+@on_postgres
+def test_ones_own_studies_and_those_granted_are_seen_and_nothing_else(
+    services: Services,
+    foreign: Laboratory,  # noqa: F811
+    outsiders: dict[str, Admin],  # noqa: F811
+) -> None:
+    with services.database.engine.connect() as connection:
+        accounts = dict(connection.execute(text("SELECT name, id FROM accounts")).all())
+        assert seen(connection, accounts["owner elsewhere"]) == ["own"]
+        assert seen(connection, accounts["the owner"]) == [foreign.study.name]
+        assert seen(connection, accounts["nowhere"]) == []
+        connection.execute(
+            text(
+                "INSERT INTO study_grants (study_id, account_id, granted, granted_at) "
+                "SELECT id, :account, 'view', now() FROM studies WHERE name = :name"
+            ),
+            {"account": accounts["nowhere"], "name": foreign.study.name},
+        )
+        assert seen(connection, accounts["nowhere"]) == [foreign.study.name]
+        assert seen(connection, accounts["nowhere"], "SELECT count(*) FROM study_runs") == [1]
+        assert seen(connection, accounts["owner elsewhere"], "SELECT count(*) FROM study_runs") == [0]
+        connection.rollback()
+
+
+def seen(connection: Connection, account: int, query: str = "SELECT name FROM studies") -> list[object]:
+    """What a member's transaction gets."""
+    with connection.begin_nested() as inner:
+        connection.exec_driver_sql(row_security._narrowing(account))
+        found = list(connection.scalars(text(query)))
+        inner.rollback()
+    return found
+
+
+@on_postgres
+def test_every_table_stands_behind_the_wall_or_is_named_as_hanging_on_no_study(services: Services) -> None:
+    with services.database.engine.connect() as connection:
+        query = "SELECT relname FROM pg_class WHERE relrowsecurity AND relkind = 'r'"
+        assert set(connection.scalars(text(query))) == set(row_policies.tables_apart())
+        views = connection.scalars(
+            text(
+                "SELECT reloptions::text FROM pg_class "
+                "WHERE relkind = 'v' AND relnamespace = 'public'::regnamespace"
+            )
+        ).all()
+        assert views
+        assert all(options == "{security_invoker=true}" for options in views)
+    assert set(Base.metadata.tables) == set(row_policies.tables_apart()) | row_policies.NOT_OF_A_STUDY
+    assert services.database.keeps_rows_apart
+
+
+@empty_postgres
+def test_the_wall_goes_with_the_newest_revision_and_comes_back_with_it(empty_database_url: str) -> None:
+    database = load_older_database(empty_database_url)
+    before = number_of_ratings(database)
+    upgrade(database)
+    assert (policies(database) > 10, number_of_ratings(database)) == (True, before)
+    downgrade(database, "0001")
+    assert (policies(database), number_of_ratings(database)) == (0, before)
+    with database.engine.connect() as connection:
+        left = "SELECT count(*) FROM information_schema.role_table_grants WHERE grantee = 'palpebra_member'"
+        assert connection.scalar(text(left)) == 0
+    assert upgrade(database) == ("0001", newest_revision())
+    assert policies(database) > 10
+    database.close()
+
+
+def number_of_ratings(database: Database) -> int:
+    with database.engine.connect() as connection:
+        table = (
+            "trial_ratings" if database.engine.dialect.has_table(connection, "trial_ratings") else "ratings"
+        )
+        return int(connection.scalar(text(f"SELECT count(*) FROM {table}")) or 0)
+
+
+def policies(database: Database) -> int:
+    with database.engine.connect() as connection:
+        return int(connection.scalar(text("SELECT count(*) FROM pg_policies")) or 0)
+
+
+@empty_postgres
+def test_a_database_user_who_may_make_no_role_goes_without_and_is_told(empty_database_url: str) -> None:
+    owner = Database(empty_database_url)
+    with owner.engine.begin() as connection:
+        connection.exec_driver_sql("CREATE ROLE plain_user LOGIN PASSWORD 'plain'")
+        connection.exec_driver_sql("GRANT ALL ON SCHEMA public TO plain_user")
+    plain = Database(
+        owner.url.set(username="plain_user", password="plain").render_as_string(hide_password=False)
+    )
+    try:
+        upgrade(plain)
+        assert (policies(plain), plain.keeps_rows_apart) == (0, False)
+        with plain.read() as session:
+            assert session.scalar(text("SELECT count(*) FROM studies")) == 0
+        with owner.engine.begin() as connection:
+            connection.exec_driver_sql(f"GRANT {row_security.ROLE} TO plain_user")
+        upgrade(plain)
+        del plain.keeps_rows_apart
+        assert (policies(plain) > 10, plain.keeps_rows_apart) == (True, True)
+    finally:
+        plain.close()
+        with owner.engine.begin() as connection:
+            connection.exec_driver_sql("DROP OWNED BY plain_user")
+            connection.exec_driver_sql(f"REVOKE {row_security.ROLE} FROM plain_user")
+            connection.exec_driver_sql("DROP ROLE plain_user")
+        owner.close()
