@@ -18,7 +18,7 @@ INTERRUPTED = "interrupted"
 """A view that was broken off by a reload or a crash: the play has no answer."""
 ASSUMED_REFRESH_HZ = 60.0
 SLACK_SHARE = 0.7
-"""Share of a frame's slack that the clock may be uneven by; measured by `make scope` (decision 0351)."""
+"""Share of a frame's slack that the clock may be uneven by, by `make scope` (decisions 0351, 0789)."""
 ROUNDING = 0.05
 """60 fps on a screen of 59.9 Hz counts as one refresh a frame."""
 
@@ -133,7 +133,8 @@ def _uncertain(rules: PlaybackRules, playback: Playback, fps: float) -> str:
     unevenness_ms = _unevenness_ms(playback)
     if unevenness_ms is None:
         return "no_clock_record"
-    limit_ms = rules.uncertain_unevenness_ms + SLACK_SHARE * _slack_ms(playback.refresh_rate_hz, fps)
+    allowed_ms = rules.uncertain_unevenness_ms
+    limit_ms = allowed_ms + SLACK_SHARE * max(0.0, _slack_ms(playback.refresh_rate_hz, fps, allowed_ms))
     return "uncertain_unevenness_ms" if unevenness_ms > limit_ms else ""
 
 
@@ -144,11 +145,16 @@ def _unevenness_ms(playback: Playback) -> float | None:
     return max(playback.clock_gap_ms - _refresh_ms(playback.refresh_rate_hz), playback.clock_late_ms)
 
 
-def _slack_ms(refresh_rate_hz: float | None, fps: float) -> float:
-    """How long a frame stays beyond one refresh at least: it may come that much late and is still seen."""
+def _slack_ms(refresh_rate_hz: float | None, fps: float, allowed_ms: float) -> float:
+    """How much later than allowed to every frame one may be drawn and is still seen.
+
+    That is the time for which it stays beyond one refresh. Where it stays for one alone it is what that
+    leaves: pages draw so that no picture waits before the screen, and then one that comes in its refresh is
+    shown (decision 0789).
+    """
     refresh_ms = _refresh_ms(refresh_rate_hz)
     refreshes = int(1000 / fps / refresh_ms + ROUNDING)
-    return max(0, refreshes - 1) * refresh_ms
+    return (refreshes - 1) * refresh_ms if refreshes > 1 else refresh_ms - allowed_ms
 
 
 def _refresh_ms(refresh_rate_hz: float | None) -> float:

@@ -9,7 +9,7 @@ import pytest
 from tests.scope.test_compare import log, play, record
 from tools.scope import results as module
 from tools.scope.measure import Row
-from tools.scope.pieces import row_of
+from tools.scope.pieces import MAX_LOST_PIECES, PIECE_PLAYS, measure_in_pieces, row_of
 from tools.scope.results import Results
 from tools.scope.table import HEADER, cells
 
@@ -62,3 +62,27 @@ def test_two_pieces_make_the_row_that_both_would_have_been(tmp_path: Path) -> No
     assert joined == whole
     assert cells(joined)[-1] == "1.0 to 3.0"
     assert len(cells(joined)) == len(HEADER)
+
+
+def test_a_row_goes_on_with_the_piece_it_was_at_and_outlives_a_lost_one(tmp_path: Path) -> None:
+    results, asked = Results(tmp_path / "scope.jsonl"), list[int]()
+    results.add(KEY, PIECE_PLAYS, [], None)
+
+    def piece(count: int) -> Row:
+        asked.append(count)
+        if len(asked) == 1:
+            raise RuntimeError("the start key did not reach the page")
+        return Row("chromium", "156", 30, "idle", (play(log(), record()),), 0, 2000.0, True, (1.0,), 1.0, 0.0)
+
+    measure_in_pieces(results, KEY, 2 * PIECE_PLAYS + 10, piece)
+    assert asked == [PIECE_PLAYS, PIECE_PLAYS, 10]
+    assert results.has(KEY, 2 * PIECE_PLAYS + 10)
+
+    def broken(count: int) -> Row:
+        asked.append(count)
+        raise RuntimeError("no window")
+
+    asked.clear()
+    with pytest.raises(RuntimeError, match="no window"):
+        measure_in_pieces(results, KEY, 1000, broken)
+    assert len(asked) == MAX_LOST_PIECES

@@ -29,7 +29,7 @@ from tools.scope.display import Display, missing_here
 from tools.scope.long import LONG_S, measure_long
 from tools.scope.measure import Row, measure
 from tools.scope.pairs import measure_pairs
-from tools.scope.pieces import PIECE_PLAYS, row_of
+from tools.scope.pieces import measure_in_pieces, row_of
 from tools.scope.results import Results
 from tools.scope.table import HEADER, cells, markdown
 from tools.scope.views import count_views
@@ -157,20 +157,13 @@ def _row_task(browser: str, fps: int, name: str, plays: int) -> Task:
     key = ("row", browser, str(fps), name)
 
     def take(bench: Bench) -> None:
-        while (left := plays - bench.results.count(key)) > 0:
-            piece = min(left, PIECE_PLAYS)
-            row = measure(
-                bench.display,
-                bench.server,
-                bench.folder,
-                browser,
-                fps,
-                condition,
-                piece,
-                bench.options.before_others,
+        def piece(count: int) -> Row:
+            before_others = bench.options.before_others
+            return measure(
+                bench.display, bench.server, bench.folder, browser, fps, condition, count, before_others
             )
-            bench.results.add(key, piece, cells(row), asdict(row))
-            print(f"    {bench.results.count(key)} of {plays} plays", flush=True)
+
+        measure_in_pieces(bench.results, key, plays, piece)
         line = cells(_row(bench.results, key))
         print(
             "    " + ", ".join(f"{head}: {cell}" for head, cell in zip(HEADER[3:], line[3:], strict=True)),

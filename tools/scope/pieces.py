@@ -1,13 +1,37 @@
 """A row measured in pieces, each stored as it ends: back from the file, and put together."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from tools.scope.compare import Play, Record, Sight
 from tools.scope.measure import Row
+from tools.scope.results import Results
+from tools.scope.table import cells
 
 PIECE_PLAYS = 40
 """Plays of one browser session: what a stopped bench loses at most."""
+MAX_LOST_PIECES = 3
+"""A browser that is starved or comes without its window in front costs its piece, and not the row."""
+
+
+def measure_in_pieces(
+    results: Results, key: tuple[str, ...], plays: int, measure_piece: Callable[[int], Row]
+) -> None:
+    """Add pieces to the results until there are `plays`; raises where three were lost."""
+    lost = 0
+    while (left := plays - results.count(key)) > 0:
+        count = min(left, PIECE_PLAYS)
+        try:
+            row = measure_piece(count)
+        except (RuntimeError, ValueError) as error:
+            lost += 1
+            if lost == MAX_LOST_PIECES:
+                raise
+            print(f"    a piece was not measured, and is begun anew: {error}", flush=True)
+            continue
+        results.add(key, count, cells(row), asdict(row))
+        print(f"    {results.count(key)} of {plays} plays", flush=True)
 
 
 def row_of(pieces: Sequence[dict[str, Any]]) -> Row:

@@ -17,8 +17,10 @@ MEASURED = ("frontend/src/participant/playback", "server/trials/verdict.py", "ex
 @cache
 def measured_sha256() -> str:
     """Of all source files that draw and judge."""
-    places = [ROOT / place for place in MEASURED]
-    files = sorted(file for place in places for file in (place.rglob("*.ts") if place.is_dir() else [place]))
+    sources = [ROOT / source for source in MEASURED]
+    files = sorted(
+        file for source in sources for file in (source.rglob("*.ts") if source.is_dir() else [source])
+    )
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
 

@@ -6223,7 +6223,8 @@ export interface components {
          *     A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
          *     breaking a `flagged_*` limit is flagged. One whose animation clock ran more unevenly than
          *     `uncertain_unevenness_ms` is uncertain: all frames were drawn, and one may not have reached the screen.
-         *     Frames that stay for several refreshes are allowed more. Any other play is good.
+         *     What a frame may be late and is still shown comes on top: 0.7 of the refreshes for which it stays beyond
+         *     one, or of what the only one leaves. Any other play is good.
          */
         PlaybackRules: {
             /**

@@ -39,6 +39,13 @@ describe("frame schedule", () => {
     expect(drawn).toEqual(all(60));
   });
 
+  it.each([58.6, 59, 61])("loses none at %f Hz where 60 Hz are taken for granted, as before the screen is measured", (rate) => {
+    const schedule = new FrameSchedule(60, 1000 / 60, 1000 / 60);
+    const drawn = refreshes(rate, 60 / rate).map((now) => schedule.next(now));
+    expect(drawn).toEqual(all(60));
+    expect(schedule.isOver(100 + (60 * 1000) / rate)).toBe(true);
+  });
+
   it("is over one period after the last frame", () => {
     const schedule = new FrameSchedule(2, PERIOD, 1000 / 60);
     [0, PERIOD].forEach((now) => schedule.next(now));

@@ -121,10 +121,20 @@ def test_only_failed_main_plays_are_repeated(kind: str, play: int, verdict: str,
     assert is_settled(kind, play, verdict, 1) is settled
 
 
-@pytest.mark.parametrize(("fps", "refresh_rate_hz", "verdict"), [
-    (24, 60.0, "good"), (25, 60.0, "good"), (30, 59.94, "good"), (50, 60.0, "uncertain"),
-    (60, 60.0, "uncertain"), (60, 59.9, "uncertain"), (60, 144.0, "good"), (60, None, "uncertain"),
+@pytest.mark.parametrize(("fps", "refresh_rate_hz", "late_ms", "verdict"), [
+    (24, 60.0, 14, "good"), (25, 60.0, 14, "good"), (30, 59.94, 14, "good"), (30, 60.0, 15, "uncertain"),
+    (50, 60.0, 12, "good"), (60, 60.0, 12, "good"), (60, 59.9, 12, "good"), (60, None, 12, "good"),
+    (50, 60.0, 13, "uncertain"), (60, 60.0, 13, "uncertain"), (60, None, 13, "uncertain"),
+    (60, 144.0, 7.5, "good"), (60, 144.0, 8, "uncertain"),
+    (120, 120.0, 6.5, "good"), (120, 120.0, 7, "uncertain"), (480, 480.0, 3.5, "uncertain"),
 ])  # fmt: skip
-def test_a_frame_that_stays_for_several_refreshes_may_come_later(fps, refresh_rate_hz, verdict) -> None:
-    play = replace(GOOD, clock_gap_ms=1000 / (refresh_rate_hz or 60) + 7, refresh_rate_hz=refresh_rate_hz)
-    assert judge(PlaybackRules(), play, CLIP, 45, fps, rated=True)[0] == verdict
+def test_a_frame_may_come_late_within_its_only_refresh_or_by_the_others(
+    fps, refresh_rate_hz, late_ms, verdict
+) -> None:
+    refresh_ms = 1000 / (refresh_rate_hz or 60)
+    for uneven in (
+        {"clock_gap_ms": refresh_ms + late_ms},
+        {"clock_gap_ms": refresh_ms, "clock_late_ms": late_ms},
+    ):
+        play = replace(GOOD, refresh_rate_hz=refresh_rate_hz, **uneven)
+        assert judge(PlaybackRules(), play, CLIP, 45, fps, rated=True)[0] == verdict

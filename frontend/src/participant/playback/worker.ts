@@ -19,7 +19,15 @@ const scope = self as unknown as Scope;
 
 /** Refreshes before a clip's first frame: a browser that has just begun to draw may put two pictures into one. */
 const WARM_REFRESHES = 4;
-const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callback), absoluteNow, performance.timeOrigin);
+/** Refreshes after those in which nothing is painted: a picture more on its way would be one that is lost when the way gets shorter. */
+const REST_REFRESHES = 2;
+/** Firefox takes a picture shortly after the refresh, where one drawn at once may have taken the place of the one before. */
+const DRAWS_AFTER = navigator.userAgent.includes("Firefox") ? 1 / 3 : 0;
+/** The same in ms: it is a share of the time between refreshes. */
+let draw_after_ms = 0;
+const request = (callback: (now: number) => void): unknown =>
+  scope.requestAnimationFrame(draw_after_ms ? (now) => setTimeout(callback, draw_after_ms, now) : callback);
+const clock = new RefreshClock(request, absoluteNow, performance.timeOrigin);
 
 const clips = new Map<string, SingleClip | Composed>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
@@ -104,14 +112,17 @@ function stopBroken(sha256: string, reason: unknown): void {
 
 function begin(sha256: string, clip: SingleClip | Composed, refresh_ms: number, fixation_ms: number): void {
   const until = absoluteNow() + fixation_ms;
+  draw_after_ms = Math.floor(DRAWS_AFTER * refresh_ms);
   const show = showing(sha256, clip, refresh_ms);
+  let rest = REST_REFRESHES;
   clock.start((refresh_at_ms, ran_at_ms) => {
-    if (absoluteNow() >= until && clock.refreshes > WARM_REFRESHES) {
+    if (absoluteNow() < until || clock.refreshes <= WARM_REFRESHES) {
+      blank();
+      if (fixation_ms > 0) cross();
+    } else if (rest-- <= 0) {
       clock.start(show);
-      return show(refresh_at_ms, ran_at_ms);
+      show(refresh_at_ms, ran_at_ms);
     }
-    blank();
-    if (fixation_ms > 0) cross();
   });
 }
 
@@ -137,7 +148,7 @@ function showing(sha256: string, clip: SingleClip | Composed, refresh_ms: number
     if (index === null || !context) return;
     if (!drawFrame(context, clip, index)) return;
     mark?.(context, index);
-    drawn.push([index, absoluteNow()]);
+    drawn.push([index, absoluteNow() - draw_after_ms]);
   };
 }
 
