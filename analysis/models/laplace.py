@@ -12,55 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from analysis.models.ordinal_data import OrdinalData, Parameters, by_sd
+from analysis.models.ordinal_hessian import CrossedHessian
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 NEWTON_STEPS = 60
 SCORE_TOLERANCE = 1e-9
-
-
-@dataclass(frozen=True)
-class OrdinalData:
-    """Trials: x (n, f), category codes from 0 (n,), participant and item codes (n,).
-
-    `z` (n, c) are the columns whose coefficients differ between participants, `term` (c,) the random term,
-    from 0, that each belongs to: the columns of a term share one SD.
-    """
-
-    x: Floats = field(repr=False)
-    z: Floats = field(repr=False)
-    term: Integers = field(repr=False)
-    category: Integers = field(repr=False)
-    participant: Integers = field(repr=False)
-    item: Integers = field(repr=False)
-    n_categories: int
-    n_participants: int
-    n_items: int
-
-    @property
-    def n_sds(self) -> int:
-        """SDs of the participants' terms, and that of the items."""
-        return int(self.term.max()) + 2
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """Thresholds (categories - 1,), coefficients (f,), log SDs of participants' terms and, last, of items."""
-
-    thresholds: Floats
-    beta: Floats
-    log_sd: Floats
 
 
 class Trials:
     """Each trial's likelihood and derivatives; u (people, c) and v (items,) are the random effects."""
 
     def __init__(self, data: OrdinalData, p: Parameters, u: Floats, v: Floats) -> None:
-        sd = np.exp(p.log_sd)
-        of_people = np.einsum("tc,tc->t", data.z * sd[data.term], u[data.participant])
-        eta = data.x @ p.beta + of_people + sd[-1] * v[data.item]
+        of_people = np.einsum("tc,tc->t", data.z * p.sd[data.term], u[data.participant])
+        eta = data.x @ p.beta + of_people + p.sd[-1] * v[data.item]
         edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
         a, b = edges[data.category + 1] - eta, edges[data.category] - eta
         self.upper, self.lower = special.expit(a), special.expit(b)
@@ -83,73 +50,6 @@ class Trials:
         return np.asarray(self.f_lower * (1 - 2 * self.lower))
 
 
-class _Hessian:
-    """H = I + L'WL of the crossed effects.
-
-    Its blocks are A of participants (block diagonal), D of items (diagonal) and B between them. The larger
-    of the two is eliminated, so that the one matrix inverted whole is the smaller one's Schur complement.
-    """
-
-    def __init__(self, data: OrdinalData, scaled: Floats, sd_item: float, weight: Floats) -> None:
-        n, c, j = data.n_participants, data.z.shape[1], data.n_items
-        self.shape = (n, c, j)
-        a = np.empty((n, c, c))
-        for row in range(c):
-            for column in range(row + 1):
-                w = weight * scaled[:, row] * scaled[:, column]
-                a[:, row, column] = a[:, column, row] = np.bincount(data.participant, weights=w, minlength=n)
-        a += np.eye(c)
-        pair = data.participant * j + data.item
-        b = np.stack([np.bincount(pair, weights=weight * z, minlength=n * j) for z in scaled.T], axis=1)
-        self.b = sd_item * b.reshape(n, j, c).transpose(0, 2, 1).reshape(n * c, j)
-        d = np.asarray(1 + sd_item**2 * np.bincount(data.item, weights=weight, minlength=j), np.float64)
-        self.keeps_people = n * c <= j
-        if self.keeps_people:
-            self._eliminate_items(a, d)
-        else:
-            self._eliminate_people(a, d)
-
-    def _eliminate_items(self, a: Floats, d: Floats) -> None:
-        n, c, _ = self.shape
-        self.d = d
-        self.scaled_b: Floats = self.b / d
-        schur: Floats = -self.scaled_b @ self.b.T
-        for i in range(n):
-            schur[i * c : (i + 1) * c, i * c : (i + 1) * c] += a[i]
-        self.inverse = np.linalg.inv(schur)
-        self.log_det = float(np.linalg.slogdet(schur)[1] + np.log(d).sum())
-
-    def _eliminate_people(self, a: Floats, d: Floats) -> None:
-        n, c, j = self.shape
-        self.a_inverse = np.linalg.inv(a)
-        self.scaled_b = (self.a_inverse @ self.b.reshape(n, c, j)).reshape(n * c, j)
-        schur = np.diag(d) - self.b.T @ self.scaled_b
-        self.inverse = np.linalg.inv(schur)
-        self.log_det = float(np.linalg.slogdet(schur)[1] + np.linalg.slogdet(a)[1].sum())
-
-    def solve(self, r_p: Floats, r_i: Floats) -> tuple[Floats, Floats]:
-        """H^-1 of a vector of participants (people, c) and items (items,)."""
-        n, c, _ = self.shape
-        if self.keeps_people:
-            people = self.inverse @ (r_p.ravel() - self.scaled_b @ r_i)
-            return people.reshape(n, c), r_i / self.d - self.scaled_b.T @ people
-        items = self.inverse @ (r_i - self.scaled_b.T @ r_p.ravel())
-        alone = np.einsum("ncd,nd->nc", self.a_inverse, r_p)
-        return alone - (self.scaled_b @ items).reshape(n, c), items
-
-    def blocks(self) -> tuple[Floats, Floats, Floats]:
-        """Of H^-1: blocks of participants (people, c, c), diagonal of items, cross (people, c, items)."""
-        n, c, j = self.shape
-        if self.keeps_people:
-            people = np.stack([self.inverse[i * c : (i + 1) * c, i * c : (i + 1) * c] for i in range(n)])
-            cross = -self.inverse @ self.scaled_b
-            items = 1 / self.d - np.einsum("qj,qj->j", self.scaled_b, cross)
-            return people, items, cross.reshape(n, c, j)
-        cross = (-self.scaled_b @ self.inverse).reshape(n, c, j)
-        people = self.a_inverse - np.einsum("ncj,ndj->ncd", cross, self.scaled_b.reshape(n, c, j))
-        return people, np.diag(self.inverse), cross
-
-
 @dataclass
 class LaplaceLikelihood:
     """Log-likelihood of OrdinalData; keeps the last modes as the start for the next."""
@@ -169,13 +69,13 @@ class LaplaceLikelihood:
         of_items = np.asarray(sd_item * np.bincount(d.item, values, d.n_items), np.float64)
         return np.stack(columns, axis=1), of_items
 
-    def _modes(self, p: Parameters, scaled: Floats, sd_item: float) -> tuple[Trials, _Hessian]:
+    def _modes(self, p: Parameters, scaled: Floats, sd_item: float) -> tuple[Trials, CrossedHessian]:
         """Newton with halved steps: the joint density is log-concave, so it always arrives."""
         u, v = self.u, self.v
         t = Trials(self.data, p, u, v)
         value = t.log_likelihood - ((u**2).sum() + v @ v) / 2
         for _ in range(NEWTON_STEPS):
-            hessian = _Hessian(self.data, scaled, sd_item, t.weight)
+            hessian = CrossedHessian(self.data, scaled, sd_item, t.weight)
             of_people, of_items = self._carried(scaled, sd_item, t.slope)
             score = of_people - u, of_items - v
             if (
@@ -202,8 +102,7 @@ class LaplaceLikelihood:
 
     def intercepts(self, p: Parameters) -> tuple[Floats, Floats, Trials]:
         """Modes of participants' first coefficient (people,), roots of its entries in H^-1, trials there."""
-        sd = np.exp(p.log_sd)
-        trials, hessian = self._modes(p, self.data.z * sd[self.data.term], float(sd[-1]))
+        trials, hessian = self._modes(p, self.data.z * p.sd[self.data.term], float(p.sd[-1]))
         return self.u[:, 0], np.sqrt(hessian.blocks()[0][:, 0, 0]), trials
 
     def evaluate(self, p: Parameters) -> tuple[float, Parameters]:
@@ -224,8 +123,8 @@ class LaplaceLikelihood:
         In (3) the modes move with eta, by -H^-1 Z'W; q is `spread`, c `change`, ZH^-1 Z'c `pull`. Thresholds
         and SDs follow by the same chain.
         """
-        d, sd = self.data, np.exp(p.log_sd)
-        scaled, sd_item = d.z * sd[d.term], float(sd[-1])
+        d = self.data
+        scaled, sd_item = d.z * p.sd[d.term], float(p.sd[-1])
         t, hessian = self._modes(p, scaled, sd_item)
         u, v = self.u, self.v
         value = t.log_likelihood - ((u**2).sum() + v @ v) / 2 - hessian.log_det / 2
@@ -246,5 +145,5 @@ class LaplaceLikelihood:
         edges += np.bincount(d.category, weights=lower, minlength=d.n_categories + 1)
         of_columns = (u**2 - (1 - np.einsum("ncc->nc", of_people)) - v_p * u).sum(axis=0)
         of_terms = np.bincount(d.term, weights=of_columns, minlength=d.n_sds - 1)
-        log_sd = np.append(of_terms, v @ v - (1 - of_items).sum() - v_i @ v)
-        return float(value), Parameters(edges[1:-1].astype(np.float64), beta, log_sd)
+        by_log_sd = np.append(of_terms, v @ v - (1 - of_items).sum() - v_i @ v)
+        return float(value), Parameters(edges[1:-1].astype(np.float64), beta, by_sd(by_log_sd, p.sd))

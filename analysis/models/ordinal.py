@@ -1,16 +1,17 @@
 """Cumulative-link mixed model of ratings: logit link, flexible thresholds, crossed random effects."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import optimize, special
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.design import ModelData, ModelTerms, Slopes, model_data, slope_groups
-from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
+from analysis.models.laplace import LaplaceLikelihood
+from analysis.models.ordinal_data import OrdinalData
+from analysis.models.ordinal_maximum import maximise, pooled_start
+from analysis.models.ordinal_result import OrdinalResult, RandomTerms, ordinal_result
 from analysis.models.quadrature import QuadratureLikelihood
 from analysis.models.separation import refuse_separation
 from experiments.errors import InputError
@@ -19,75 +20,13 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 MAXIMUM_CATEGORIES = 20
-LOG_SD_BOUNDS = (-9.0, 4.0)
-ZERO_LOG_SD = LOG_SD_BOUNDS[0] / 2
-START_LOG_SD = np.log(0.6)
-HESSIAN_STEP = 1e-4
 MAX_NODES = 100
 
-Likelihood = LaplaceLikelihood | QuadratureLikelihood
+ENDLESS = 20.0
+"""A standard error, in logits a standard deviation of its column, of an estimate without a finite maximum.
 
-
-@dataclass(frozen=True)
-class OrdinalEffect:
-    """Joint Wald test that all coefficients of an effect are zero."""
-
-    effect: str
-    chi2: float
-    df: int
-    p_value: float
-
-
-@dataclass(frozen=True)
-class OrdinalCoefficient:
-    """A sum-coded coefficient on the logit scale with its Wald test."""
-
-    name: str
-    estimate: float
-    se: float
-    z: float
-    p_value: float
-
-
-@dataclass(frozen=True)
-class OrdinalComponent:
-    """Standard deviation, on the logit scale, of a random term; a slope's is over unit-variance contrasts."""
-
-    group: str
-    term: str
-    sd: float
-
-
-@dataclass(frozen=True)
-class OrdinalResult:
-    """A fitted cumulative-link mixed model; `thresholds[k]` lies between categories k and k + 1.
-
-    Attributes
-    ----------
-    singular : bool
-        The SD of a random term is estimated as zero.
-    quadrature : int
-        Nodes of each participant's integral; 1 is Laplace's approximation.
-    """
-
-    formula: str
-    log_likelihood: float
-    aic: float
-    categories: tuple[float, ...]
-    thresholds: tuple[float, ...]
-    coefficients: tuple[OrdinalCoefficient, ...]
-    effects: tuple[OrdinalEffect, ...]
-    sd_participant: float
-    sd_item: float
-    slopes: Slopes
-    components: tuple[OrdinalComponent, ...]
-    singular: bool
-    n_ratings: int
-    n_participants: int
-    n_items: int
-    notes: tuple[str, ...] = ()
-    factors: tuple[str, ...] = ()
-    quadrature: int = 1
+Of separated cells it was 900 and more, of other data below 6.
+"""
 
 
 def fit_ordinal(
@@ -130,20 +69,15 @@ def fit_ordinal(
     refuse_separation(data)
     groups, left_out = slope_groups(data, slopes)
     ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups)
-    likelihood: Likelihood = LaplaceLikelihood(ordinal)
     # matrices this small only wait for a second thread
     with threadpool_limits(1, "blas"):
-        packed, notes = _maximise(likelihood, _start(ordinal), bool(items))
+        maximum = maximise(LaplaceLikelihood(ordinal), pooled_start(ordinal, bool(items)), bool(items))
         if quadrature > 1:
-            likelihood = QuadratureLikelihood(ordinal, quadrature)
-            packed, notes = _maximise(likelihood, packed, False)
-        value, _ = likelihood.evaluate(_unpack(packed, ordinal))
-        covariance = _covariance(likelihood, packed)
-    _refuse_undetermined(data, np.diag(covariance)[len(categories) - 1 : -ordinal.n_sds])
-    said = (*data.notes, *left_out, *notes, *_sd_notes(packed, groups, bool(items)))
-    terms = _Terms(slopes, tuple(groups))
-    result = _result(data, ordinal, packed, value, covariance, categories, said, terms)
-    return replace(result, quadrature=quadrature)
+            maximum = maximise(QuadratureLikelihood(ordinal, quadrature), maximum.parameters, False)
+    first = len(categories) - 1
+    _refuse_undetermined(data, np.diag(maximum.covariance)[first : -ordinal.n_sds])
+    terms = RandomTerms(slopes, tuple(groups))
+    return ordinal_result(data, categories, maximum, terms, left_out, quadrature)
 
 
 def _refuse_quadrature(nodes: int, items: Sequence[str], slopes: Slopes) -> None:
@@ -159,20 +93,20 @@ def _refuse_quadrature(nodes: int, items: Sequence[str], slopes: Slopes) -> None
 
 def _refuse_undetermined(data: ModelData, variances: Floats) -> None:
     # A flat likelihood has no curvature: the estimate is where the search stopped, and its error unknown.
-    undetermined = [name for name, v in zip(data.column_names[1:], variances, strict=True) if not v > 0]
+    names = data.column_names[1:]
+    undetermined = [name for name, v in zip(names, variances, strict=True) if not v > 0]
     if undetermined:
         raise InputError(
             f"the ordinal model has too few ratings or participants to tell {', '.join(undetermined)} apart "
             "from chance; use the linear mixed model, or collect more"
         )
-
-
-@dataclass(frozen=True)
-class _Terms:
-    """The effects that differ between participants."""
-
-    slopes: Slopes
-    groups: tuple[str, ...]
+    errors = np.sqrt(variances) * data.x[:, 1:].std(axis=0)
+    endless = [name for name, error in zip(names, errors, strict=True) if error > ENDLESS]
+    if endless:
+        raise InputError(
+            f"ratings are separated: the likelihood rises without end as {', '.join(endless)} grow, and an "
+            "ordinal model has no finite estimate; use analysis mixed, or leave a factor out"
+        )
 
 
 def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: Sequence[str]) -> OrdinalData:
@@ -190,151 +124,3 @@ def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: S
         len(people.names),
         1 if items is None else len(items.names),
     )
-
-
-def _start(d: OrdinalData) -> Floats:
-    """Thresholds from the pooled cumulative shares, no effects, moderate SDs."""
-    shares = np.cumsum(np.bincount(d.category, minlength=d.n_categories))[:-1] / len(d.category)
-    return _pack(
-        Parameters(np.log(shares / (1 - shares)), np.zeros(d.x.shape[1]), np.full(d.n_sds, START_LOG_SD))
-    )
-
-
-def _pack(p: Parameters) -> Floats:
-    """First threshold, logs of the gaps between thresholds, coefficients, log SDs."""
-    return np.concatenate([p.thresholds[:1], np.log(np.diff(p.thresholds)), p.beta, p.log_sd])
-
-
-def _unpack(packed: Floats, d: OrdinalData) -> Parameters:
-    k = d.n_categories - 1
-    thresholds = packed[0] + np.concatenate([[0.0], np.cumsum(np.exp(packed[1:k]))])
-    return Parameters(thresholds, packed[k : -d.n_sds], packed[-d.n_sds :])
-
-
-def _packed_gradient(gradient: Parameters, packed: Floats, d: OrdinalData) -> Floats:
-    k = d.n_categories - 1
-    later = np.cumsum(gradient.thresholds[::-1])[::-1]
-    return np.concatenate([later[:1], later[1:] * np.exp(packed[1:k]), gradient.beta, gradient.log_sd])
-
-
-def _maximise(likelihood: Likelihood, start: Floats, with_items: bool) -> tuple[Floats, tuple[str, ...]]:
-    """Maximise the likelihood; without items their SD is held at its lower bound, which counts as zero."""
-    d = likelihood.data
-    start = start if with_items else np.append(start[:-1], LOG_SD_BOUNDS[0])
-
-    def objective(packed: Floats) -> tuple[float, Floats]:
-        value, gradient = likelihood.evaluate(_unpack(packed, d))
-        return -value, -_packed_gradient(gradient, packed, d)
-
-    bounds: list[tuple[float | None, float | None]] = [(None, None)] + [(-12.0, 5.0)] * (d.n_categories - 2)
-    bounds += [(None, None)] * d.x.shape[1] + [LOG_SD_BOUNDS] * (d.n_sds - 1)
-    bounds.append(LOG_SD_BOUNDS if with_items else (LOG_SD_BOUNDS[0], LOG_SD_BOUNDS[0]))
-    optimum = optimize.minimize(
-        objective,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=bounds,
-        options={"maxiter": 2000, "maxfun": 4000, "ftol": 1e-13, "gtol": 1e-5, "maxcor": 30},
-    )
-    notes = () if optimum.success else (f"the optimiser stopped early: {optimum.message}",)
-    return np.asarray(optimum.x, dtype=np.float64), notes
-
-
-def _sd_notes(packed: Floats, groups: Sequence[str], with_items: bool) -> list[str]:
-    names = ["participants", *(f"participants' slopes of {group}" for group in groups[1:])]
-    names += ["items"] * with_items
-    log_sds = packed[-len(groups) - 1 :]
-    zero = "the SD of {} is estimated as zero"
-    limit = (
-        "the SD of {} is at its upper limit of {:.1f}: the ratings hardly bound it, and with it the estimates"
-    )
-    return [
-        zero.format(name) if log_sd < ZERO_LOG_SD else limit.format(name, np.exp(LOG_SD_BOUNDS[1]))
-        for name, log_sd in zip(names, log_sds, strict=False)
-        if log_sd < ZERO_LOG_SD or log_sd > LOG_SD_BOUNDS[1] - 1e-6
-    ]
-
-
-def _covariance(likelihood: Likelihood, packed: Floats) -> Floats:
-    """Inverse of the observed information from central differences of the exact gradient.
-
-    SDs estimated as zero are held fixed.
-    """
-    d = likelihood.data
-    is_sd = np.arange(len(packed)) >= len(packed) - d.n_sds
-    free = np.flatnonzero(~(is_sd & (packed < ZERO_LOG_SD)))
-    information = np.empty((len(free), len(free)))
-    for row, k in enumerate(free):
-        sides = []
-        for sign in (1, -1):
-            moved = packed.copy()
-            moved[k] += sign * HESSIAN_STEP
-            _, gradient = likelihood.evaluate(_unpack(moved, d))
-            sides.append(_packed_gradient(gradient, moved, d)[free])
-        information[row] = -(sides[0] - sides[1]) / (2 * HESSIAN_STEP)
-    covariance = np.zeros((len(packed), len(packed)))
-    covariance[np.ix_(free, free)] = np.linalg.pinv((information + information.T) / 2, hermitian=True)
-    return covariance
-
-
-def _result(
-    data: ModelData,
-    d: OrdinalData,
-    packed: Floats,
-    value: float,
-    covariance: Floats,
-    categories: Floats,
-    notes: tuple[str, ...],
-    terms: _Terms,
-) -> OrdinalResult:
-    p, first = _unpack(packed, d), d.n_categories - 1
-    block = covariance[first : -d.n_sds, first : -d.n_sds]
-    se = np.sqrt(np.maximum(np.diag(block), 0.0))
-    coefficients = tuple(
-        OrdinalCoefficient(name, float(b), float(s), float(b / s), float(2 * special.ndtr(-abs(b / s))))
-        for name, b, s in zip(data.column_names[1:], p.beta, se, strict=True)
-    )
-    effects = []
-    for effect in data.effects:
-        columns = data.columns(effect) - 1
-        chi2 = float(p.beta[columns] @ np.linalg.solve(block[np.ix_(columns, columns)], p.beta[columns]))
-        effects.append(OrdinalEffect(effect, chi2, len(columns), float(special.chdtrc(len(columns), chi2))))
-    components = _components(p, terms, data)
-    return OrdinalResult(
-        formula=_formula(data, terms),
-        log_likelihood=value,
-        aic=2 * (len(packed) - (data.items is None)) - 2 * value,
-        categories=tuple(float(c) for c in categories),
-        thresholds=tuple(float(t) for t in p.thresholds),
-        coefficients=coefficients,
-        effects=tuple(effects),
-        sd_participant=components[0].sd,
-        sd_item=components[-1].sd if data.items else 0.0,
-        slopes=terms.slopes,
-        components=components,
-        singular=any(component.sd < np.exp(ZERO_LOG_SD) for component in components),
-        n_ratings=len(data.rating),
-        n_participants=len(data.participants.names),
-        n_items=len(data.items.names) if data.items else 0,
-        notes=notes,
-        factors=data.factors,
-    )
-
-
-def _components(p: Parameters, terms: _Terms, data: ModelData) -> tuple[OrdinalComponent, ...]:
-    sds = np.exp(p.log_sd)
-    components = [
-        OrdinalComponent(data.terms.participant, group, float(sd))
-        for group, sd in zip(terms.groups, sds[:-1], strict=True)
-    ]
-    if data.items is not None:
-        components.append(OrdinalComponent(data.items.name, "intercept", float(sds[-1])))
-    return tuple(components)
-
-
-def _formula(data: ModelData, terms: _Terms) -> str:
-    participant = data.terms.participant
-    slopes = "".join(f" + (0 + {group} | {participant})" for group in terms.groups[1:])
-    items = f" + (1 | {data.items.name})" if data.items else ""
-    return f"{data.terms.rating} ~ {data.fixed_part} + (1 | {participant}){slopes}{items}, logit"

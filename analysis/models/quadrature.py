@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters, Trials
+from analysis.models.laplace import LaplaceLikelihood, Trials
+from analysis.models.ordinal_data import OrdinalData, Parameters, by_sd
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ class QuadratureLikelihood:
 
     def evaluate(self, p: Parameters) -> tuple[float, Parameters]:
         """Log-likelihood, eq. 2, and its gradient in the form of Parameters."""
-        d, sd = self.data, float(np.exp(p.log_sd[0]))
+        d, sd = self.data, float(p.sd[0])
         modes, tau, trials = self._laplace.intercepts(p)
         moves = np.sqrt(2.0) * tau[:, None] * self._x
         u = modes[:, None] + moves
@@ -65,11 +66,11 @@ class QuadratureLikelihood:
         slope = -(upper + lower)
         pulls = sd * self._summed(slope) - share * u
         moved = _moved(d, sd, (modes, tau, trials), (pulls.sum(axis=1), 1 + (pulls * moves).sum(axis=1)))
-        log_sd = sd * float((slope * u[d.participant]).sum()) + float(moved.log_sd[0])
+        of_sd = float((slope * u[d.participant]).sum()) + float(moved.sd[0])
         gradient = Parameters(
             _by_edge(d, upper.sum(axis=1), lower.sum(axis=1)) + moved.thresholds,
             d.x.T @ slope.sum(axis=1) + moved.beta,
-            np.array([log_sd, 0.0]),
+            np.array([of_sd, 0.0]),
         )
         return float((of_people + np.log(tau)).sum()), gradient
 
@@ -108,5 +109,6 @@ def _moved(
     thresholds = _by_edge(
         d, curved * t.curve_upper + pulled * t.f_upper, curved * t.curve_lower + pulled * t.f_lower
     )
-    log_sd = half * (u * changes + 2 * (1 - tau**2)) + kappa * u * (2 * tau**2 - 1)
-    return Parameters(thresholds, d.x.T @ by_eta, np.array([log_sd.sum(), 0.0]))
+    by_log_sd = half * (u * changes + 2 * (1 - tau**2)) + kappa * u * (2 * tau**2 - 1)
+    of_sd = by_sd(np.array([by_log_sd.sum(), 0.0]), np.array([sd, 0.0]))
+    return Parameters(thresholds, d.x.T @ by_eta, of_sd)

@@ -1,7 +1,7 @@
 """Mixed and ordinal models as tables."""
 
 from analysis.models.mixed import MixedResult
-from analysis.models.ordinal import OrdinalResult
+from analysis.models.ordinal_result import OrdinalResult
 from analysis.report.captions import caption
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value

@@ -12,7 +12,7 @@ from analysis.report.templating import filled
 
 if TYPE_CHECKING:
     from analysis.models.mixed import MixedResult
-    from analysis.models.ordinal import OrdinalResult
+    from analysis.models.ordinal_result import OrdinalResult
 
 Rows = list[list[Any]]
 

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 from scipy import integrate, special
 
-from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
+from analysis.models.laplace import LaplaceLikelihood
 from analysis.models.ordinal import fit_ordinal
+from analysis.models.ordinal_data import OrdinalData, Parameters
 from analysis.models.quadrature import QuadratureLikelihood
 from experiments.errors import InputError
 
@@ -43,7 +44,7 @@ def small() -> OrdinalData:
     return OrdinalData(x, np.ones((30, 1)), zeros[:1], category, participant, zeros, 3, 5, 1)
 
 
-AT = Parameters(np.array([-1.1, 0.9]), np.array([0.7]), np.array([0.2, -9.0]))
+AT = Parameters(np.array([-1.1, 0.9]), np.array([0.7]), np.array([np.exp(0.2), 0.0]))
 
 
 def test_many_nodes_give_the_integral(small) -> None:
@@ -69,13 +70,13 @@ def test_one_node_is_laplace(small) -> None:
 
 def test_the_gradient_is_that_of_the_sum(small) -> None:
     likelihood = QuadratureLikelihood(small, 7)
-    packed = np.concatenate([AT.thresholds, AT.beta, AT.log_sd[:1]])
+    packed = np.concatenate([AT.thresholds, AT.beta, AT.sd[:1]])
 
     def value(values: np.ndarray) -> float:
-        return likelihood.evaluate(Parameters(values[:2], values[2:3], np.append(values[3:], -9.0)))[0]
+        return likelihood.evaluate(Parameters(values[:2], values[2:3], np.append(values[3:], 0.0)))[0]
 
     _, gradient = likelihood.evaluate(AT)
-    exact = np.concatenate([gradient.thresholds, gradient.beta, gradient.log_sd[:1]])
+    exact = np.concatenate([gradient.thresholds, gradient.beta, gradient.sd[:1]])
     steps = 1e-6 * np.eye(4)
     differences = [(value(packed + step) - value(packed - step)) / 2e-6 for step in steps]
     assert exact == pytest.approx(differences, rel=1e-6, abs=1e-7)
@@ -96,7 +97,8 @@ def test_models_it_is_not_for_are_refused(more, said) -> None:
 
 
 def test_an_sd_at_its_limit_is_noted(monkeypatch) -> None:
-    monkeypatch.setattr("analysis.models.ordinal.LOG_SD_BOUNDS", (-9.0, 0.5))
+    for module in ("ordinal_maximum", "ordinal_result"):
+        monkeypatch.setattr(f"analysis.models.{module}.SD_MAX", np.exp(0.5))
     rows = pd.read_csv(GOLDEN / "models" / "ordinal_far_apart.csv")
     result = fit_ordinal(rows, "participant", "rating", ["A"])
     assert result.sd_participant == pytest.approx(np.exp(0.5))
