@@ -24,7 +24,7 @@ def own_clause(tail: str) -> str:
     Another clause begins with a sentence, a contrast, the first word behind a semicolon that no report of a
     statistic has, or with more than `WORDS_MAX` such words elsewhere: what follows is of something else.
     """
-    ends = [found.start() for pattern in (_END_OF_SENTENCE, _CONTRAST) if (found := pattern.search(tail))]
+    ends = [match.start() for pattern in (_END_OF_SENTENCE, _CONTRAST) if (match := pattern.search(tail))]
     tail = tail[: min(ends, default=len(tail))]
     semicolon, strange = -1, 0
     for part in _PARTS.finditer(tail):

@@ -9,7 +9,7 @@ from functools import cache
 from operator import itemgetter
 from typing import Any
 
-from sqlalchemy import Connection, TextClause, bindparam, text
+from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.columns import View
@@ -32,12 +32,12 @@ def rating_lines(
     """Lines of CSV without their ends, by start of the run, then trial, play and scale."""
     connection = session.connection()
     stretches = _stretches(view, "sqlite" if connection.dialect.name == "sqlite" else "postgresql")
-    answers, order = _of_runs(stretches.answers()), itemgetter(*range(1 + len(stretches.order)))
+    answers = repository.read_of_runs(connection, stretches.answers())
+    order = itemgetter(*range(1 + len(stretches.order)))
     parts = list(_parts(connection, stretches, factors))
 
     def read(runs: Runs) -> Rows:
-        result = connection.execute(answers, {"runs": [run for run, _ in runs]})
-        return sorted(repository.plain_rows(result), key=order)
+        return sorted(answers([run for run, _ in runs]), key=order)
 
     for rows in repository.batches_of_runs(session, study, extract, read):
         yield from map(",".join, zip(*(part(rows) for part in parts), strict=True))
@@ -46,10 +46,6 @@ def rating_lines(
 @cache
 def _stretches(view: View, dialect: Dialect) -> Stretches:
     return Stretches(view, dialect)
-
-
-def _of_runs(query: str) -> TextClause:
-    return text(query).bindparams(bindparam("runs", expanding=True))
 
 
 def _parts(connection: Connection, stretches: Stretches, factors: tuple[str, ...]) -> Iterator[Part]:
@@ -83,15 +79,14 @@ class _RunPart:
     def __init__(
         self, connection: Connection, stretches: Stretches, stretch: Stretch, factors: tuple[str, ...]
     ) -> None:
-        self._connection, self._query = connection, _of_runs(stretches.runs(stretch))
+        self._read = repository.read_of_runs(connection, stretches.runs(stretch))
         self._levels, self._factors = levels_at(stretch.columns), factors
 
     def __call__(self, rows: Rows) -> Iterable[str]:
         runs = [row[0] for row in rows]
-        result = self._connection.execute(self._query, {"runs": list(set(runs))})
         text_of = {
             run: _text(with_levels(cells, self._levels, self._factors))
-            for run, *cells in repository.plain_rows(result)
+            for run, *cells in self._read(list(set(runs)))
         }
         return map(text_of.__getitem__, runs)
 
@@ -103,7 +98,7 @@ class _ClipPart(dict[Any, str]):
         self, connection: Connection, stretches: Stretches, stretch: Stretch, factors: tuple[str, ...]
     ) -> None:
         super().__init__()
-        self._connection, self._query = connection, text(stretches.shown(stretch))
+        self._read = repository.read_of_clips(connection, stretches.shown(stretch))
         self._levels, self._factors, self._clips = levels_at(stretch.columns), factors, stretch.clips
         self._ids = itemgetter(*map(stretches.clip_at, stretch.clips))
 
@@ -114,7 +109,7 @@ class _ClipPart(dict[Any, str]):
         if len(self) >= CLIPS_KEPT:
             self.clear()
         shown = dict(zip(self._clips, ids if isinstance(ids, tuple) else (ids,), strict=True))
-        (cells,) = repository.plain_rows(self._connection.execute(self._query, shown))
+        (cells,) = self._read(shown)
         self[ids] = _text(with_levels(cells, self._levels, self._factors))
         return self[ids]
 

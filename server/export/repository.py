@@ -5,7 +5,7 @@ from datetime import datetime
 from functools import cache, partial
 from typing import Any, NamedTuple
 
-from sqlalchemy import CursorResult, Select, TextClause, bindparam, func, select, text, true
+from sqlalchemy import Connection, CursorResult, Select, TextClause, bindparam, func, select, text, true
 from sqlalchemy.orm import Session
 
 from experiments.columns import View, names_of
@@ -138,6 +138,18 @@ def _rows_of_runs(view: View) -> TextClause:
     columns = ", ".join(f"CAST({name} AS INTEGER)" if name in booleans else name for name in view.names)
     rows = text(f"SELECT {columns} FROM {view.name} WHERE run IN :runs")  # noqa: S608
     return rows.bindparams(bindparam("runs", expanding=True))
+
+
+def read_of_runs(connection: Connection, query: str) -> Callable[[Sequence[int]], Rows]:
+    """What reads the rows of `query` for some runs, named by their ids."""
+    statement = text(query).bindparams(bindparam("runs", expanding=True))
+    return lambda runs: plain_rows(connection.execute(statement, {"runs": runs}))
+
+
+def read_of_clips(connection: Connection, query: str) -> Callable[[Mapping[str, Any]], Rows]:
+    """What reads the row of `query` for the clips that were shown, by the names of their ids."""
+    statement = text(query)
+    return lambda clips: plain_rows(connection.execute(statement, dict(clips)))
 
 
 def plain_rows(result: CursorResult[Any]) -> Rows:
