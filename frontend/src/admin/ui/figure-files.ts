@@ -2,7 +2,7 @@
 
 import * as Plot from "@observablehq/plot";
 
-export type Cell = string | number | null | undefined;
+type Cell = string | number | null | undefined;
 export type Row = Record<string, Cell>;
 
 const SVG = "http://www.w3.org/2000/svg";
