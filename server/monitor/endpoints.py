@@ -75,7 +75,7 @@ async def _waited(services: Services, seen: int | None) -> bool:
 async def stream_monitor(
     request: Request, services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> StreamingResponse:
-    """Server-sent events: the whole monitor first, then every two seconds what has changed.
+    """Server-sent events: the whole monitor first, then what has changed, within two seconds of it.
 
     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
     when the session ends or the server does; the browser then connects again by itself.

@@ -1697,7 +1697,7 @@ export interface paths {
         };
         /**
          * Stream Monitor
-         * @description Server-sent events: the whole monitor first, then every two seconds what has changed.
+         * @description Server-sent events: the whole monitor first, then what has changed, within two seconds of it.
          *
          *     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
          *     when the session ends or the server does; the browser then connects again by itself.
