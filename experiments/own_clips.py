@@ -74,9 +74,9 @@ def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
     whole, by_stem = (NamePattern.read(one_form(text)) for text in (pattern, _stem(pattern)))
     rows = {}
     for name in files:
-        fit = whole.fit(name)
-        if fit is None and _stem(pattern) != pattern:
-            fit = by_stem.fit(_stem(name))  # files of several formats follow one pattern
+        fit = by_stem.fit(_stem(name))  # files of several formats follow one pattern
+        if fit is None:
+            fit = whole.fit(name)
         if fit is None:
             raise InputError(f"the file name '{name}' does not follow the pattern {pattern}")
         levels = {field: fit[field] for field in fields if field != FIRST_FIELD}

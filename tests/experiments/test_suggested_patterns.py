@@ -33,3 +33,16 @@ def test_parts_that_vary_are_factors(names: list[str], pattern: str | None) -> N
     assert suggest_pattern(names) == pattern
     if pattern is not None:
         assert set(levels_from_names(pattern, names)) == set(names)
+
+
+def test_an_ending_is_no_part_of_a_level_as_the_page_shows_it() -> None:
+    placed = levels_from_names("{speed}_{style}", ["fast_round.mp4", "slow_flat.webm"])
+    assert [levels for levels, _ in placed.values()] == [
+        {"speed": "fast", "style": "round"},
+        {"speed": "slow", "style": "flat"},
+    ]
+
+
+def test_an_ending_can_be_a_field() -> None:
+    placed = levels_from_names("{speed}.{format}", ["fast.mp4", "slow.mp4"])
+    assert [levels["format"] for levels, _ in placed.values()] == ["mp4", "mp4"]
