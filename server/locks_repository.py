@@ -57,6 +57,8 @@ class DatabaseLocks:
 
     def is_held(self, name: str) -> bool:
         """Whether any process holds a lock."""
+        if _number(name) in self._held:  # also where PostgreSQL was started anew meanwhile
+            return True
         query = text("SELECT pg_try_advisory_xact_lock_shared(:number)")
         with self._database.engine.connect() as connection:
             return not connection.scalar(query, {"number": _number(name)})

@@ -79,7 +79,7 @@ def raise_wall(connection: Connection) -> bool:
         return False
     statements = list(_statements(_schema(connection), _sequences(connection)))
     mark = hashlib.sha256("\n".join(statements).encode()).hexdigest()
-    if _mark(connection) == mark:
+    if _mark(connection) == mark and _is_whole(connection):
         return True
     take_down_wall(connection)
     for statement in statements:
@@ -138,6 +138,18 @@ def _mark(connection: Connection) -> str | None:
     query = "SELECT obj_description(to_regprocedure('palpebra_account()'), 'pg_proc')"
     mark: str | None = connection.scalar(text(query))
     return mark
+
+
+def _is_whole(connection: Connection) -> bool:
+    """Whether policies and rights stand too: a dump brings the mark alone to where the role was missing."""
+    query = text(
+        "SELECT (SELECT count(*) FROM pg_policies "
+        "WHERE policyname = :name AND schemaname = current_schema()), "
+        "has_schema_privilege(:role, current_schema(), 'USAGE'), "
+        "has_table_privilege(:role, 'studies', 'SELECT')"
+    )
+    policies, *rights = connection.execute(query, {"name": _POLICY, "role": ROLE}).one()
+    return policies == len(tables_apart()) and all(rights)
 
 
 def _schema(connection: Connection) -> str:

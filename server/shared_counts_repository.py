@@ -15,7 +15,9 @@ from server.db import Database
 
 FORGOTTEN_S = 6 * 3600.0
 """After so long without an event a count goes: shares are full again by then, failures forgiven."""
-_SWEPT_ONE_IN = 100
+KEYS_MAX = 20_000
+"""Of more the oldest go: strangers can invent keys, such as links that do not exist."""
+_SWEPT_ONE_IN, _SWEPT_AT_ONCE = 100, 1000
 _REFILLED = (
     "least(:share, shared_counts.amount "
     "+ extract(epoch FROM clock_timestamp() - shared_counts.at) * :share / :window)"
@@ -36,7 +38,14 @@ _FAILURES = text(
     "SELECT amount, extract(epoch FROM clock_timestamp() - at) FROM shared_counts WHERE key = :key"
 )
 _FORGET = text("DELETE FROM shared_counts WHERE key = :key")
-_SWEEP = text("DELETE FROM shared_counts WHERE at < clock_timestamp() - make_interval(secs => :forgotten)")
+_SWEEP_OLD = text(
+    "DELETE FROM shared_counts WHERE key IN (SELECT key FROM shared_counts "
+    "WHERE at < now() - make_interval(secs => :forgotten) ORDER BY at LIMIT :most FOR UPDATE SKIP LOCKED)"
+)
+_SWEEP_MANY = text(
+    "DELETE FROM shared_counts WHERE key IN (SELECT key FROM shared_counts ORDER BY at "
+    "LIMIT least(:most, greatest(0, (SELECT count(*) FROM shared_counts) - :kept)) FOR UPDATE SKIP LOCKED)"
+)
 
 
 class SharedCounts:
@@ -74,9 +83,16 @@ class SharedCounts:
         with self._database.write_engine.begin() as connection:
             done = connection.execute(statement, values)
             given = done.scalar() if done.returns_rows else None
-            if random.randrange(_SWEPT_ONE_IN) == 0:
-                connection.execute(_SWEEP, {"forgotten": FORGOTTEN_S})
-            return given
+        if random.randrange(_SWEPT_ONE_IN) == 0:
+            self.sweep()
+        return given
+
+    def sweep(self) -> None:
+        """Remove counts that are forgotten, and the oldest of too many; some at a time."""
+        # In a transaction of its own, past rows in use: nobody waits for it who counts, and it for nobody.
+        with self._database.write_engine.begin() as connection:
+            connection.execute(_SWEEP_OLD, {"forgotten": FORGOTTEN_S, "most": _SWEPT_AT_ONCE})
+            connection.execute(_SWEEP_MANY, {"kept": KEYS_MAX, "most": _SWEPT_AT_ONCE})
 
     @cached_property
     def _key(self) -> bytes:

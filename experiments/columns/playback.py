@@ -34,7 +34,7 @@ PLAYBACK: tuple[Column, ...] = (
     Column(
         "frames_late",
         "integer",
-        "Frames drawn more than one refresh after their time.",
+        "Frames drawn more than one refresh from their time.",
         unit="frames",
         minimum=0,
         source="t",

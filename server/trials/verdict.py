@@ -150,11 +150,13 @@ def _slack_ms(refresh_rate_hz: float | None, fps: float, allowed_ms: float) -> f
 
     That is the time for which it stays beyond one refresh. Where it stays for one alone it is what that
     leaves: pages draw so that no picture waits before the screen, and then one that comes in its refresh is
-    shown (decision 0789).
+    shown (decision 0789). A rate that was not measured leaves nothing: the screen may be a faster one.
     """
     refresh_ms = _refresh_ms(refresh_rate_hz)
     refreshes = int(1000 / fps / refresh_ms + ROUNDING)
-    return (refreshes - 1) * refresh_ms if refreshes > 1 else refresh_ms - allowed_ms
+    if refreshes > 1:
+        return (refreshes - 1) * refresh_ms
+    return 0.0 if refresh_rate_hz is None else refresh_ms - allowed_ms
 
 
 def _refresh_ms(refresh_rate_hz: float | None) -> float:

@@ -146,6 +146,21 @@ def test_counts_that_nobody_needs_go(services: Services) -> None:
     assert counts.failures("long ago") == (0, 0.0)
 
 
+def test_invented_keys_are_bounded_and_the_oldest_go(
+    services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.shared_counts_repository.KEYS_MAX", 50)
+    counts = SharedCounts(services.database, lambda: b"key")
+    counts.failed("first")
+    for number in range(100):
+        counts.hit(f"invented {number}", 10, 1, 60)
+    counts.failed("last")
+    counts.sweep()
+    with services.database.engine.connect() as connection:
+        assert connection.scalar(text("SELECT count(*) FROM shared_counts")) == 50
+    assert (counts.failures("first")[0], counts.failures("last")[0]) == (0, 1)
+
+
 def test_a_change_is_heard_of_by_another_process_and_after_a_cut_line(services: Services) -> None:
     here, there = Changes(services.database), Changes(services.database)
     try:

@@ -30,14 +30,14 @@ class FakeScope {
   }
 
   /** What was painted at the refresh, and what by `later_ms` after it. */
-  refresh(later_ms: number): { at_once: string[]; later: string[] } {
+  refresh(later_ms: number, period_ms = REFRESH_MS): { at_once: string[]; later: string[] } {
     this.painted.length = 0;
     for (const callback of this.waiting.splice(0)) callback(performance.now());
     const at_once = [...this.painted];
     this.painted.length = 0;
     vi.advanceTimersByTime(later_ms);
     const later = [...this.painted];
-    vi.advanceTimersByTime(REFRESH_MS - later_ms);
+    vi.advanceTimersByTime(period_ms - later_ms);
     return { at_once, later };
   }
 }
@@ -67,6 +67,12 @@ describe("the way to the screen", () => {
     const scope = await workerIn("Chrome/156");
     const refreshes = Array.from({ length: 9 }, () => scope.refresh(8).at_once[0] ?? "nothing");
     expect(refreshes).toEqual([...Array<string>(4).fill("surround"), "nothing", "nothing", "frame 0", "frame 1", "frame 2"]);
+  });
+
+  it("shows a clip at its own rate on a screen that is faster than was believed", async () => {
+    const scope = await workerIn("Chrome/156");
+    const refreshes = Array.from({ length: 11 }, () => scope.refresh(4, 10).at_once[0] ?? "nothing");
+    expect(refreshes.slice(6)).toEqual(["frame 0", "nothing", "frame 1", "frame 2", "nothing"]);
   });
 
   it("gets Firefox's pictures a third of a refresh later, when the one before has been taken", async () => {

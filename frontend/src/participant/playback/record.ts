@@ -71,11 +71,12 @@ export function disturbancesOf(showings: readonly Pick<Showing, "disturbances">[
   return total;
 }
 
+/** Frames drawn more than a refresh away from their time; early ones too, as where a screen is faster than it was measured. */
 function late({ drawn, fps }: Showing, refresh_ms: number): number {
   const start = drawn[0];
   if (!start) return 0;
   const due = (index: number): number => start[1] + (index - start[0]) * shownPeriod(1000 / fps, refresh_ms);
-  return drawn.filter(([index, at_ms]) => at_ms - due(index) > refresh_ms + JITTER_MS).length;
+  return drawn.filter(([index, at_ms]) => Math.abs(at_ms - due(index)) > refresh_ms + JITTER_MS).length;
 }
 
 function gapsOf(drawn: Showing["drawn"]): number[] {

@@ -21,6 +21,8 @@ const scope = self as unknown as Scope;
 const WARM_REFRESHES = 4;
 /** Refreshes after those in which nothing is painted: a picture more on its way would be one that is lost when the way gets shorter. */
 const REST_REFRESHES = 2;
+/** Refreshes that follow one another within less than this share of the time believed are those of a faster screen. */
+const FASTER = 0.85;
 /** Firefox takes a picture shortly after the refresh, where one drawn at once may have taken the place of the one before. */
 const DRAWS_AFTER = navigator.userAgent.includes("Firefox") ? 1 / 3 : 0;
 /** The same in ms: it is a share of the time between refreshes. */
@@ -113,13 +115,17 @@ function stopBroken(sha256: string, reason: unknown): void {
 function begin(sha256: string, clip: SingleClip | Composed, refresh_ms: number, fixation_ms: number): void {
   const until = absoluteNow() + fixation_ms;
   draw_after_ms = Math.floor(DRAWS_AFTER * refresh_ms);
-  const show = showing(sha256, clip, refresh_ms);
+  const waited = new EvennessMeter();
   let rest = REST_REFRESHES;
   clock.start((refresh_at_ms, ran_at_ms) => {
+    waited.add(refresh_at_ms, ran_at_ms);
     if (absoluteNow() < until || clock.refreshes <= WARM_REFRESHES) {
       blank();
       if (fixation_ms > 0) cross();
     } else if (rest-- <= 0) {
+      // Refreshes are counted: a screen faster than believed would show the clip too fast.
+      const seen_ms = waited.read().refresh_ms ?? refresh_ms;
+      const show = showing(sha256, clip, seen_ms < FASTER * refresh_ms ? seen_ms : refresh_ms);
       clock.start(show);
       show(refresh_at_ms, ran_at_ms);
     }
