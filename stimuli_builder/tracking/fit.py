@@ -35,7 +35,8 @@ class Fit:
     iterations : int
         0 if the fit broke down.
     light : (float, float)
-        Gain and offset that would bring the picture's grey levels nearest to the model's.
+        Gain and offset that would bring the picture's grey levels nearest to the model's; (1, 0) if the fit
+        broke down.
     """
 
     c: Values
@@ -156,5 +157,8 @@ class Fitter:
         limit = max_iterations or self.max_iterations
         iterations = run(picture, c, pose, limit, self.stop_px, self._mesh, self._arrays, self._buffers)
         residuals = np.sqrt(self._buffers.squares)
-        light = light_between(self._buffers.look, self._buffers.sampled, self.model.weights)
+        # A fit that broke down leaves what it last sampled, wherever that was.
+        light = (1.0, 0.0)
+        if iterations:
+            light = light_between(self._buffers.look, self._buffers.sampled, self.model.weights)
         return Fit(c, pose, self._buffers.vertices.copy(), residuals, int(iterations), light)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.light import Light, light_between
 from stimuli_builder.tracking.track import Tracker
 
@@ -73,6 +74,15 @@ def test_gain_and_offset_are_found_beside_what_no_model_explains(gain, offset):
     told = light_between(look, seen, np.ones(6500, np.float32))
     assert told == pytest.approx((gain, offset), abs=1.5)
     assert told[0] == pytest.approx(gain, rel=0.02)
+
+
+def test_a_fit_that_broke_down_tells_no_light(lesson, recording):
+    fitter, model = Fitter(lesson.model), lesson.model
+    dim = in_light(recording.pictures[0], 0.6, 0.0)
+    seen = fitter.fit(dim, np.zeros(len(model.sd)), model.poses[0], 1)
+    assert not Light(*seen.light).steady  # what the buffers hold
+    broken = fitter.fit(dim, np.zeros(len(model.sd)), np.full(4, np.nan))
+    assert (broken.iterations, broken.light) == (0, (1.0, 0.0))
 
 
 def test_nothing_in_common_tells_no_light():
