@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.models.columns import Grouping, covariate_columns, groupings, ratings, refuse_unknown_columns
 from analysis.models.terms import Term, intercept_term
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
-from analysis.within.level_codes import natural_order
+from analysis.within.level_codes import level_codes
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -188,7 +188,7 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     groups = groupings(rows, terms)
     terms, said = _by_participant(rows, terms, groups[0].codes)
     factors = (*terms.between, *terms.within)
-    coded = [_coded(rows[name], f"levels of '{name}'") for name in factors]
+    coded = [_coded(rows[name], name) for name in factors]
     levels = tuple(names for _, names in coded)
     shape = tuple(len(names) for names in levels)
     cell = np.zeros(len(values), np.int64)
@@ -268,13 +268,11 @@ def _by_participant(
     return moved, (said,)
 
 
-def _coded(column: "pd.Series[str]", what: str) -> tuple[Integers, tuple[str, ...]]:
-    texts = column.astype(str)
-    names = natural_order(sorted(set(texts)))
+def _coded(column: "pd.Series[str]", name: str) -> tuple[Integers, tuple[str, ...]]:
+    codes, names = level_codes(column, name)
     if len(names) < 2:
-        raise InputError(f"expected at least two {what}, got {len(names)}")
-    position = {name: i for i, name in enumerate(names)}
-    return np.asarray(texts.map(position), dtype=np.int64), tuple(names)
+        raise InputError(f"expected at least two levels of '{name}', got {len(names)}")
+    return codes, tuple(names)
 
 
 def _refuse_empty_cells(cell: Integers, factors: Sequence[str], levels: Sequence[Sequence[str]]) -> None:

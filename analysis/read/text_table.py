@@ -14,6 +14,7 @@ from analysis.read.files.cells import Cells
 from analysis.read.files.open import Reader, reader_of
 from analysis.read.files.programs import program_of, trials_only
 from analysis.read.wide import wide_hint
+from analysis.within.level_codes import natural_order
 from experiments.errors import InputError, nearest
 
 NAMED_ROWS = 5
@@ -172,6 +173,7 @@ def texts_required(table: TextTable, name: str) -> None:
 
 
 def _worded(table: TextTable, column: "pd.Series[Any]", words: Mapping[str, str]) -> "pd.Series[Any]":
+    """The words of codes, as levels whose order is that of the codes."""
     if not words:
         return column
     codes = list(column.cat.categories)
@@ -185,7 +187,12 @@ def _worded(table: TextTable, column: "pd.Series[Any]", words: Mapping[str, str]
         names = [
             f"{name} ({code})" if name in twice else name for name, code in zip(names, codes, strict=True)
         ]
-    return pd.Series(categorical(column.cat.codes.to_numpy(), names), index=column.index)
+    name_of = dict(zip(codes, names, strict=True))
+    order = [name_of[code] for code in natural_order(codes)]
+    if order != natural_order(order):
+        table.decisions.append(f"levels of '{column.name}' in the order of the codes: {', '.join(order)}")
+    worded = pd.Categorical(np.array(names, dtype=object)[column.cat.codes], order, ordered=True)
+    return pd.Series(worded, index=column.index)
 
 
 def name_lines(table: TextTable, rows: NDArray[np.bool_]) -> str:

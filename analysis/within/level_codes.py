@@ -36,7 +36,9 @@ def factorized(column: pd.Series) -> tuple[Integers, Sequence[Any]]:
 def level_codes(
     column: pd.Series, name: str, declared: Sequence[str] | None = None
 ) -> tuple[Integers, list[str]]:
-    """Codes (n,) of the column `name` into its declared names, or into those it holds in natural order.
+    """Codes (n,) of the column `name` into its declared names, or into those it holds in order.
+
+    The order is that of an ordered categorical column, else the natural one.
 
     Raises
     ------
@@ -49,13 +51,21 @@ def level_codes(
     if codes.min() < 0:
         raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
     texts = [str(text) for text in uniques]
-    names = natural_order(texts) if declared is None else [str(level) for level in declared]
+    names = _in_order(column, texts) if declared is None else [str(level) for level in declared]
     position = {text: i for i, text in enumerate(names)}
     for text in texts:
         if text not in position:
             raise InputError(f"'{text}' is no level of '{name}'{did_you_mean(text, names)}")
     lookup = np.array([position[text] for text in texts], dtype=np.int64)
     return lookup[codes], names
+
+
+def _in_order(column: pd.Series, texts: Sequence[str]) -> list[str]:
+    """The names that a column holds: as its own categories are ordered, where they are."""
+    if isinstance(column.dtype, pd.CategoricalDtype) and column.dtype.ordered:
+        there = set(texts)
+        return [str(level) for level in column.dtype.categories if str(level) in there]
+    return natural_order(texts)
 
 
 def _whole_numbers(column: pd.Series) -> tuple[Integers, list[str]] | None:

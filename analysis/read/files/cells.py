@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import date, datetime, time
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+
+from analysis.read.files.cell_text import cell_text
 
 
 @dataclass(frozen=True)
@@ -36,20 +37,6 @@ class Cells:
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     numeric: frozenset[str] = frozenset()
     decisions: tuple[str, ...] = ()
-
-
-def cell_text(value: Any) -> str:
-    """A value of a sheet as a person would type it: whole numbers without a point, days as 2026-11-22."""
-    if value is None or value is pd.NaT or (isinstance(value, float) and np.isnan(value)):
-        return ""
-    if isinstance(value, bool | np.bool_):
-        return str(bool(value))
-    if isinstance(value, float | np.floating):
-        number = float(value)
-        return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
-    if isinstance(value, datetime):
-        return value.date().isoformat() if value.time() == time() else value.isoformat(" ")
-    return value.isoformat() if isinstance(value, date | time) else str(value)
 
 
 def cells_of(

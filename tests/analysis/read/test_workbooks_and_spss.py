@@ -7,7 +7,10 @@ import pandas as pd
 import pyreadstat
 import pytest
 
+from analysis.models.design import ModelTerms, model_data
 from analysis.read.long_csv import LongData, read_long_table
+from analysis.read.model_csv import read_model_input
+from analysis.within.cell_means import cell_table
 from experiments.errors import InputError
 
 HEAD = ("id", "cond", "score")
@@ -90,3 +93,25 @@ def test_values_declared_missing_are_no_ratings(tmp_path) -> None:
     data = spss(tmp_path / "a.sav", {1: "a"}, missing_ranges=ranges)
     left = [score for *_, score in ROWS if score not in (1, 6, 7)]
     assert data.rows["score"].tolist() == left
+
+
+WORDS = {1: "low", 2: "middle", 3: "high"}
+
+
+def test_levels_stand_in_the_order_of_their_codes(tmp_path) -> None:
+    data = spss(tmp_path / "a.sav", WORDS)
+    table = cell_table(data.rows, "id", "score", ["cond"])
+    assert table.levels == (("low", "middle", "high"),)
+    assert table.y[1].tolist() == [score for person, _, score in ROWS if person == "p1"]
+    assert any("levels of 'cond' in the order of the codes: low, middle, high" in d for d in data.decisions)
+
+
+def test_a_mixed_model_takes_the_order_of_the_codes(tmp_path) -> None:
+    spss(tmp_path / "a.sav", WORDS)
+    rows = read_model_input(tmp_path / "a.sav", "id", "score", ["cond"], []).rows
+    assert model_data(rows, ModelTerms("id", "score", ("cond",))).levels == (("low", "middle", "high"),)
+
+
+def test_order_by_letters_needs_no_word(tmp_path) -> None:
+    words = {1: "a", 2: "b", 3: "c"}
+    assert not any("order" in said for said in spss(tmp_path / "a.sav", words).decisions)
