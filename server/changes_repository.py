@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import psycopg
 from sqlalchemy import text
 
-from server.db import Database
+from server.db import Database, kept_alive
 
 _CHANNEL = "palpebra_changes"
 
@@ -22,7 +22,8 @@ def heard_changes(database: Database, look_s: float) -> Iterator[int]:
 
     Where the connection is cut, or there is none, psycopg's error is raised.
     """
-    url = database.url.set(drivername="postgresql").render_as_string(hide_password=False)
+    address = kept_alive(database.url).set(drivername="postgresql")
+    url = address.render_as_string(hide_password=False)
     with psycopg.connect(url, autocommit=True) as connection:
         connection.execute(f"LISTEN {_CHANNEL}")
         yield 0

@@ -28,6 +28,15 @@ BUSY_TIMEOUT_S = 30
 """How long a command waits for a turn to write."""
 REQUEST_BUSY_S = 4
 """How long a request does: twice this, in the queue and at the file, is less than the 10 s pages wait."""
+ALIVE = {
+    "connect_timeout": "10",
+    "keepalives_idle": "20",
+    "keepalives_interval": "10",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "30000",
+}
+"""Of libpq: a PostgreSQL whose host went without a word is given up within a minute, not after two hours."""
+COUNTING_POOL = 2
 SQLITE_AWAY = frozenset(
     (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 )
@@ -67,8 +76,11 @@ class Database:
         self.engine, self.write_engine = (
             sqlite_engines(self.url, pool, busy_s, BUSY_TIMEOUT_S)
             if self.is_sqlite
-            else 2 * (_postgres_engine(url, pool),)
+            else 2 * (_postgres_engine(self.url, pool),)
         )
+        # Limits count while a transaction holds a connection of the pool: asked for a second one, a pool that
+        # is used up would have all wait for one another.
+        self.counting_engine = self.engine if self.is_sqlite else _postgres_engine(self.url, COUNTING_POOL)
         self.carried = dict(carried or {})
         # SQLite lets one writer in and makes the others poll; queueing them here keeps the wait short.
         self._writer = _Turns(busy_s) if self.is_sqlite else nullcontext()
@@ -133,6 +145,7 @@ class Database:
         """Close every pooled connection."""
         self.engine.dispose()
         self.write_engine.dispose()
+        self.counting_engine.dispose()
 
 
 class Writer:
@@ -233,9 +246,14 @@ def open_database(settings: Settings, busy_s: float = BUSY_TIMEOUT_S) -> Databas
     )
 
 
-def _postgres_engine(url: str, pool: int) -> Engine:
+def kept_alive(url: URL) -> URL:
+    """The address of a PostgreSQL whose silence is noticed soon; what it says of that itself goes first."""
+    return url.set(query={**ALIVE, **url.query})
+
+
+def _postgres_engine(url: URL, pool: int) -> Engine:
     return create_engine(
-        url,
+        kept_alive(url),
         pool_size=pool,
         max_overflow=pool,
         pool_timeout=BUSY_TIMEOUT_S,

@@ -1,10 +1,12 @@
 """Locks that PostgreSQL keeps for all processes of a server: each ends with the process that holds it.
 
 One connection of a process holds all of its locks, however many there are; another lets others see whether a
-lock is held. A host that goes without a word lets go of its locks within a minute.
+lock is held. A host that goes without a word lets go of its locks within a minute. Where PostgreSQL is
+started anew, the process notices within `HEARTBEAT_S` and takes its locks again.
 """
 
 import hashlib
+import logging
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,8 +14,10 @@ from contextlib import contextmanager
 from sqlalchemy import Connection, NullPool, create_engine, text
 from sqlalchemy.exc import DBAPIError
 
-from server.db import Database
+from server.db import Database, kept_alive
 
+LOG = logging.getLogger(__name__)
+HEARTBEAT_S = 5.0
 _ALIVE = "SET tcp_keepalives_idle = 20; SET tcp_keepalives_interval = 10; SET tcp_keepalives_count = 3"
 
 
@@ -27,11 +31,12 @@ class DatabaseLocks:
     def __init__(self, database: Database) -> None:
         self._database = database
         self._engine = create_engine(
-            database.url, poolclass=NullPool, isolation_level="AUTOCOMMIT", hide_parameters=True
+            kept_alive(database.url), poolclass=NullPool, isolation_level="AUTOCOMMIT", hide_parameters=True
         )
         self._changing = threading.Lock()
         self._held: set[int] = set()
         self._connection: Connection | None = None
+        self._let_all_go = threading.Event()
 
     @contextmanager
     def held(self, name: str) -> Iterator[None]:
@@ -48,6 +53,9 @@ class DatabaseLocks:
             if number in self._held or not self._taken(number):
                 raise LockTaken(name)
             self._held.add(number)
+            if len(self._held) == 1:
+                self._let_all_go = threading.Event()
+                threading.Thread(target=self._beat, args=(self._let_all_go,), daemon=True).start()
         try:
             yield
         finally:
@@ -75,12 +83,35 @@ class DatabaseLocks:
                 self._close()  # PostgreSQL was started anew: the locks went with the connection
         return False
 
+    def _beat(self, let_all_go: threading.Event) -> None:
+        """Look after the connection for as long as a lock is held."""
+        while not let_all_go.wait(HEARTBEAT_S):
+            with self._changing:
+                if let_all_go.is_set():
+                    return
+                try:
+                    self._open().exec_driver_sql("SELECT 1")
+                except DBAPIError:
+                    self._close()
+                    self._retake()
+
+    def _retake(self) -> None:
+        """Open another connection, which takes the locks again; the next beat tries it where this fails."""
+        try:
+            self._open()
+        except DBAPIError as error:
+            self._close()
+            LOG.warning("locks are not held: %s", type(error.orig).__name__)
+
     def _open(self) -> Connection:
         if self._connection is None:
             self._connection = self._engine.connect()
             self._connection.exec_driver_sql(_ALIVE)
             for number in self._held:
-                self._connection.execute(text("SELECT pg_try_advisory_lock(:number)"), {"number": number})
+                if not self._connection.scalar(
+                    text("SELECT pg_try_advisory_lock(:number)"), {"number": number}
+                ):
+                    LOG.error("a lock was lost while PostgreSQL was away: another process holds it now")
         return self._connection
 
     def _let_go(self, number: int) -> None:
@@ -91,6 +122,7 @@ class DatabaseLocks:
         except DBAPIError:
             self._close()
         if not self._held:
+            self._let_all_go.set()
             self._close()
 
     def _close(self) -> None:

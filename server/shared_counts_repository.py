@@ -58,7 +58,7 @@ class SharedCounts:
     """
 
     def __init__(self, database: Database, secret: Callable[[], bytes]) -> None:
-        self._database, self._secret = database, secret
+        self._engine, self._secret = database.counting_engine, secret
 
     def hit(self, what: str, share: float, number: int, window_s: float) -> float:
         """Take `number` from a share, refilled within `window_s`; return what was left before."""
@@ -71,7 +71,7 @@ class SharedCounts:
 
     def failures(self, what: str) -> tuple[int, float]:
         """How many failures there were, and how many seconds ago the last."""
-        with self._database.engine.connect() as connection:
+        with self._engine.connect() as connection:
             row = connection.execute(_FAILURES, {"key": self._hidden(what)}).one_or_none()
         return (0, 0.0) if row is None else (int(row[0]), float(row[1]))
 
@@ -80,7 +80,7 @@ class SharedCounts:
         self._run(_FORGET, {"key": self._hidden(what)})
 
     def _run(self, statement: Any, values: dict[str, Any]) -> Any:
-        with self._database.write_engine.begin() as connection:
+        with self._engine.begin() as connection:
             done = connection.execute(statement, values)
             given = done.scalar() if done.returns_rows else None
         if random.randrange(_SWEPT_ONE_IN) == 0:
@@ -90,7 +90,7 @@ class SharedCounts:
     def sweep(self) -> None:
         """Remove counts that are forgotten, and the oldest of too many; some at a time."""
         # In a transaction of its own, past rows in use: nobody waits for it who counts, and it for nobody.
-        with self._database.write_engine.begin() as connection:
+        with self._engine.begin() as connection:
             connection.execute(_SWEEP_OLD, {"forgotten": FORGOTTEN_S, "most": _SWEPT_AT_ONCE})
             connection.execute(_SWEEP_MANY, {"kept": KEYS_MAX, "most": _SWEPT_AT_ONCE})
 

@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 
 from experiments.counted import counted
 from server.context import Services
+from server.db import COUNTING_POOL
 from server.identities.repository import readable
 from server.migrate import current_revision, newest_revision
 from server.operations import repository
@@ -136,7 +137,7 @@ def _postgres(services: Services) -> Iterator[Finding]:
     advice = "" if apart else RAISE_THE_WALL
     said = "kept apart by PostgreSQL too" if apart else "kept apart by the server alone"
     yield Finding("laboratories' rows", "ok" if apart else "warning", said, advice)
-    needed = 2 * services.settings.database_pool
+    needed = 2 * (services.settings.database_pool + COUNTING_POOL) + 2  # locks, changes
     advice = f"a worker may use {needed}: raise max_connections or lower PALPEBRA_DATABASE_POOL"
     tight = needed + 5 > allowed
     yield Finding("connections", "warning" if tight else "ok", f"{allowed} allowed", advice if tight else "")

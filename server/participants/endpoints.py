@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from server.context import DatabaseDep, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.evidence.waiting import judge_waiting
-from server.participants import completion, form_answers, links, runs
+from server.participants import completion, form_answers, links, returning, runs
 from server.participants.next_trials import follow
 from server.participants.older_pages import finished_for_page
 from server.participants.schemas import (
@@ -66,6 +66,8 @@ async def start_run(
 ) -> RunStarted:
     """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
     await run_in_threadpool(services.run_starts.hit, hash_token(link_token))
+    if start.resume_code is not None:
+        await run_in_threadpool(returning.count_code, services, link_token, start.resume_code)
 
     def begin(connection: Connection) -> RunStarted:
         with Session(connection, expire_on_commit=False, info=services.database.carried) as session:

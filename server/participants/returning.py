@@ -25,6 +25,7 @@ from server.participants.refusals import (
 )
 from server.participants.schemas import RunStart
 from server.participants.signatures import is_of, is_signed
+from server.tokens import hash_token
 
 
 def name_of(link: Link, study: Study, identifier: str) -> str | None:
@@ -67,10 +68,17 @@ def _run_of_id(
     return None
 
 
+def count_code(services: Services, link_token: str, typed: str) -> None:
+    """Count that a resume code was tried; refused where too many were.
+
+    Before the transaction of the start, which may be tried again for the sake of others in its group. For
+    each visit, so that who guesses at one keeps nobody from another.
+    """
+    services.resume_codes.hit(f"{hash_token(link_token)}:{run_prefix(typed)}")
+
+
 def _run_of_code(services: Services, session: Session, link: Link, typed: str) -> StudyRun:
     prefix = run_prefix(typed)
-    # Counted for each visit, so that who guesses at one keeps nobody from another.
-    services.resume_codes.hit(f"{link.id}:{prefix}")
     runs = repository.runs_beginning(session, link, prefix) if prefix else ()
     run = next((run for run in runs if fits(services.settings.key, run.public_id, typed)), None)
     if run is None:

@@ -118,7 +118,7 @@ def _build(services: Services, name: str, public_id: str, order: NewReport) -> N
 def _export(services: Services, name: str, inputs: Path, order: NewReport) -> int:
     """Write the ratings, the runs and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
-    with services.database.read() as session:
+    with services.database.snapshot() as session:  # answers and runs are of one moment
         study = find_study(session, name, OPERATOR, "view")
         version = version_of_series(session, study, order.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")

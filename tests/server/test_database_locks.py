@@ -5,12 +5,18 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from typing import Any
 
+import psycopg
 import pytest
-from sqlalchemy import text
+from sqlalchemy import make_url, text
 
 from server.changes import Changes
+from server.changes_repository import heard_changes
 from server.context import Services
+from server.db import Database, kept_alive
 from server.errors import TooManyRequests
 from server.locks_repository import DatabaseLocks, LockTaken
 from server.rate_limit import RateLimit
@@ -43,6 +49,15 @@ def soon(holds: Callable[[], bool]) -> None:
     while not holds():
         assert time.monotonic() < until
         time.sleep(0.05)
+
+
+def cut_lines_of_locks(services: Services) -> None:
+    with services.database.write() as session:
+        cut = (
+            "SELECT pg_terminate_backend(pid) FROM pg_locks "
+            "WHERE locktype = 'advisory' AND pid <> pg_backend_pid()"
+        )
+        assert session.execute(text(cut)).all()
 
 
 def test_a_lock_is_held_against_other_processes_and_ones_own_threads(
@@ -83,16 +98,74 @@ def test_a_lock_ends_with_a_process_that_is_killed(
 def test_locks_are_taken_again_where_the_connection_was_cut(services: Services, locks: DatabaseLocks) -> None:
     other = DatabaseLocks(services.database)
     with locks.held("one"):
-        with services.database.write() as session:
-            cut = (
-                "SELECT pg_terminate_backend(pid) FROM pg_locks "
-                "WHERE locktype = 'advisory' AND pid <> pg_backend_pid()"
-            )
-            assert session.execute(text(cut)).all()
+        cut_lines_of_locks(services)
         soon(lambda: not other.is_held("one"))
         with locks.held("two"):
             assert other.is_held("one")
     assert not other.is_held("one")
+
+
+def test_locks_are_regained_without_being_asked(
+    services: Services,
+    locks: DatabaseLocks,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 0.2)
+    other = DatabaseLocks(services.database)
+    with locks.held("one"), locks.held("two"):
+        for _ in range(2):
+            cut_lines_of_locks(services)
+            soon(lambda: other.is_held("one") and other.is_held("two"))
+        assert "lost" not in caplog.text
+    assert not other.is_held("one")
+
+
+def test_a_lock_that_another_took_meanwhile_is_told_of(
+    services: Services,
+    locks: DatabaseLocks,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 1.0)
+    other = DatabaseLocks(services.database)
+    with locks.held("one"):
+        cut_lines_of_locks(services)
+        soon(lambda: not other.is_held("one"))
+        with other.held("one"):
+            soon(lambda: "another process holds it now" in caplog.text)
+
+
+def test_a_silent_host_is_noticed_by_every_line(
+    services: Services, locks: DatabaseLocks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = {"keepalives_idle": "20", "keepalives_interval": "10", "keepalives_count": "3"}
+    expected |= {"tcp_user_timeout": "30000"}
+    with closing(heard_changes(services.database, 0.1)) as listening, monkeypatch.context() as patched:
+        connect, lines = psycopg.connect, list[psycopg.Connection[Any]]()
+        patched.setattr("psycopg.connect", lambda *of, **by: lines.append(connect(*of, **by)) or lines[-1])
+        next(listening)
+        assert expected.items() <= lines[0].info.get_parameters().items()
+    for engine in (services.database.engine, services.database.counting_engine, locks._engine):
+        with engine.connect() as connection:
+            line = connection.connection.driver_connection
+            assert line is not None
+            assert expected.items() <= line.info.get_parameters().items()
+    by_hand = kept_alive(make_url("postgresql://me@host/name?keepalives_idle=7"))
+    assert by_hand.query["keepalives_idle"] == "7"
+
+
+def test_counting_needs_no_connection_of_a_pool_that_is_used_up(services: Services) -> None:
+    database = Database(services.database.url.render_as_string(hide_password=False), pool=1)
+    limit = RateLimit(3, name="x", shared=SharedCounts(database, lambda: b"key"))
+    try:
+        # Its one and its one more.
+        with database.engine.connect(), database.engine.connect(), ThreadPoolExecutor(8) as threads:
+            done = [threads.submit(limit.hit, f"key {number}") for number in range(8)]
+            for one in done:
+                one.result(timeout=PATIENCE_S)
+    finally:
+        database.close()
 
 
 def test_a_share_is_one_for_all_processes(services: Services) -> None:

@@ -99,6 +99,25 @@ def test_the_code_that_was_shown_resumes_on_another_device(
     assert other.start(query=QUERY, resume_code=shown).status_code == 200
 
 
+@pytest.mark.parametrize(
+    "database_url", [pytest.param("postgres", marks=pytest.mark.postgres)], indirect=True
+)
+def test_a_code_is_counted_before_the_transaction_of_a_start(
+    client: TestClient, link: str, victim: Participant, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted: list[str] = []
+
+    def looked_around(key: str) -> None:
+        with services.database.engine.connect() as connection:
+            connection.execute(text("SELECT id FROM studies FOR UPDATE NOWAIT"))
+        counted.append(key)
+
+    monkeypatch.setattr(services.resume_codes, "hit", looked_around)
+    shown = victim.state()["resume_code"]
+    assert Participant(client, link).start(query=QUERY, resume_code=shown).status_code == 200
+    assert len(counted) == 1
+
+
 def test_a_resume_code_works_where_the_recruiter_names_nobody(
     client: TestClient, study: StudyInDatabase, participant: Participant
 ) -> None:

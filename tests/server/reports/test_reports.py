@@ -1,9 +1,16 @@
 import re
 import time
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 
+from server.context import Services
+from server.models import StudyRun
+from server.reports import service
+from server.reports.schemas import NewReport
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -55,3 +62,22 @@ def test_a_report_on_no_data_fails_with_a_reason(experimenter: Admin, study: Stu
 
 def test_only_files_of_the_report_are_served(experimenter: Admin, study: StudyInDatabase) -> None:
     assert experimenter.get("/studies/short/reports/x/..%2Fsecret_key").status_code == 404
+
+
+def test_answers_and_runs_of_a_report_are_of_one_moment(
+    client: TestClient, participant: Participant, services: Services, study: StudyInDatabase, tmp_path: Path
+) -> None:
+    participant.agree().rate_all()
+    written = service.runs_csv
+
+    def after_another_began(*of: Any) -> Iterator[bytes]:
+        Participant(client, study.link_token).start()
+        return written(*of)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(service, "runs_csv", after_another_began)
+        service._export(services, study.name, tmp_path / "inputs", NewReport())
+    lines = (tmp_path / "inputs" / "runs.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 2
+    with services.database.read() as session:
+        assert session.query(StudyRun).count() == 2
