@@ -66,7 +66,12 @@ PLAYBACK: tuple[Column, ...] = (
 
 SCREEN: tuple[Column, ...] = (
     Column(
-        "refresh_rate_hz", "number", "Measured refresh rate of the screen.", unit="Hz", minimum=0, source="t"
+        "refresh_rate_hz",
+        "number",
+        "Measured refresh rate of the screen; where the play itself saw a faster one, that one.",
+        unit="Hz",
+        minimum=0,
+        source="t",
     ),
     Column("device_pixel_ratio", "number", "Device pixels per CSS pixel.", minimum=0, source="t"),
     Column(

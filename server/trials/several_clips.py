@@ -54,7 +54,9 @@ def judge_several(
         return "failed", "wrong_clip"
     first = next(iter(assigned.values()))
     playback = replace(playback_of(rating.playback), clip_sha256=first.sha256)
-    ruling = judge(rules, playback, first.sha256, frames, first.fps, rated=rating.answer.given)
+    # The fastest's frames stay for the shortest time, and the clock is known of all clips together.
+    fps = max(clip.fps for clip in assigned.values())
+    ruling = judge(rules, playback, first.sha256, frames, fps, rated=rating.answer.given)
     counted = {role: one.frames_drawn + one.frames_missing for role, one in shown.items()}
     if ruling[0] != "good" or counted == {role: clip.frames for role, clip in assigned.items()}:
         return ruling

@@ -19,6 +19,8 @@ INTERRUPTED = "interrupted"
 ASSUMED_REFRESH_HZ = 60.0
 SLACK_SHARE = 0.7
 """Share of a frame's slack that the clock may be uneven by, by `make scope` (decisions 0351, 0789)."""
+SHOWN_SHARE = 0.9
+"""Of the time for which a frame stays: one that came later was not seen, whatever was declared."""
 ROUNDING = 0.05
 """60 fps on a screen of 59.9 Hz counts as one refresh a frame."""
 
@@ -133,8 +135,7 @@ def _uncertain(rules: PlaybackRules, playback: Playback, fps: float) -> str:
     unevenness_ms = _unevenness_ms(playback)
     if unevenness_ms is None:
         return "no_clock_record"
-    allowed_ms = rules.uncertain_unevenness_ms
-    limit_ms = allowed_ms + SLACK_SHARE * max(0.0, _slack_ms(playback.refresh_rate_hz, fps, allowed_ms))
+    limit_ms = _limit_ms(rules.uncertain_unevenness_ms, playback.refresh_rate_hz, fps)
     return "uncertain_unevenness_ms" if unevenness_ms > limit_ms else ""
 
 
@@ -145,6 +146,16 @@ def _unevenness_ms(playback: Playback) -> float | None:
     return max(playback.clock_gap_ms - _refresh_ms(playback.refresh_rate_hz), playback.clock_late_ms)
 
 
+def _limit_ms(allowed_ms: float, refresh_rate_hz: float | None, fps: float) -> float:
+    """How late a frame may be drawn and is still seen: what is allowed to every frame, and most of the slack.
+
+    On screens of more than some 220 Hz the allowed time alone may be longer than the frame stays.
+    """
+    slack_ms = _slack_ms(refresh_rate_hz, fps, allowed_ms)
+    stays_ms = max(1, _refreshes(refresh_rate_hz, fps)) * _refresh_ms(refresh_rate_hz)
+    return min(allowed_ms + SLACK_SHARE * max(0.0, slack_ms), SHOWN_SHARE * stays_ms)
+
+
 def _slack_ms(refresh_rate_hz: float | None, fps: float, allowed_ms: float) -> float:
     """How much later than allowed to every frame one may be drawn and is still seen.
 
@@ -153,10 +164,14 @@ def _slack_ms(refresh_rate_hz: float | None, fps: float, allowed_ms: float) -> f
     shown (decision 0789). A rate that was not measured leaves nothing: the screen may be a faster one.
     """
     refresh_ms = _refresh_ms(refresh_rate_hz)
-    refreshes = int(1000 / fps / refresh_ms + ROUNDING)
+    refreshes = _refreshes(refresh_rate_hz, fps)
     if refreshes > 1:
         return (refreshes - 1) * refresh_ms
     return 0.0 if refresh_rate_hz is None else refresh_ms - allowed_ms
+
+
+def _refreshes(refresh_rate_hz: float | None, fps: float) -> int:
+    return int(1000 / fps / _refresh_ms(refresh_rate_hz) + ROUNDING)
 
 
 def _refresh_ms(refresh_rate_hz: float | None) -> float:

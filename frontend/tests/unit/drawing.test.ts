@@ -75,10 +75,30 @@ describe("the way to the screen", () => {
     expect(refreshes.slice(6)).toEqual(["frame 0", "nothing", "frame 1", "frame 2", "nothing"]);
   });
 
+  it("puts Firefox's pictures off by a third of that screen's refresh too", async () => {
+    const scope = await workerIn("Firefox/153.0");
+    const refreshes = Array.from({ length: 11 }, () => scope.refresh(4, 10).later[0] ?? "nothing");
+    expect(refreshes.slice(6)).toEqual(["frame 0", "nothing", "frame 1", "frame 2", "nothing"]);
+  });
+
   it("gets Firefox's pictures a third of a refresh later, when the one before has been taken", async () => {
     const scope = await workerIn("Firefox/153.0");
     const refreshes = Array.from({ length: 9 }, () => scope.refresh(5));
     expect(refreshes.at(-1)).toEqual({ at_once: [], later: ["frame 2"] });
+  });
+
+  it("loses no refresh in Firefox where a timer comes later than the next one", async () => {
+    const scope = await workerIn("Firefox/153.0");
+    for (let count = 0; count < 7; count += 1) scope.refresh(8);
+    const timer = setTimeout;
+    const late = (run: () => void, wait_ms: number): unknown => timer(run, wait_ms + 14);
+    vi.stubGlobal("setTimeout", late);
+    scope.refresh(8);
+    vi.stubGlobal("setTimeout", timer);
+    for (let count = 0; count < FRAMES; count += 1) scope.refresh(8);
+    const played = scope.messages.at(-1) as FromWorker & { type: "played" };
+    expect(played.drawn.map(([index]) => index)).toEqual([0, 1, 2, 3, 4]);
+    expect(played.clock_late_ms).toBeCloseTo(19, 0);
   });
 
   it.each([

@@ -113,6 +113,30 @@ describe("playback record", () => {
     expect(record).toMatchObject({ frames_drawn: 2, frames_missing: 1, frames_late: 1, longest_gap_ms: 100 });
   });
 
+  it.each([59, 59.94, 60])("calls no frame late that had its refresh of %f Hz where the rate was not measured", (rate) => {
+    const drawn = all(120).map((index): [number, number] => [index, 1_010 + (index * 1000) / rate]);
+    const play = showing(drawn, { frames: 120, fps: 60, refresh_ms: 1000 / rate });
+    const record = playbackRecord("ab", [play], { ...screen, refresh_rate_hz: null });
+    expect(record).toMatchObject({ frames_late: 0, frames_missing: 0, refresh_rate_hz: null });
+  });
+
+  it("counts frames as late by the screen's refresh where a loaded page saw fewer of them", () => {
+    const drawn = all(60).map((index): [number, number] => [index, 1_010 + (index * 1000) / 30 + (index > 30 ? 25 : 0)]);
+    const record = playbackRecord("ab", [showing(drawn, { frames: 60, refresh_ms: 1000 / 30 })], screen);
+    expect(record.frames_late).toBe(29);
+  });
+
+  it("tells the rate of the screen that it was seen on, where that is faster than was measured", () => {
+    const drawn = all(3).map((index): [number, number] => [index, 1_010 + index * 33.3]);
+    const rateOf = (...seen_ms: (number | null)[]): number | null =>
+      playbackRecord(
+        "ab",
+        seen_ms.map((refresh_ms) => showing(drawn, { refresh_ms })),
+        screen,
+      ).refresh_rate_hz;
+    expect([rateOf(1000 / 144), rateOf(16.7), rateOf(33.3), rateOf(null), rateOf(16.7, 1000 / 120)]).toEqual([144, 60, 60, 60, 120]);
+  });
+
   it("adds up the views of a trial, the worst method counting", () => {
     const views = [
       showing([

@@ -4,7 +4,7 @@ import { aTrial } from "./a-trial";
 import { luminance } from "../../src/participant/flow/appearance";
 import { findings, lackOfRoom, type Abilities, type Measures } from "../../src/participant/flow/gates";
 import { owed, Replays } from "../../src/participant/flow/replays";
-import { refreshRate } from "../../src/participant/screen/refresh-rate";
+import { refreshRate, untilMeasured } from "../../src/participant/screen/refresh-rate";
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
 import { deviation, randomStart, settled, spreadPercent } from "../../src/participant/calibration/spread";
 import { distanceFrom } from "../../src/participant/calibration/distance";
@@ -59,6 +59,42 @@ describe("actual size", () => {
     const stamps = Array.from({ length: 61 }, (_, n) => (n * 1000) / 144 + (n === 30 ? 4 : 0));
     expect(refreshRate(stamps)).toBeCloseTo(144, 0);
     expect(refreshRate([1, 2, 3])).toBeNull();
+  });
+});
+
+describe("the refresh rate of a page that nobody looked at", () => {
+  it("is measured again each time the page is looked at, until it is known or the run is over", async () => {
+    const page = Object.assign(new EventTarget(), { visibilityState: "visible" });
+    const look = async (state: string): Promise<void> => {
+      page.visibilityState = state;
+      page.dispatchEvent(new Event("visibilitychange"));
+      await Promise.resolve();
+    };
+    const rates = [null, null, 59.9, 120];
+    const told: (number | null)[] = [];
+    const over = new AbortController();
+    const measure = (): Promise<number | null> => Promise.resolve(rates.shift() ?? null);
+    const measured = untilMeasured(page as unknown as Document, (rate) => told.push(rate), over.signal, measure);
+    for (const state of ["hidden", "visible", "hidden", "visible", "visible", "hidden", "visible"]) {
+      await new Promise((resolve) => setTimeout(resolve));
+      await look(state);
+    }
+    await measured;
+    expect([told, rates]).toEqual([[null, null, 59.9], [120]]);
+  });
+
+  it("stays unknown where the run is over before that", async () => {
+    const over = new AbortController();
+    const told: (number | null)[] = [];
+    const measured = untilMeasured(
+      new EventTarget() as Document,
+      (rate) => told.push(rate),
+      over.signal,
+      () => Promise.resolve(null),
+    );
+    over.abort();
+    await measured;
+    expect(told).toEqual([]);
   });
 });
 

@@ -127,6 +127,9 @@ def test_only_failed_main_plays_are_repeated(kind: str, play: int, verdict: str,
     (50, 60.0, 13, "uncertain"), (60, 60.0, 13, "uncertain"), (60, None, 4, "uncertain"),
     (60, 144.0, 7.5, "good"), (60, 144.0, 8, "uncertain"),
     (120, 120.0, 6.5, "good"), (120, 120.0, 7, "uncertain"), (480, 480.0, 3.5, "uncertain"),
+    (240, 240.0, 3.7, "good"), (240, 240.0, 4, "uncertain"),
+    (480, 480.0, 1.8, "good"), (480, 480.0, 2, "uncertain"),
+    (240, 480.0, 3.7, "good"), (240, 480.0, 3.8, "uncertain"), (60, 480.0, 13, "good"),
 ])  # fmt: skip
 def test_a_frame_may_come_late_within_its_only_refresh_or_by_the_others(
     fps, refresh_rate_hz, late_ms, verdict

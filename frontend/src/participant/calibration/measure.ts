@@ -2,7 +2,7 @@
 import type { CalibrationState, TrialInfo } from "../../api/schema";
 import { h } from "../../ui/element";
 import { showPage, statusLine, alertLine } from "../../ui/page";
-import { measureRefreshRate } from "../screen/refresh-rate";
+import { untilMeasured } from "../screen/refresh-rate";
 import { calibrationBody, clipWidth, type Distance, isPlausible, type Measured, NO_DISTANCE } from "../screen/size";
 import { choose, noDevice, saveShown, screenOut, stopButton } from "../screens/support";
 import type { Session } from "../session";
@@ -79,7 +79,7 @@ export async function calibrate(session: Session, display: HTMLElement, eyebrow:
   if (occasion === "screen_changed") {
     await tell(session, display, "screen_changed_title", session.t("screen_changed"));
     // Beside the card, which takes longer: the other screen may refresh at another rate.
-    void measureRefreshRate().then((rate) => (session.screen.refresh_rate_hz = rate));
+    void untilMeasured(document, (rate) => (session.screen.refresh_rate_hz = rate), session.over.signal);
   }
   const measured = await measureUntilItFits(session, display, eyebrow);
   if (!measured) return { px_per_mm: null, method: "", checked: false };

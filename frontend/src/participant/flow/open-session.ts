@@ -8,7 +8,7 @@ import type { OutboxItem } from "../outbox/store";
 import { hasWebCodecs } from "../playback/choose";
 import type { ClipPlayer } from "../playback/player";
 import { ClipCache } from "../preload/clip-cache";
-import { measureRefreshRate } from "../screen/refresh-rate";
+import { untilMeasured } from "../screen/refresh-rate";
 import { RunClock } from "../screen/run-clock";
 import { ScreenState } from "../screen/screen-state";
 import { counted, RunApi, type Session } from "../session";
@@ -71,11 +71,17 @@ export function openSession({ root, link, run, kind, checks, player, outbox, uns
 }
 
 /** Measure the refresh rate, and tell the server what it deals with. */
-export async function describeDevice(session: Session, storage: boolean): Promise<void> {
-  session.screen.refresh_rate_hz = await measureRefreshRate();
-  // A simulated visit may be over by now.
-  if (session.completion || session.over.signal.aborted) return;
-  await session.api.device({
+export function describeDevice(session: Session, storage: boolean): Promise<void> {
+  const tell = (rate: number | null): void => {
+    session.screen.refresh_rate_hz = rate;
+    // A simulated visit may be over by now.
+    if (!session.completion) void sendDevice(session, storage);
+  };
+  return untilMeasured(document, tell, session.over.signal);
+}
+
+function sendDevice(session: Session, storage: boolean): Promise<unknown> {
+  return session.api.device({
     refresh_rate_hz: session.screen.refresh_rate_hz,
     user_agent: navigator.userAgent,
     webcodecs: hasWebCodecs(),

@@ -1,6 +1,6 @@
 /** From the frames that were drawn to the figures stored with the rating. */
 import type { PlaybackLog } from "../../api/schema";
-import { shownPeriod } from "./schedule";
+import { shownPeriod, trueRefresh } from "./schedule";
 
 /** Every key of the server's log, with the list of drawn frames. */
 export type PlaybackRecord = Required<PlaybackLog> & { drawn: NonNullable<PlaybackLog["drawn"]> };
@@ -24,7 +24,7 @@ export interface Showing {
   disturbances: Record<string, number>;
   /** Smallest share of the clip inside the window. */
   visible_share: number;
-  /** Median time between refreshes meanwhile; null where it could not be seen. */
+  /** Mean time between refreshes meanwhile, those missed left out; null where it could not be seen. */
   refresh_ms: number | null;
 }
 
@@ -39,7 +39,7 @@ const JITTER_MS = 2;
 
 /** The record of all showings of a trial: counts are totals, `drawn` counts from each showing's start key. */
 export function playbackRecord(clip_sha256: string | null, showings: Showing[], screen: Screen): PlaybackRecord {
-  const refresh_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : ASSUMED_REFRESH_MS;
+  const believed_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : ASSUMED_REFRESH_MS;
   const first = showings[0];
   const first_drawn = first?.drawn[0];
   const gaps = showings.flatMap((showing) => gapsOf(showing.drawn));
@@ -49,7 +49,7 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
     clips: null,
     key_to_first_frame_ms: first && first_drawn ? round(first_drawn[1] - first.key_at_ms) : null,
     frames_drawn: sum(showings.map((showing) => distinct(showing.drawn))),
-    frames_late: sum(showings.map((showing) => late(showing, refresh_ms))),
+    frames_late: sum(showings.map((showing) => late(showing, believed_ms))),
     frames_missing: sum(showings.map((showing) => Math.max(0, showing.frames - distinct(showing.drawn)))),
     longest_gap_ms: gaps.length ? round(Math.max(...gaps)) : null,
     clock_gap_ms: greatest(showings.map((showing) => showing.clock_gap_ms)),
@@ -58,6 +58,7 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
     focus_lost: sum(showings.map((showing) => showing.focus_lost)),
     disturbances: disturbancesOf(showings),
     ...screen,
+    refresh_rate_hz: rateShownAt(showings, screen.refresh_rate_hz),
     drawn: showings.flatMap(({ drawn, key_at_ms }) => drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),
   };
 }
@@ -71,12 +72,23 @@ export function disturbancesOf(showings: readonly Pick<Showing, "disturbances">[
   return total;
 }
 
-/** Frames drawn more than a refresh away from their time; early ones too, as where a screen is faster than it was measured. */
-function late({ drawn, fps }: Showing, refresh_ms: number): number {
+/** As measured, or that of the fastest showing where the screen is faster than was believed; what is not known stays so. */
+function rateShownAt(showings: readonly Showing[], measured_hz: number | null): number | null {
+  if (!measured_hz) return null;
+  const shortest_ms = Math.min(...showings.map((showing) => trueRefresh(showing.refresh_ms, 1000 / measured_hz)));
+  return shortest_ms < 1000 / measured_hz ? Math.round(10_000 / shortest_ms) / 10 : measured_hz;
+}
+
+/**
+ * Frames drawn more than a refresh away from their time; early ones too, as where a clip ran fast. The refresh is that seen
+ * meanwhile; where it is longer than was believed, as on a page that missed some, no frame may be later for that.
+ */
+function late({ drawn, fps, refresh_ms }: Showing, believed_ms: number): number {
   const start = drawn[0];
   if (!start) return 0;
-  const due = (index: number): number => start[1] + (index - start[0]) * shownPeriod(1000 / fps, refresh_ms);
-  return drawn.filter(([index, at_ms]) => Math.abs(at_ms - due(index)) > refresh_ms + JITTER_MS).length;
+  const period_ms = shownPeriod(1000 / fps, refresh_ms ?? believed_ms);
+  const allowed_ms = Math.min(refresh_ms ?? believed_ms, believed_ms) + JITTER_MS;
+  return drawn.filter(([index, at_ms]) => Math.abs(at_ms - start[1] - (index - start[0]) * period_ms) > allowed_ms).length;
 }
 
 function gapsOf(drawn: Showing["drawn"]): number[] {

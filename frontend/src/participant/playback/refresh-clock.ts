@@ -12,9 +12,11 @@ export class RefreshClock {
     private readonly request: (callback: (now: number) => void) => unknown,
     private readonly now_ms: () => number,
     private readonly origin_ms: number,
+    /** Puts off what is done at a refresh; the next one is asked for at once, so that a late timer skips none. */
+    private readonly putOff: (run: () => void) => unknown = (run) => run(),
   ) {}
 
-  /** Refreshes since the clock was started. */
+  /** Refreshes since the clock was started, up to the one whose job runs. */
   get refreshes(): number {
     return this.count;
   }
@@ -37,9 +39,13 @@ export class RefreshClock {
       this.going = false;
       return;
     }
-    this.count += 1;
     this.request((next) => this.tick(next));
-    this.job(this.origin_ms + now, this.now_ms());
+    this.putOff(() => this.run(now));
+  }
+
+  private run(now: number): void {
+    this.count += 1;
+    this.job?.(this.origin_ms + now, this.now_ms());
   }
 }
 
@@ -49,7 +55,7 @@ export interface Evenness {
   clock_gap_ms: number;
   /** Longest time by which a callback ran after the refresh it was for. */
   clock_late_ms: number;
-  /** Median time between two refreshes; null with fewer than two. */
+  /** Mean time between two refreshes that followed one another; null with fewer than two. */
   refresh_ms: number | null;
 }
 
@@ -67,8 +73,15 @@ export class EvennessMeter {
   }
 
   read(): Evenness {
-    const periods = this.refreshes_ms.slice(1).map((at_ms, index) => at_ms - (this.refreshes_ms[index] ?? at_ms));
-    const refresh_ms = periods.sort((a, b) => a - b)[Math.floor(periods.length / 2)] ?? null;
-    return { clock_gap_ms: this.gap_ms, clock_late_ms: this.late_ms, refresh_ms };
+    return { clock_gap_ms: this.gap_ms, clock_late_ms: this.late_ms, refresh_ms: meanGap(this.refreshes_ms) };
   }
+}
+
+/** Mean time between refreshes, those missed left out: stamps may be rounded to a millisecond, so that it tells more than the median. */
+export function meanGap(stamps: readonly number[]): number | null {
+  const gaps = stamps.slice(1).map((stamp, index) => stamp - (stamps[index] ?? stamp));
+  const median = [...gaps].sort((a, b) => a - b)[Math.floor(gaps.length / 2)];
+  if (!median) return null;
+  const regular = gaps.filter((gap) => Math.abs(gap - median) < median / 4);
+  return regular.reduce((total, gap) => total + gap, 0) / regular.length;
 }

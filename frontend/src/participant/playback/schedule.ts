@@ -13,6 +13,14 @@
 const LOCKED_WITHIN = 0.03;
 const ROUNDING = 1e-6;
 
+/** Refreshes that follow one another within less than this share of the time believed are those of a faster screen. */
+const FASTER = 0.85;
+
+/** The time between refreshes to go by: that which was seen, where the screen is faster than was believed. */
+export function trueRefresh(seen_ms: number | null, believed_ms: number): number {
+  return seen_ms !== null && seen_ms < FASTER * believed_ms ? seen_ms : believed_ms;
+}
+
 /** The time a frame is shown for on a screen with that time between refreshes. */
 export function shownPeriod(declared_period_ms: number, refresh_ms: number): number {
   const locked_ms = Math.max(1, Math.round(declared_period_ms / refresh_ms)) * refresh_ms;

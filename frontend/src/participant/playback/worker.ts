@@ -7,7 +7,7 @@ import { decodeClip } from "./decode";
 import type { Part } from "./player";
 import { absoluteNow, type FromWorker, type Started, type ToWorker } from "./protocol";
 import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
-import { FrameSchedule } from "./schedule";
+import { FrameSchedule, trueRefresh } from "./schedule";
 import type { drawSyncPatch } from "./sync-patch";
 
 interface Scope {
@@ -21,15 +21,12 @@ const scope = self as unknown as Scope;
 const WARM_REFRESHES = 4;
 /** Refreshes after those in which nothing is painted: a picture more on its way would be one that is lost when the way gets shorter. */
 const REST_REFRESHES = 2;
-/** Refreshes that follow one another within less than this share of the time believed are those of a faster screen. */
-const FASTER = 0.85;
 /** Firefox takes a picture shortly after the refresh, where one drawn at once may have taken the place of the one before. */
 const DRAWS_AFTER = navigator.userAgent.includes("Firefox") ? 1 / 3 : 0;
 /** The same in ms: it is a share of the time between refreshes. */
 let draw_after_ms = 0;
-const request = (callback: (now: number) => void): unknown =>
-  scope.requestAnimationFrame(draw_after_ms ? (now) => setTimeout(callback, draw_after_ms, now) : callback);
-const clock = new RefreshClock(request, absoluteNow, performance.timeOrigin);
+const putOff = (run: () => void): unknown => (draw_after_ms ? setTimeout(run, draw_after_ms) : run());
+const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callback), absoluteNow, performance.timeOrigin, putOff);
 
 const clips = new Map<string, SingleClip | Composed>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
@@ -122,10 +119,12 @@ function begin(sha256: string, clip: SingleClip | Composed, refresh_ms: number, 
     if (absoluteNow() < until || clock.refreshes <= WARM_REFRESHES) {
       blank();
       if (fixation_ms > 0) cross();
-    } else if (rest-- <= 0) {
+    } else {
       // Refreshes are counted: a screen faster than believed would show the clip too fast.
-      const seen_ms = waited.read().refresh_ms ?? refresh_ms;
-      const show = showing(sha256, clip, seen_ms < FASTER * refresh_ms ? seen_ms : refresh_ms);
+      const true_ms = trueRefresh(waited.read().refresh_ms, refresh_ms);
+      if (rest === REST_REFRESHES) draw_after_ms = Math.floor(DRAWS_AFTER * true_ms);
+      if (rest-- > 0) return;
+      const show = showing(sha256, clip, true_ms);
       clock.start(show);
       show(refresh_at_ms, ran_at_ms);
     }
