@@ -41,11 +41,18 @@ class Problem:
 
 
 class DefinitionError(InputError):
-    """A definition cannot be used; `problems` lists every reason, the message is the first."""
+    """A definition cannot be used; `problems` lists the reasons, the message is the first.
 
-    def __init__(self, source: str, problems: Sequence[Problem]) -> None:
+    Parameters
+    ----------
+    number : int, optional
+        How many reasons there are, where not all are listed.
+    """
+
+    def __init__(self, source: str, problems: Sequence[Problem], number: int | None = None) -> None:
         self.problems = tuple(problems)
-        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        others = (number or len(problems)) - 1
+        more = f" (and {others} more)" if others else ""
         super().__init__(f"{source}: {problems[0]}{more}")
 
 
@@ -76,9 +83,20 @@ def locate(name_or_path: str) -> Path:
     raise InputError(f"no experiment '{name_or_path}'{near}{path_too}")
 
 
+MAX_PROBLEMS = 100
+"""Reasons that are listed; a text can hold a hundred thousand unknown keys."""
 MAX_DEPTH = 32
 """Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
 TOO_DEEP = "not valid TOML: lists or tables are nested too deeply"
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DOTTED = re.compile(rf"{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*+")
+MAX_DOTS = 500
+"""In one key, written or quoted in a text; the time to read one grows with their square."""
+
+
+def has_endless_key(text: str) -> bool:
+    """Whether the text has a dotted key that takes seconds to read; asked before any reader gets it."""
+    return any(key[0].count(".") > MAX_DOTS for key in _DOTTED.finditer(text))
 
 
 def parse_experiment(text: str, source: str = "definition", *, has_data: bool = False) -> Experiment:
@@ -89,6 +107,8 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
     has_data : bool
         Of data that were collected by it: what an earlier version took, such as a number in quotes, still is.
     """
+    if has_endless_key(text):
+        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -114,8 +134,8 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         # A misspelt key is also a missing one: name the misspelling first.
         causes = (detail for detail in error.errors() if not is_follower(detail))
         details = sorted(causes, key=lambda detail: detail["type"] == "missing")
-        problems = [_problem(detail, text) for detail in details]
-        raise DefinitionError(source, problems) from error
+        problems = [_problem(detail, text) for detail in details[:MAX_PROBLEMS]]
+        raise DefinitionError(source, problems, len(details)) from error
 
 
 def _is_deeper(data: Any, depth: int) -> bool:

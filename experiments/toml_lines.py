@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
 _STRING_OR_COMMENT = re.compile(
@@ -27,6 +28,7 @@ def line_of(text: str, location: Sequence[object]) -> int | None:
     return None
 
 
+@lru_cache(maxsize=1)
 def _places(text: str) -> dict[tuple[object, ...], int]:
     places: dict[tuple[object, ...], int] = {}
     counts: dict[tuple[object, ...], int] = {}

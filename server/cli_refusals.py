@@ -2,8 +2,10 @@
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
+from sqlalchemy.exc import DBAPIError
 
 from experiments.wrong_values import wrong_value
+from server.db import is_away, is_busy
 from server.errors import ApiError
 from server.settings import Settings
 
@@ -14,6 +16,11 @@ def refusal(error: Exception) -> str | None:
         return error.message
     if isinstance(error, ValidationError) and error.title == Settings.__name__:
         return "; ".join(map(_setting, error.errors()))
+    if is_busy(error):
+        return "another program keeps the database locked: end it, or try again when it is done"
+    if isinstance(error, DBAPIError) and is_away(error):
+        said = str(error.orig).strip().splitlines() or ["it does not answer"]
+        return f"the database is away ({said[0]}); see DATABASE_URL, then run: server doctor"
     return None
 
 

@@ -5,15 +5,24 @@ and every migration that touches a table would meet them. Each upgrade takes the
 """
 
 import hashlib
+import logging
 from collections.abc import Iterator
 
 from sqlalchemy import Connection, inspect, text
 from sqlalchemy.exc import DBAPIError
 
+from experiments.errors import InputError
 from experiments.trials import views
 from server.models import Base
 from server.row_security_repository import ACCOUNT, ROLE
 
+LOG = logging.getLogger(__name__)
+NO_RIGHT = "42501"
+"""PostgreSQL's code where a user may not do what was asked."""
+OWN_TABLES = (
+    "let the user of DATABASE_URL own its tables and views (ALTER TABLE ... OWNER TO, or REASSIGN OWNED), "
+    "then run: server database upgrade"
+)
 OLDEST_POSTGRES = 150_000
 """Before, a view always reads as its owner, and all rows."""
 NOT_OF_A_STUDY = frozenset(
@@ -81,10 +90,25 @@ def raise_wall(connection: Connection) -> bool:
     mark = hashlib.sha256("\n".join(statements).encode()).hexdigest()
     if _mark(connection) == mark and _is_whole(connection):
         return True
-    take_down_wall(connection)
-    for statement in statements:
-        connection.exec_driver_sql(statement)
-    connection.exec_driver_sql(f"COMMENT ON FUNCTION palpebra_account() IS '{mark}'")
+    statements.append(f"COMMENT ON FUNCTION palpebra_account() IS '{mark}'")
+    return _raised(connection, statements)
+
+
+def _raised(connection: Connection, statements: list[str]) -> bool:
+    """Whether the statements could be carried out, all or none; a wall of before is not left half-built."""
+    try:
+        with connection.begin_nested():
+            take_down_wall(connection)
+            for statement in statements:
+                connection.exec_driver_sql(statement)
+    except DBAPIError as error:
+        if getattr(error.orig, "sqlstate", None) != NO_RIGHT:
+            raise
+        said = str(error.orig).splitlines()[0]
+        if _mark(connection) is not None:
+            raise InputError(f"rows are kept apart as by an earlier version: {said}; {OWN_TABLES}") from error
+        LOG.warning("rows are not kept apart by PostgreSQL: %s; %s", said, OWN_TABLES)
+        return False
     return True
 
 
@@ -96,7 +120,8 @@ def _statements(schema: str, sequences: list[str]) -> Iterator[str]:
         )
     yield f"GRANT USAGE ON SCHEMA {schema} TO {ROLE}"
     yield f"GRANT SELECT, INSERT, UPDATE, DELETE ON {', '.join(Base.metadata.tables)} TO {ROLE}"
-    yield f"GRANT USAGE ON SEQUENCE {', '.join(sequences)} TO {ROLE}"
+    if sequences:  # none are a user's who does not own the tables
+        yield f"GRANT USAGE ON SEQUENCE {', '.join(sequences)} TO {ROLE}"
     for view in views():
         yield f"ALTER VIEW {view.name} SET (security_invoker = true)"
         yield f"GRANT SELECT ON {view.name} TO {ROLE}"

@@ -88,13 +88,20 @@ def data_dictionary() -> str:
 def setting_row(name: str, field: Any) -> tuple[str, ...]:
     """One setting."""
     variable = "DATABASE_URL" if name == "database_url" else f"PALPEBRA_{name.upper()}"
-    default = "" if field.default is PydanticUndefined else field.default
+    default = "" if field.default in (PydanticUndefined, None) else field.default
     if isinstance(default, Path):
         default = default.relative_to(ROOT) if default.is_absolute() else default
     if get_origin(field.annotation) is dict:
         return f"`{variable}__NAME__KEY`", "table", "none", field.description
-    kind = " or ".join(map(str, get_args(field.annotation))) or field.annotation.__name__
+    kind = " or ".join(map(_told, get_args(field.annotation))) or field.annotation.__name__
     return f"`{variable}`", kind, f"`{default}`" if default != "" else "empty", field.description
+
+
+def _told(kind: Any) -> str:
+    """A type, or one of the words allowed, as a person reads it."""
+    if kind is type(None):
+        return "empty"
+    return kind.__name__ if isinstance(kind, type) else str(kind)
 
 
 def settings_reference() -> str:

@@ -20,6 +20,7 @@ from server.operations import repository
 from server.operations.backup_checks import backups, snapshots
 from server.operations.findings import Finding
 from server.operations.modes import open_to_others, own_folders
+from server.operations.shared_checks import connection_pool, ledger
 from server.row_policies_repository import OLDEST_POSTGRES as OLDEST_WITH_WALL
 from server.row_security_repository import ROLE
 from server.tallies.recount import Recount
@@ -230,6 +231,8 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     file_modes,
     secret_key,
     database,
+    connection_pool,
+    ledger,
     counts,
     identities,
     clips,

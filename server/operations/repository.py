@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sqlalchemy import Connection, func, select, text
+from sqlalchemy import Connection, Engine, func, select, text
 from sqlalchemy.orm import Session
 
 from server.models import Account, Clip, Study, StudyRun
@@ -68,3 +68,17 @@ def sqlite_complaint(session: Session) -> str:
 def postgres_setting(session: Session, name: str) -> str:
     """A setting of the PostgreSQL server."""
     return str(session.scalar(text(f"SHOW {name}")))
+
+
+def session_is_kept(engine: Engine) -> bool:
+    """Whether a session of PostgreSQL has the same process behind it in each of its transactions.
+
+    A pool in transaction mode hands the process that a transaction left to the next one who asks; here
+    that is a second connection, which keeps it while the first asks again.
+    """
+    process = text("SELECT pg_backend_pid()")
+    with engine.connect() as first, engine.connect() as second:
+        before = first.scalar(process)
+        first.commit()
+        second.scalar(process)
+        return bool(first.scalar(process) == before)

@@ -8,7 +8,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
-from server.context import DatabaseDep, ServicesDep
+from server.context import DatabaseDep, Services, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.evidence.waiting import judge_waiting
 from server.participants import completion, form_answers, links, returning, runs
@@ -32,6 +32,7 @@ from server.participants.schemas import (
     StageChange,
     Unsupported,
 )
+from server.rate_limit import RateLimit
 from server.tokens import hash_token
 from server.trials.refusals import RunUnknown
 
@@ -53,6 +54,13 @@ async def _run_token(
 RunToken = Annotated[str, Depends(_run_token)]
 
 
+def _count(services: Services, limit: RateLimit, token: str) -> None:
+    """Count one event of a link that exists: strangers' inventions would take the room of true counts."""
+    with services.database.read() as session:
+        links.find_link(session, token)
+    limit.hit(hash_token(token))
+
+
 @router.get("/links/{link_token}")
 def get_link(services: ServicesDep, link_token: str) -> LinkState:
     """Where a link leads and whether it is open."""
@@ -65,7 +73,7 @@ async def start_run(
     services: ServicesDep, link_token: str, start: RunStart, response: Response
 ) -> RunStarted:
     """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
-    await run_in_threadpool(services.run_starts.hit, hash_token(link_token))
+    await run_in_threadpool(_count, services, services.run_starts, link_token)
     if start.resume_code is not None:
         await run_in_threadpool(returning.count_code, services, link_token, start.resume_code)
 
@@ -83,7 +91,7 @@ async def start_run(
 @router.post("/unsupported", status_code=202)
 def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
     """Tell the server that a browser or screen was turned away before a run began."""
-    services.unsupported.hit(hash_token(report.link_token))
+    _count(services, services.unsupported, report.link_token)
     with services.database.write() as session:
         runs.save_unsupported(session, report)
     return Received(received=1)

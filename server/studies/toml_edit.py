@@ -14,8 +14,10 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Array, Comment, Table, Whitespace
 
 from experiments.errors import InputError
+from experiments.load import has_endless_key
 from server.studies import toml_items
 
+TOO_DEEP = "lists or tables are nested too deeply; correct the text first"
 IDENTITY = ("name", "value", "rule", "kind")
 """Keys by which an element of a list is known again after an edit; else its content, then its place."""
 MAX_ELEMENTS = 2000
@@ -31,6 +33,8 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
         Where `text` is not TOML, `data` holds what TOML cannot say, or there is too much of either.
     """
     edited = _without_none(data)
+    if has_endless_key(text):
+        raise InputError(TOO_DEEP)
     try:
         _refuse_too_many(tomllib.loads(text), edited)
         document = tomlkit.parse(text)
@@ -44,7 +48,7 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     except (TypeError, ValueError) as error:
         raise InputError(f"the declaration holds what TOML cannot say: {error}") from error
     except RecursionError as error:
-        raise InputError("lists or tables are nested too deeply; correct the text first") from error
+        raise InputError(TOO_DEEP) from error
     # Tables written out of order are beyond tomlkit's editing: the whole is then written afresh.
     return tomlkit.dumps(toml_items.fresh_document(edited))
 

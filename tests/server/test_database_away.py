@@ -11,12 +11,13 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
-from server import context
+from server import context, db
 from server.app import create_app
 from server.context import Services
 from server.db import Database, is_away
 from server.settings import Settings
-from tests.helpers.studies import Participant
+from tests.helpers.databases import run_server_command
+from tests.helpers.studies import Participant, StudyInDatabase
 
 
 def refused(url: str, statement: str = "SELECT 1") -> DBAPIError:
@@ -81,3 +82,18 @@ def test_a_locked_database_is_told_apart_and_nobody_waits_in_a_queue(
         assert (answer.status_code, answer.json()["error"]["code"]) == (503, "database_busy")
         assert int(answer.headers["retry-after"]) > 0
     assert [participant.rate(trial).status_code for trial in trials] == [201] * 4
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+@pytest.mark.usefixtures("soon_busy")
+def test_a_command_on_a_locked_database_ends_in_one_line(
+    settings: Settings, study: StudyInDatabase, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(db, "BUSY_TIMEOUT_S", 0.5)
+    out, path = tmp_path / "short.csv", settings.database_url.removeprefix("sqlite:///")
+    with closing(sqlite3.connect(path, isolation_level=None)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        called = run_server_command(settings, "export", "short", "--out", str(out))
+    assert (called.returncode, out.exists()) == (2, False)
+    assert called.stderr.count("\n") == 1, called.stderr
+    assert "keeps the database locked" in called.stderr

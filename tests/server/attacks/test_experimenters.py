@@ -1,5 +1,6 @@
 """What one experimenter may send to keep a server busy or make it fail: refused in words, at once."""
 
+import re
 import time
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 from server.context import Services
 from server.studies.uploads import new_upload
 from tests.helpers.admins import Admin
-from tests.helpers.studies import StudyInDatabase
+from tests.helpers.studies import SHORT, StudyInDatabase
 
 SOON_S = 5.0
 """Milliseconds' work on an idle machine; as a regular expression some of it took minutes."""
@@ -18,6 +19,8 @@ SOON_S = 5.0
     ("toml", "said"),
     [
         ("a" + ".a" * 20_000 + " = 1", "nested too deeply"),
+        ("a" + " . 'b'.\"c\"" * 10_000 + " = 1", "nested too deeply"),
+        ("[a" + ".a" * 20_000 + "]", "nested too deeply"),
         ("a = " + "[" * 40 + "]" * 40, "nested too deeply"),
         ("a = " + "9" * 5_000, "too many digits"),
     ],
@@ -25,12 +28,30 @@ SOON_S = 5.0
 def test_a_definition_that_no_program_reads_is_refused_in_words(
     experimenter: Admin, study: StudyInDatabase, toml: str, said: str
 ) -> None:
+    began = time.monotonic()
     for path, body in (
         ("/studies/short/versions/check", {"toml": toml}),
         ("/studies", {"name": "other", "shipped": "exp1", "toml": toml}),
     ):
         answer = experimenter.send("POST", path, body)
         assert (answer.status_code, said in answer.json()["error"]["message"]) == (422, True), answer.text
+    assert time.monotonic() - began < SOON_S
+
+
+def test_of_a_hundred_thousand_unknown_keys_the_first_are_told_at_once(
+    experimenter: Admin, study: StudyInDatabase
+) -> None:
+    toml, began = "".join(f"[a{number}]\n" for number in range(30_000)), time.monotonic()
+    answer = experimenter.send("POST", "/studies/short/versions/check", {"toml": toml})
+    assert answer.status_code == 422, answer.text
+    assert re.search(r"and 3\d{4} more\)$", answer.json()["error"]["message"])
+    assert time.monotonic() - began < SOON_S
+
+
+def test_a_long_text_of_words_and_dots_is_no_key(experimenter: Admin, study: StudyInDatabase) -> None:
+    text = SHORT.replace("\n", f"\n# {'Look at a. ' * 3000}{'.' * 3000}\n", 1)
+    answer = experimenter.send("POST", "/studies/short/versions/check", {"toml": text})
+    assert answer.status_code == 200, answer.text
 
 
 @pytest.mark.parametrize(

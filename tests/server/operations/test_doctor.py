@@ -1,7 +1,9 @@
 import json
+import subprocess
 from pathlib import Path
 
 from server.context import Services, open_services
+from server.operations import erasures
 from server.operations.checks import CHECKS
 from server.operations.doctor import examine
 from server.operations.findings import Finding
@@ -70,3 +72,19 @@ def test_a_database_that_cannot_be_opened_is_one_finding_each(tmp_path: Path) ->
         "see DATABASE_URL, then run: server database upgrade",
     )
     assert len(found) >= len(CHECKS)
+
+
+def test_a_ledger_left_in_the_data_folder_is_told_until_it_was_moved(
+    services: Services, settings: Settings, tmp_path: Path
+) -> None:
+    erasures.note(settings, ["run-a", "run-b"])
+    assert by_subject(services)["ledger of erasures"].verdict == "ok"
+    shared = settings.model_copy(update={"shared_folder": tmp_path / "shared"})
+    erasures.note(shared, ["run-c"])
+    sharing = open_services(shared)
+    found = by_subject(sharing)["ledger of erasures"]
+    assert (found.verdict, found.state[:2]) == ("failed", "2 "), found
+    subprocess.run(["sh", "-c", found.advice.partition("run: ")[2]], check=True)
+    found = by_subject(sharing)["ledger of erasures"]
+    sharing.database.close()
+    assert (found.verdict, set(erasures.noted(shared))) == ("ok", {"run-a", "run-b", "run-c"}), found

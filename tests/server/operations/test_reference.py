@@ -18,3 +18,9 @@ def test_every_exported_column_is_explained() -> None:
     for column in (*RUN_COLUMNS, *(column for view in views() for column in view.columns)):
         assert f"| `{column.name}` | {column.type} |" in page
         assert column.description.endswith(".")
+
+
+def test_no_page_shows_how_python_writes_a_type() -> None:
+    page = (REPOSITORY / "docs" / "settings.md").read_text(encoding="utf-8")
+    assert "<class" not in page
+    assert "| `PALPEBRA_BACKUP_IDENTITY` | Path or empty | empty |" in page

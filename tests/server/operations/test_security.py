@@ -83,6 +83,22 @@ def test_run_starts_of_one_link_are_limited(
     assert statuses == [201, 201, 201, 429, 429]
 
 
+def test_links_that_strangers_invent_are_not_counted(
+    settings: Settings, study: StudyInDatabase, services: Services
+) -> None:
+    """Ten thousand of them would push the counts of real links out of a process's memory and the table."""
+    with TestClient(create_app(settings.model_copy(update={"run_starts_per_minute": 1}))) as client:
+        assert Participant(client, study.link_token).start().status_code == 201
+        app_services = client.app.state.services  # type: ignore[attr-defined]
+        before = len(app_services.run_starts._buckets), len(app_services.unsupported._buckets)
+        for number in range(3):
+            assert Participant(client, f"invented{number}").start().status_code == 404
+            report = {"link_token": f"invented{number}", "reason": "no_webcodecs", "data": {}}
+            assert client.post("/api/unsupported", json=report).status_code == 404
+        assert (len(app_services.run_starts._buckets), len(app_services.unsupported._buckets)) == before
+        assert Participant(client, study.link_token).start().status_code == 429
+
+
 def test_sign_ins_from_one_place_are_limited(settings: Settings, owner: Admin) -> None:
     with TestClient(create_app(settings.model_copy(update={"logins_per_minute": 3}))) as client:
         body = {"password": "wrong guess again"}

@@ -3,6 +3,7 @@
 import copy
 import random
 import re
+import time
 import tomllib
 from typing import Any
 
@@ -144,3 +145,10 @@ def test_a_text_beyond_editing_is_refused_in_one_line() -> None:
         assert "\n" not in str(refused.value)
     with pytest.raises(DefinitionError, match="nested too deeply"):
         parse_experiment(deep)
+
+
+def test_a_key_of_twenty_thousand_parts_is_refused_before_it_is_read() -> None:
+    began = time.monotonic()
+    with pytest.raises(InputError, match="nested too deeply"):
+        with_data("a" + ".a" * 40_000 + " = 1", {"title": "t"})
+    assert time.monotonic() - began < 2.0  # a reader takes ten seconds

@@ -1,5 +1,7 @@
 """The second wall: with the server's own checks taken out, PostgreSQL alone keeps laboratories apart."""
 
+import uuid
+
 import pytest
 from fastapi import FastAPI
 from sqlalchemy import Connection, select, text, true
@@ -161,6 +163,31 @@ def test_the_wall_goes_with_the_newest_revision_and_comes_back_with_it(empty_dat
         assert connection.scalar(text(left)) == 0
     assert upgrade(database) == ("0001", newest_revision())
     assert policies(database) > 10
+    database.close()
+
+
+@empty_postgres
+def test_a_user_who_does_not_own_the_tables_gets_no_wall_and_a_line_that_says_why(
+    empty_database_url: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    database, user = Database(empty_database_url), f"other_{uuid.uuid4().hex[:8]}"
+    upgrade(database)
+    with database.engine.begin() as connection:
+        row_policies.take_down_wall(connection)
+        connection.exec_driver_sql(f"CREATE ROLE {user} LOGIN PASSWORD 'x'")
+        connection.exec_driver_sql(f"GRANT palpebra_member TO {user}")
+        connection.exec_driver_sql(f"GRANT ALL ON SCHEMA public TO {user} WITH GRANT OPTION")
+        connection.exec_driver_sql(f"GRANT ALL ON ALL TABLES IN SCHEMA public TO {user} WITH GRANT OPTION")
+        connection.exec_driver_sql(f"GRANT ALL ON ALL SEQUENCES IN SCHEMA public TO {user} WITH GRANT OPTION")
+        connection.exec_driver_sql(f"SET LOCAL ROLE {user}")
+        assert row_policies.raise_wall(connection) is False
+        connection.exec_driver_sql("RESET ROLE")
+    assert policies(database) == 0
+    assert "must be owner of" in caplog.text
+    assert "REASSIGN OWNED" in caplog.text
+    with database.engine.begin() as connection:
+        connection.exec_driver_sql(f"DROP OWNED BY {user}")
+        connection.exec_driver_sql(f"DROP ROLE {user}")
     database.close()
 
 
