@@ -12,7 +12,6 @@ from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
 from analysis.report.r_models import model_files
-from analysis.within.bayes_factor import bayes_factor
 from experiments.errors import InputError
 
 MAX_RATINGS = 50_000
@@ -179,12 +178,10 @@ def bayes_factors(analysis: Analysis) -> Section:
     Source: Rouder et al. (2009), doi:10.3758/PBR.16.2.225.
     """
     planned = analysis.experiment.analysis.pairs if analysis.experiment else ()
-    # The test is that of differences within participants; pairs of groups have none.
-    within = [name for name in planned or analysis.anova.factors if name in analysis.anova.factors]
-    pairs = [p for p in analysis.pairs if p.effect in within]
+    names = [name for name in planned or analysis.anova.all_factors if name in analysis.anova.all_factors]
     rows = []
-    for pair in pairs:
-        bf = bayes_factor(pair.t, analysis.n_participants, pair.df)
+    for pair in (p for p in analysis.pairs if p.effect in names):
+        bf = pair.bayes_factor
         name = analysis.labels.pair(pair.effect, pair.level_a, pair.level_b)
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
     header = ("Margin: pair", "t", "BF10", "BF01", "evidence")

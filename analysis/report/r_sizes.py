@@ -6,7 +6,6 @@ from typing import Any
 
 from analysis.plans.result import Analysis
 from analysis.report.r_text import as_csv, r_number
-from analysis.within.bayes_factor import bayes_factor
 from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.pairwise import Pair
@@ -56,11 +55,8 @@ def _of_one_factor(analysis: Analysis, names: Names) -> list[Pair]:
 
 def _pair(analysis: Analysis, pair: Pair, names: Names) -> list[Any]:
     levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))[pair.effect]
-    people = analysis.n_participants
-    within = pair.effect in analysis.anova.factors
-    evidence = bayes_factor(pair.t, people, pair.df) if within else float("nan")
     positions = [levels.index(name) + 1 for name in (pair.level_a, pair.level_b)]
-    numbers = (pair.t, pair.df, pair.dz, *pair.dz_ci, people, evidence)
+    numbers = (pair.t, pair.df, pair.dz, *pair.dz_ci, pair.bayes_factor)
     return [names[pair.effect], *positions, *map(r_number, numbers)]
 
 

@@ -26,7 +26,7 @@ def bayes_factor(t: float, n: float, df: float, scale: float = PRIOR_SCALE) -> f
     Returns
     -------
     float
-        BF10; NaN where t is.
+        BF10; NaN where t or n is.
 
     Notes
     -----
@@ -40,7 +40,7 @@ def bayes_factor(t: float, n: float, df: float, scale: float = PRIOR_SCALE) -> f
     normal z, twice; summed over equal steps of log z, which converges exponentially. pingouin gives the same
     by scipy's `quad`; importing it takes as long as the rest of a report.
     """
-    if not np.isfinite(t):
+    if not (np.isfinite(t) and np.isfinite(n)):
         return float("nan")
     z2 = np.exp(2 * _LOG_Z)
     # log(1 + n r^2 / z^2), and what t says of each g against what it says of no difference

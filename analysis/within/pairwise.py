@@ -10,6 +10,7 @@ from scipy import special
 
 from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, sidak, tukey
 from analysis.within.anova import AnovaResult
+from analysis.within.bayes_factor import bayes_factor
 from analysis.within.contrasts import effect_name
 from analysis.within.estimates import Margin, margin_of
 
@@ -23,7 +24,7 @@ class Pair:
     `difference` is level_a minus level_b; `t`, `p` and `dz` are NaN where the difference does not vary.
     Adjusted for the pairs of the margin: Bonferroni, Holm, Sidak, Tukey, false discovery rate.
     `dz` divides by the SD of the difference, pooled over groups; between groups it is Cohen's d, over the
-    pooled SD of participants' means, and NaN where both group and level differ.
+    pooled SD of participants' means, and NaN where both group and level differ, as `bayes_factor` (JZS) is.
     Levels of a margin of several factors are joined with ':'.
     """
 
@@ -43,6 +44,7 @@ class Pair:
     ci: tuple[float, float]
     dz: float
     dz_ci: tuple[float, float]
+    bayes_factor: float
 
 
 def pairs_of(result: AnovaResult, factors: Sequence[str], confidence: float = 0.95) -> tuple[Pair, ...]:
@@ -74,11 +76,11 @@ def _tested(
     estimate, se, t = margin.tested(weights, scale)
     spread = _spread(margin, weights)
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.where(se > 0, estimate / spread, np.nan)
+        size, scale_of_t = (np.where(se > 0, values / spread, np.nan) for values in (estimate, se))
     p = 2 * special.stdtr(margin.df, -np.abs(t))
     family = [bonferroni(p), holm(p), sidak(p), tukey(t, len(margin.combinations), margin.df)]
     family = [np.where(np.isnan(p), np.nan, values) for values in (*family, false_discovery_rate(p))]
-    sizes = size_intervals(t, size, margin.df, confidence)
+    sizes = size_intervals(t, scale_of_t, margin.df, confidence)
     reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2)) * se
     return tuple(
         Pair(
@@ -98,19 +100,21 @@ def _tested(
             ci=(float(estimate[i] - reach[i]), float(estimate[i] + reach[i])),
             dz=float(size[i]),
             dz_ci=(float(sizes[i, 0]), float(sizes[i, 1])),
+            # as many differences of this SD have this standard error: N, or n1 n2 / (n1 + n2) of two groups
+            bayes_factor=bayes_factor(float(t[i]), float(scale_of_t[i]) ** -2.0, margin.df),
         )
         for i, (a, b) in enumerate(labels)
     )
 
 
-def size_intervals(t: Floats, size: Floats, df: int, confidence: float) -> Floats:
+def size_intervals(t: Floats, scale: Floats, df: int, confidence: float) -> Floats:
     """Intervals (m, 2) of standardised differences from the noncentral t distribution.
 
-    The noncentralities that put t at the two tails, times size / t. Source: Steiger & Fouladi (1997).
+    The noncentralities that put t at the two tails, times `scale`, which is the size over t.
+    Source: Steiger & Fouladi (1997).
     """
     tails = np.array([0.5 + confidence / 2, 0.5 - confidence / 2])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(t != 0, size / t, np.nan)
+    with np.errstate(invalid="ignore"):
         noncentral = special.nctdtrinc(float(df), tails, np.where(np.isnan(t), 0.0, t)[:, None])
         return np.asarray(noncentral * scale[:, None], dtype=np.float64)
 

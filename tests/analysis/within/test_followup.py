@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from pingouin import bayesfactor_ttest
 from scipy import integrate, stats
 from scipy.special import ndtr
 from statsmodels.stats.multitest import multipletests
 
 from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, sidak, tukey
-from analysis.within.anova import within_anova
+from analysis.within.anova import linear_anova, within_anova
+from analysis.within.bayes_factor import PRIOR_SCALE
+from analysis.within.between import between_design
 from analysis.within.contrast_tests import contrasts_of, equivalence, polynomial_weights, trends
 from analysis.within.pairwise import one_factor_pairs, pairs_of
 from analysis.within.simple_effects import main_p, simple_effect, simple_effects
@@ -123,6 +126,31 @@ def test_equivalence_is_two_one_sided_t_tests() -> None:
     assert ours.p_lower == pytest.approx(stats.ttest_1samp(d, -0.5, alternative="greater").pvalue, rel=1e-9)
     assert ours.p_upper == pytest.approx(stats.ttest_1samp(d, 0.7, alternative="less").pvalue, rel=1e-9)
     assert ours.p == max(ours.p_lower, ours.p_upper)
+
+
+def test_the_interval_of_a_difference_of_exactly_zero_is_that_of_a_t_of_zero() -> None:
+    y = np.array([[1.0, 2.0], [2.0, 1.0], [4.0, 2.0], [2.0, 4.0], [3.0, 3.0]])
+    (pair,) = pairs_of(within_anova(y, ["face"], [["a", "b"]]), ["face"])
+    assert pair.t == 0
+    low, high = pair.dz_ci
+    assert (low, high) == pytest.approx((-high, high))
+    assert stats.nct.cdf(0.0, 4, high * np.sqrt(5)) == pytest.approx(0.025, abs=1e-9)
+
+
+def test_bayes_factors_of_pairs_are_those_of_their_t_tests() -> None:
+    by_level = dict(zip("abc", Y.mean(axis=1).T, strict=True))
+    for pair in pairs_of(RESULT, ["face"]):
+        t = stats.ttest_rel(by_level[pair.level_a], by_level[pair.level_b]).statistic
+        theirs = bayesfactor_ttest(t, 14, paired=True, r=PRIOR_SCALE)
+        assert pair.bayes_factor == pytest.approx(float(theirs), rel=1e-6)
+
+
+def test_bayes_factors_of_unequal_groups_are_those_of_two_samples() -> None:
+    design = between_design(["group"], [["u", "v"]], np.repeat([[0], [1]], [9, 5], axis=0))
+    result = linear_anova(Y, ["duration", "face"], None, design)
+    pair = next(p for p in one_factor_pairs(result) if p.effect == "group")
+    theirs = bayesfactor_ttest(pair.t, 9, 5, r=PRIOR_SCALE)
+    assert pair.bayes_factor == pytest.approx(float(theirs), rel=1e-6)
 
 
 def test_the_interval_of_dz_puts_t_at_both_tails() -> None:
