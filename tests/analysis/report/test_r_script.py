@@ -239,13 +239,13 @@ def test_a_size_that_r_has_not_differs(tmp_path) -> None:
     needed("afex", "car", "emmeans")
     path = report(tmp_path / "lacking", *CASES["within"])
     script = path.read_text()
-    for line, lack in (("sizes <- as.data.frame(", "sizes$ges[1] <- NA"), ("own_dz <- ", "own_dz[1] <- NA")):
+    for line, lack in (("sizes <- as.data.frame(", "sizes$ges[1] <- NA"), ("own_dz <- ", "own_dz[1] <- own$n[1] <- NA")):
         at = script.index("\n", script.index(f"\n{line}") + 1)
         script = f"{script[:at]}\n{lack}{script[at:]}"
     path.write_text(script)
     (said,) = run_together([path])
     differing = {" ".join(line.split()[:2]) for line in said.splitlines() if line.endswith(": DIFFER")}
-    assert differing == {"sizes general", "dz dz", "dz interval"}
+    assert differing == {"sizes general", "dz dz", "dz interval", "bayes BF10"}
 
 
 def test_bounds_beyond_what_r_can_are_counted_aloud(tmp_path) -> None:
