@@ -239,7 +239,8 @@ def test_a_size_that_r_has_not_differs(tmp_path) -> None:
     needed("afex", "car", "emmeans")
     path = report(tmp_path / "lacking", *CASES["within"])
     script = path.read_text()
-    for line, lack in (("sizes <- as.data.frame(", "sizes$ges[1] <- NA"), ("own_dz <- ", "own_dz[1] <- own$n[1] <- NA")):
+    lacks = {"sizes <- as.data.frame(": "sizes$ges[1] <- NA", "own_dz <- ": "own_dz[1] <- own$n[1] <- NA"}
+    for line, lack in lacks.items():
         at = script.index("\n", script.index(f"\n{line}") + 1)
         script = f"{script[:at]}\n{lack}{script[at:]}"
     path.write_text(script)
