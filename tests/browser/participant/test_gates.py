@@ -18,6 +18,17 @@ OTHER_REFRESH_RATE = """
     window.requestAnimationFrame = (draw) => setTimeout(() => draw((stamp += 21)), 1);
 """
 
+# What a tab opened behind another one is to its page: no refreshes until somebody looks at it.
+IN_THE_BACKGROUND = """
+    const draw = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = () => 0;
+    window.lookAt = () => {
+        window.requestAnimationFrame = draw;
+        document.dispatchEvent(new Event("visibilitychange"));
+    };
+"""
+MEASURED_RATE = "SELECT 1 FROM study_runs WHERE json_extract(device, '$.refresh_rate_hz')"
+
 
 def reasons(server: ServerProcess) -> str:
     return str([(row["type"], row["data"]) for row in server.rows(EVENTS)])
@@ -260,6 +271,19 @@ def visit_or_asked(page: Page, visit: Visit) -> None:
     else:
         visit.page.wait_for_selector(".scale")
         visit.page.keyboard.press("4")
+
+
+def test_a_page_opened_in_the_background_measures_its_screen_when_it_is_looked_at(
+    server: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    page.add_init_script(IN_THE_BACKGROUND)
+    visit = Visit(page, server.address).open(study.link_token).begin()
+    server.rows_soon(f"{MEASURED_RATE} IS NULL AND json_extract(device, '$.webcodecs')", 1)
+    page.evaluate("lookAt()")
+    server.rows_soon(f"{MEASURED_RATE} BETWEEN 10 AND 1000", 1)
+    assert visit.problems == []
 
 
 def test_a_card_that_nobody_has_touched_and_an_impossible_screen_are_refused(
