@@ -1,6 +1,7 @@
 """Attacks on a real server while honest raters rate: what clips and ratings take, and the server's memory.
 
 python tools/attack.py                       every attack, about five minutes
+python tools/attack.py --database postgres   the same on PostgreSQL, a server of its own
 python tools/attack.py --only "passwords for the owner, 100/s" --seconds 20
 
 Before each attack the raters are alone for as long as it lasts, so that each line compares with its own quiet
@@ -27,6 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from rich.console import Console
 
+from server.operations.repository import clip_sizes
 from tests.helpers.attacked import api_token
 from tools import attacks
 from tools.load_client import LoadRater, Tally, percentile
@@ -36,6 +38,13 @@ from tools.load_scenarios import begin, prepare, run
 from tools.load_server import LoadServer, load_server
 
 EVERY_S, SETTLE_S = 2.0, 1.0
+MAIL = {
+    "PALPEBRA_SMTP_HOST": "127.0.0.1",
+    "PALPEBRA_SMTP_PORT": "9",
+    "PALPEBRA_SMTP_SECURITY": "none",
+    "PALPEBRA_MAIL_FROM": "server@lab.example",
+}
+"""Where reset letters would go: nobody listens there."""
 TIMES, FLOOR_MS, MAX_MB = 2.0, 40.0, 400.0
 
 
@@ -129,12 +138,18 @@ async def run_of_attacker(server: LoadServer) -> str:
     return attacks.begun(answer)
 
 
+def a_clip(server: LoadServer) -> str:
+    """Address of one of the study's clips."""
+    with server.services.database.read() as session:
+        return f"/clips/{clip_sizes(session)[0].sha256}.mp4"
+
+
 async def attack_all(
     server: LoadServer, names: Sequence[str], raters: int, seconds: float, tally: Tally, console: Console
 ) -> list[Line]:
     """Every attack after the other, the raters going on all the while."""
     owner = api_token(server.services, "read", "personal", "write", "export", name="owner")
-    target = attacks.Target(server.port, server.link, owner, await run_of_attacker(server))
+    target = attacks.Target(server.port, server.link, owner, await run_of_attacker(server), a_clip(server))
     people: list[LoadRater] = await begin(server, raters, tally, 10)
     await prepare(people)
     lines: list[Line] = []
@@ -169,11 +184,12 @@ def main() -> int:
         help="honest raters, a clip and a rating each 2 s, or slower in a long run (40)",
     )
     parser.add_argument("--only", nargs="*", choices=tuple(attacks.ATTACKS), default=tuple(attacks.ATTACKS))
+    parser.add_argument("--database", choices=("sqlite", "postgres"), default="sqlite")
     asked = parser.parse_args()
     console, tally, lines = Console(width=200), Tally(), list[Line]()
     console.print(f"{os.cpu_count()} cores, load before: {os.getloadavg()[0]:.1f}")
     console.print(HEAD)
-    with load_server("sqlite", 1) as server:
+    with load_server(asked.database, 1, **MAIL) as server:
 
         async def go() -> None:
             lines.extend(await attack_all(server, asked.only, asked.raters, asked.seconds, tally, console))

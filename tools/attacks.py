@@ -25,12 +25,13 @@ STUDY = "/api/admin/studies/short"
 
 @dataclass(frozen=True)
 class Target:
-    """What is attacked: the port, a link to take part, an owner's API token, a run begun by the attacker."""
+    """What is attacked: the port, a link to take part, an owner's API token, the attacker's run, a clip."""
 
     port: int
     link: str
     owner: str
     run: str
+    clip: str
 
 
 Request = tuple[str, str, Any, str]
@@ -78,6 +79,12 @@ def _codes() -> Iterator[Request]:
     while True:
         path = f"/api/admin/invitations/{uuid.uuid4().hex}/account"
         yield "POST", path, {"name": uuid.uuid4().hex, "password": PASSWORD}, ""
+
+
+def _invented() -> Iterator[Request]:
+    while True:
+        body = {"link_token": uuid.uuid4().hex, "reason": "no_webcodecs", "data": {}}
+        yield "POST", "/api/unsupported", body, ""
 
 
 def _starts(link: str) -> Iterator[Request]:
@@ -162,6 +169,16 @@ ATTACKS: dict[str, Attack] = {
     "300 streams of one account": lambda target, end: raw_attacks.streams(
         target.port, end, f"{STUDY}/monitor/stream".encode(), target.owner.encode(), 300
     ),
+    "ranges of clips that no player asks for, 100/s": lambda target, end: raw_attacks.ranges(
+        target.port, end, target.clip.encode(), 100
+    ),
+    "300 MB of zeros in a zip, SVG as clips, 4/s": lambda target, end: raw_attacks.uploads(
+        target.port, end, target.owner.encode(), 4
+    ),
+    "reset letters for the owner, 50/s": _flooding(
+        lambda _: _same("POST", "/api/admin/session/forgotten", {"name": "owner"}, ""), 50
+    ),
+    "reports of links that do not exist, 100/s": _flooding(lambda _: _invented(), 100),
     **{name: _raw(*sent) for name, sent in raw_attacks.REQUESTS.items()},
 }
 """By the name that the table shows."""

@@ -1,5 +1,6 @@
 """Sign-in under attack: no lock-out of others, no telling who exists, one use of what is for one use."""
 
+import asyncio
 import statistics
 import threading
 import time
@@ -11,7 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.accounts import invitations, service
-from server.accounts.passwords import WeakPassword, check_strength, hash_password
+from server.accounts.passwords import PasswordsBusy, PasswordWork, WeakPassword, check_strength, hash_password
 from server.accounts.throttle import BackOff, TooManyFailures, address_range, known_device, new_device
 from server.context import Services
 from server.models import Account, AdminSession
@@ -192,3 +193,29 @@ def test_resets_by_command_line_are_audited(
 
 def test_a_hash_costs_what_is_recommended() -> None:
     assert hash_password("four walruses sang in March", "Ada").startswith("$argon2id$v=19$m=65536,t=3,p=4$")
+
+
+def test_one_hash_at_a_time_and_of_those_who_wait_only_so_many() -> None:
+    """Each takes 64 MB and four cores; a thread more for each stranger is how the memory was filled."""
+    at_once, highest, gate = 0, 0, threading.Event()
+
+    def work() -> None:
+        nonlocal at_once, highest
+        at_once += 1
+        highest = max(highest, at_once)
+        gate.wait(30)
+        at_once -= 1
+
+    async def flood() -> list[object]:
+        passwords = PasswordWork(waiting=3)
+        asked = [asyncio.create_task(passwords.run(work)) for _ in range(10)]
+        await asyncio.sleep(0.1)
+        gate.set()
+        answers = await asyncio.gather(*asked, return_exceptions=True)
+        passwords.close()
+        return list(answers)
+
+    answers = asyncio.run(flood())
+    refused = [answer for answer in answers if isinstance(answer, PasswordsBusy)]
+    assert (len(refused), answers.count(None), highest) == (7, 3, 1)
+    assert refused[0].status == 503
