@@ -44,6 +44,15 @@ def bake_face(
     frame_samples: Annotated[
         int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the still frame.")
     ] = 32,
+    lid_samples: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=4096,
+            help="Cycles samples per pixel where lids and lashes pass; the skin round them then keeps the "
+            "still frame's noise [as --samples].",
+        ),
+    ] = 0,
     lower_lid: Annotated[
         bool, typer.Option(help="--no-lower-lid leaves out the poses that Experiment 3 needs (17 pictures).")
     ] = True,
@@ -97,7 +106,7 @@ def bake_face(
         size_px=parse_size(size, framing),
         levels=levels,
         rendered=rendered or levels,
-        samples=Samples(samples, frame_samples),
+        samples=Samples(samples, frame_samples, lid_samples),
         lower_lid=lower_lid,
         light=light,
         out=out or Path("out/characters") / character_name(name, framing, version),

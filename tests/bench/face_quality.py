@@ -6,6 +6,11 @@ and halfway between the atlas's levels, and of lower lids on their way.
 
 The references have as many samples as the levels, so that their own noise counts as error too. --samples 48
 renders references with a quarter of it; --closures 0.094,0.906 leaves out the others, and the lower lid's.
+--seeds 2,3 renders each with both seeds, other noise than the levels', and counts that noise honestly:
+
+    n = mean((a - b)^2) / 4,   e = mean((x - (a + b) / 2)^2) - n                                          (1)
+
+Letters: a, b references, x the atlas's picture, n the noise of the references' mean, e the error without it.
 """
 
 import argparse
@@ -18,7 +23,13 @@ from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.facekit.assembly import STUDIO_EV
 from stimuli_builder.characters.facekit.bake import RECIPES
-from stimuli_builder.characters.facekit.development import develop, psnr_db, to_8_bit
+from stimuli_builder.characters.facekit.development import (
+    develop,
+    error_and_noise,
+    error_db,
+    psnr_db,
+    to_8_bit,
+)
 from stimuli_builder.characters.facekit.environment import ensure_blender
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import load_facekit
@@ -75,6 +86,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("facekit", type=Path, help="your copy of ICT-FaceKit")
     parser.add_argument("--work", type=Path, help="where renders wait (build/bake/truth-NAME-SAMPLES)")
     parser.add_argument("--samples", type=int, help="of the references (as many as the levels have)")
+    parser.add_argument("--seeds", type=seed_pair, help="two, of references with noise of their own")
     parser.add_argument("--closures", type=closure_list, help="these alone, separated by commas")
     parser.add_argument("--blender", type=Path, default=Path(".venv-bake"), help="Blender's environment")
     parser.add_argument("--threads", type=int, default=2, help="render threads on the CPU")
@@ -85,6 +97,13 @@ def closure_list(text: str) -> list[float]:
     return [float(part) for part in text.split(",")]
 
 
+def seed_pair(text: str) -> tuple[int, int]:
+    first, second = (int(part) for part in text.split(","))
+    if first == second:
+        raise ValueError("two references with one seed have one noise")
+    return first, second
+
+
 def scene_of(character: Atlas, facekit: Path) -> FaceScene:
     """The scene that the character's provenance tells of; a line where the recipe is another by now."""
     made = character.declaration.provenance
@@ -92,17 +111,18 @@ def scene_of(character: Atlas, facekit: Path) -> FaceScene:
     if made["recipe"] != RECIPES[framing]:
         say(
             f"{character.name} is of recipe {made['recipe']}, the references of {RECIPES[framing]}: "
-            "they differ where the lids meet"
+            "they differ in the eyes, in the skin's tone and where the lids meet"
         )
     identity = Identity.model_validate(made["face"])
     return FaceScene(load_facekit(facekit), identity, framing, character.size_px)
 
 
 def references(
-    scene: FaceScene, poses: list[LidPose], samples: int, asked: argparse.Namespace
+    scene: FaceScene, poses: list[LidPose], samples: int, asked: argparse.Namespace, seed: int = 1
 ) -> dict[LidPose, Shot]:
     """Shots of the poses, those rendered that are missing."""
     work = asked.work or Path("build/bake") / f"truth-{asked.name}-{samples}"
+    work = work if seed == 1 else work / f"seed-{seed}"
     work.mkdir(parents=True, exist_ok=True)
     shots = {
         pose: Shot(
@@ -116,7 +136,7 @@ def references(
     missing = [shot for shot in shots.values() if not shot.file.exists()]
     if missing:
         python = ensure_blender(asked.blender)
-        setup = Setup(python, "studio", "auto", asked.threads, work / "blender.log")
+        setup = Setup(python, "studio", "auto", asked.threads, work / "blender.log", seed)
         with Renderer(scene, setup) as renderer:
             for shot in missing:
                 renderer.render(shot)
@@ -140,6 +160,9 @@ def main() -> None:
         moved = list(MOVED) if character.has_lower_lid else []
     samples = asked.samples or made["samples"]
     still = [LidPose(closure) for closures in places.values() for closure in closures]
+    if asked.seeds:
+        say_by_two_seeds(character, scene, still, samples, asked)
+        return
     shots = references(scene, [*still, *moved], samples, asked)
     say(f"{asked.name}: levels of {made['samples']} samples, references of {samples}")
     for what, closures in places.items():
@@ -151,6 +174,18 @@ def main() -> None:
         say("lower lid: closure, mm up, mm nasal, PSNR in dB (left as it was)")
     for pose in moved:
         say(lower_lid_line(character, laid(character, scene, shots[pose]), pose))
+
+
+def say_by_two_seeds(
+    character: Atlas, scene: FaceScene, poses: list[LidPose], samples: int, asked: argparse.Namespace
+) -> None:
+    """PSNR of levels without the references' noise, and of that noise, equation (1) above."""
+    first, second = (references(scene, poses, samples, asked, seed) for seed in asked.seeds)
+    say("closure  PSNR in dB (crop) without the references' noise; of the mean of both references")
+    for pose in poses:
+        pictures = (laid(character, scene, shots[pose]) for shots in (first, second))
+        error, noise = error_and_noise(linear_to_srgb(picture(character, pose.closure)), *pictures)
+        say(f"{pose.closure:.5f} {error_db(error):8.1f} {error_db(noise):8.1f}")
 
 
 def lower_lid_line(character: Atlas, truth: np.ndarray, pose: LidPose) -> str:

@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +30,9 @@ from stimuli_builder.characters.level_video import write_level_video
 from stimuli_builder.characters.writing import write_bytes, write_declaration, write_picture
 
 STUDIO_EV = 0.15
+STEADY_CODE = 0.03
+"""A change of this share of white is movement; one far below it is a change of light on still skin."""
+STEADY_PX = 1.5
 LEVELS_FILE, POSES_FILE = "levels.mkv", "lower_lid.mkv"
 NOTICE_FILE = Path(__file__).with_name("ICT-FaceKit-LICENSE.txt")
 """Goes beside every character rendered from the kit's geometry, as its licence asks."""
@@ -46,9 +50,15 @@ class Assembly:
         self._lower = {shot.pose: shot for shot in lower}
         self.crop = bounding_box(list(scene.boxes.values()))
         self.lower_lid_crop = bounding_box(list(scene.lower_lid_boxes.values()))
+        opened = self._levels[0.0]
+        self._steady = {
+            name: (opened.boxes[name], self._developed(light))
+            for name, light in opened.read().items()
+            if opened.finer and name not in opened.finer
+        }
         still = self._developed(frame.read()["frame"])
         # The open level's own samples go into the still frame, so that nothing changes when a blink begins.
-        self._still = self._laid(still, self._levels[0.0])
+        self._still = self._laid(still, opened)
 
     def level(self, closure: float) -> Picture:
         """(h, w, 3) sRGB code values of the crop at a rendered closure."""
@@ -100,12 +110,19 @@ class Assembly:
         return develop(light.astype(np.float32), self._scene.identity.exposure_ev + STUDIO_EV)
 
     def _laid(self, still: NDArray[np.float32], shot: Shot) -> NDArray[np.float32]:
-        """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims."""
+        """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims.
+
+        Where lids have boxes with samples of their own, of the others only the change since the open eye
+        counts: one seed gives both the same noise, so that still skin keeps the still frame's many samples.
+        """
         laid = still.copy()
         for name, light in shot.read().items():
             x, y, width, height = box = shot.boxes[name]
-            where = laid[y : y + height, x : x + width]
-            where += self._scene.view.feather(box) * (self._developed(light) - where)
+            where, picture = laid[y : y + height, x : x + width], self._developed(light)
+            if name in self._steady:
+                (left, top, _, _), opened = self._steady[name]
+                picture = steadied(picture, _cut(opened, (x - left, y - top, width, height)), where)
+            where += self._scene.view.feather(box) * (picture - where)
         return laid
 
     def _write_lower_lid(self, folder: Path) -> LowerLid | None:
@@ -148,6 +165,24 @@ class Assembly:
             return _encoded(pose_between(self._scene, pose, around, self.lower_lid_crop))
         frame = self._still if pose == OPEN else self._laid(self._still, self._lower[pose])
         return to_8_bit(_cut(frame, self.lower_lid_crop))
+
+
+def steadied(
+    picture: NDArray[np.float32], opened: NDArray[np.float32], still: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(h, w, 3) code of a picture: the still one plus its change from `opened`, itself where it moves.
+
+    Parameters
+    ----------
+    picture, opened : float32 array (h, w, 3)
+        A pose and the open eye, rendered with the same few samples and seed.
+    still : float32 array (h, w, 3)
+        The open eye of many samples.
+    """
+    change = picture - opened
+    size = cv2.GaussianBlur(np.abs(change).max(axis=-1), (0, 0), STEADY_PX)
+    share = np.exp(-((size / STEADY_CODE) ** 2))[..., None]
+    return np.asarray(picture + share * (still - opened), np.float32)
 
 
 def _encoded(light: NDArray[np.float32]) -> Picture:

@@ -30,7 +30,7 @@ from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, l
 from stimuli_builder.characters.facekit.scene import FaceScene
 
 # Raise when geometry, textures, materials, lights or that framing change: other recipes' work is not resumed.
-RECIPES = {"eyes": 4, "face": 5}
+RECIPES = {"eyes": 5, "face": 6}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 
@@ -101,7 +101,10 @@ class FaceBake:
     def levels(self) -> list[Shot]:
         """The levels' shots, in the order of rendering."""
         order = self.order
-        return level_shots(self.work, self.scene.boxes, order.samples, order.rendered, order.denser_ends)
+        lids = self.scene.lid_boxes
+        return level_shots(
+            self.work, self.scene.boxes, order.samples, order.rendered, order.denser_ends, lids
+        )
 
     @cached_property
     def lower(self) -> list[Shot]:
@@ -185,12 +188,13 @@ class FaceBake:
     def _provenance(self, levels: int, rendered: list[float]) -> dict[str, Any]:
         order, width, height = self.order, *self.order.size_px
         ends = " --denser-ends" if order.denser_ends else ""
+        lids = f" --lid-samples {order.samples.lids}" if order.samples.lids else ""
         again = f" --version {order.version}" if order.version > 1 else ""
         face = f"--identity {order.name}" if order.seed is None else f"--seed {order.seed}"
         return {
             "command": f"stimuli bake face {face} --framing {order.framing} "
             f"--size {width}x{height} --levels {levels} --rendered {order.rendered}{ends} "
-            f"--samples {order.samples.boxes} --frame-samples {order.samples.frame} "
+            f"--samples {order.samples.boxes} --frame-samples {order.samples.frame}{lids} "
             f"--light {order.light}{again}",
             "geometry": NOTICE,
             "recipe": RECIPES[order.framing],
@@ -198,6 +202,7 @@ class FaceBake:
             "rendered_closures": rendered,
             "samples": order.samples.boxes,
             "frame_samples": order.samples.frame,
+            "lid_samples": order.samples.lids or order.samples.boxes,
             "moved_mm_at_closure_1": {k: round(v, 3) for k, v in self.scene.movement_mm().items()},
             "versions": {"palpebra": version("palpebra"), "bpy": BPY_VERSION, "numpy": version("numpy")},
             "platform": f"{sys.platform} {platform.machine()}",

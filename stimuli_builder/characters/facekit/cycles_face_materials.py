@@ -5,9 +5,13 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 # Optical depths of the pigments per channel, over the colour of skin without them.
 BASE = (0.86, 0.73, 0.595)
+FILM_IOR = 1.376
+ROOM_MIRRORED = 0.5
+"""Share of the room's light that the eyes mirror: half of what lies about them is the face itself."""
 MELANIN, BLOOD = (1.0, 1.33, 1.64), (0.06, 0.84, 0.86)
 
 
@@ -45,6 +49,15 @@ class Nodes:
             self.put(value, node.inputs[k])
         return node.outputs[0]
 
+    def vector(self, operation: str, *values: Any, scale: Any = None) -> Any:
+        """Result of a VectorMath node; a number where the operation gives one."""
+        node = self.add("VectorMath", operation=operation)
+        for k, value in enumerate(values):
+            self.put(value, node.inputs[k])
+        if scale is not None:
+            self.put(scale, node.inputs["Scale"])
+        return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
+
     def attribute(self, name: str, vector: bool = False) -> Any:
         """A per-vertex value."""
         return self.add("Attribute", attribute_name=name).outputs["Vector" if vector else "Fac"]
@@ -77,8 +90,8 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
     return {
         "skin": skin(look),
         "eye": eye(colour, height),
-        "film": film(),
-        "tear": tear(),
+        "film": film(settings["lights"]),
+        "tear": tear(settings["lights"]),
         "flesh": flesh(look),
         "spectacles": spectacles(),
         "lash": hair("lash", [min(0.008, c * 0.25) for c in look["hair"]], 0.25),
@@ -107,7 +120,8 @@ def skin(look: dict[str, Any]) -> Any:
     n.put(_skin_colour(n, grain, pit, furrow, line), shader.inputs["Base Color"])
     n.put(n.math("SUBTRACT", n.attribute("rough"), n.math("MULTIPLY", wet, 0.26)), shader.inputs["Roughness"])
     dark = look["melanin"] > 0.9
-    shader.subsurface_method = "RANDOM_WALK"
+    # Random walks took 1.7 times the time a sample and left red blotches that few samples cannot settle.
+    shader.subsurface_method = "BURLEY"
     for name, value in (
         ("Normal", bump),
         ("Coat Normal", bump),
@@ -156,39 +170,81 @@ def eye(colour: Any, height: Any) -> Any:
     return n.surface(shader)
 
 
-def film() -> Any:
-    """Clear wet layer: glass to the camera, open to light on its way to what lies behind."""
+def film(lights: dict[str, Any]) -> Any:
+    """Clear wet layer: refracts to the camera and shines with what it mirrors, is open to light on its way.
+
+    Mirrored lamps are worked out by their rectangles. As a mirror it would be asked once in forty samples,
+    so that at 12 samples a third of a level's error stood on the hundredth part that is catchlight.
+    """
     n = Nodes("film")
-    glass, clear, mix = (
-        n.add("BsdfGlass", IOR=1.376, Roughness=0.0),
-        n.add("BsdfTransparent"),
-        n.add("MixShader"),
-    )
     coordinates = n.add("TexCoord").outputs["Object"]
     ripples = n.math("MULTIPLY", n.noise(coordinates, 9.0, 2), 0.0004)
-    n.put(n.add("Bump", Strength=1.0, Distance=1.0, Height=ripples).outputs[0], glass.inputs["Normal"])
-    ray = n.add("LightPath")
+    normal = n.add("Bump", Strength=1.0, Distance=1.0, Height=ripples).outputs[0]
+    mirrored = n.add("Fresnel", IOR=FILM_IOR, Normal=normal).outputs[0]
+    through = n.math("SUBTRACT", 1.0, mirrored)
+    ray, clear = n.add("LightPath"), n.add("BsdfTransparent")
+    glass = n.add("BsdfRefraction", IOR=FILM_IOR, Roughness=0.0, Normal=normal)
+    n.put(n.add("CombineXYZ", X=through, Y=through, Z=through).outputs[0], glass.inputs["Color"])
+    shine = n.add("Emission", Color=reflected(n, normal, lights))
+    n.put(n.math("MULTIPLY", mirrored, ray.outputs["Is Camera Ray"]), shine.inputs["Strength"])
+    seen, mix = n.add("AddShader"), n.add("MixShader")
+    n.put(glass.outputs[0], seen.inputs[0])
+    n.put(shine.outputs[0], seen.inputs[1])
     n.put(n.math("MAXIMUM", ray.outputs["Is Shadow Ray"], ray.outputs["Is Diffuse Ray"]), mix.inputs[0])
-    n.put(glass.outputs[0], mix.inputs[1])
+    n.put(seen.outputs[0], mix.inputs[1])
     n.put(clear.outputs[0], mix.inputs[2])
     return n.surface(mix)
 
 
-def tear() -> Any:
-    """Thin water: what it does not mirror passes."""
+def reflected(n: Nodes, normal: Any, lights: dict[str, Any], room: float = ROOM_MIRRORED) -> Any:
+    """Light that comes from where a mirror of that normal looks: the room's, and each mirrored lamp's."""
+    geometry = n.add("NewGeometry")
+    away = n.vector("REFLECT", n.vector("SCALE", geometry.outputs["Incoming"], scale=-1.0), normal)
+    total = n.vector("SCALE", lights["room"], scale=lights["room_strength"] * room)
+    for lamp in lights["areas"]:
+        if not lamp.get("in_eyes", lamp["mirrored"]):
+            continue
+        share = _lamp_share(n, geometry.outputs["Position"], away, lamp)
+        radiance = lamp["energy"] / (math.pi * lamp["size"][0] * lamp["size"][1])
+        colour = [c * radiance for c in lamp["colour"]]
+        total = n.vector("ADD", total, n.vector("SCALE", colour, scale=share))
+    return total
+
+
+def _lamp_share(n: Nodes, start: Any, away: Any, lamp: dict[str, Any]) -> Any:
+    """1 where a ray meets the lamp's rectangle, 0 beside it, with an edge as soft as a soft box's."""
+    centre = Vector(lamp["place"])
+    turned = (Vector(lamp["aim"]) - centre).to_track_quat("-Z", "Y")
+    across, up, back = (turned @ Vector(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    towards = n.vector("SUBTRACT", list(centre), start)
+    facing = n.vector("DOT_PRODUCT", away, list(back))
+    way = n.math("DIVIDE", n.vector("DOT_PRODUCT", towards, list(back)), facing)
+    off = n.vector("SUBTRACT", n.vector("SCALE", away, scale=way), towards)
+    share = n.math("MULTIPLY", n.math("GREATER_THAN", way, 0.0), n.math("GREATER_THAN", facing, 0.0))
+    for axis, size in ((across, lamp["size"][0]), (up, lamp["size"][1])):
+        beside = n.math("ABSOLUTE", n.vector("DOT_PRODUCT", off, [c * 2 / size for c in axis]))
+        share = n.math("MULTIPLY", share, n.ramp(beside, 0.80, 1.06, 1.0, 0.0))
+    return share
+
+
+def tear(lights: dict[str, Any]) -> Any:
+    """Thin water: it passes what lies behind and shines with the lamps; the lids are all else it mirrors."""
     n = Nodes("tear")
-    mix = n.add("MixShader")
-    n.put(n.add("Fresnel", IOR=1.34).outputs[0], mix.inputs[0])
-    n.put(n.add("BsdfTransparent").outputs[0], mix.inputs[1])
-    n.put(n.add("BsdfGlossy", Roughness=0.06).outputs[0], mix.inputs[2])
-    return n.surface(mix)
+    # The rim of so thin a line would mirror all there is, as white dots that come and go with the samples.
+    mirrored, ray = n.math("MINIMUM", n.add("Fresnel", IOR=1.34).outputs[0], 0.05), n.add("LightPath")
+    shine = n.add("Emission", Color=reflected(n, n.add("NewGeometry").outputs["Normal"], lights, room=0.0))
+    n.put(n.math("MULTIPLY", mirrored, ray.outputs["Is Camera Ray"]), shine.inputs["Strength"])
+    both = n.add("AddShader")
+    n.put(n.add("BsdfTransparent").outputs[0], both.inputs[0])
+    n.put(shine.outputs[0], both.inputs[1])
+    return n.surface(both)
 
 
 def flesh(look: dict[str, Any]) -> Any:
     """The nasal corner's moist flesh."""
     n = Nodes("flesh")
     dark = math.exp(-0.25 * look["melanin"])
-    shader = n.add("BsdfPrincipled", Roughness=0.35, Coat_Weight=0.5, Coat_Roughness=0.12)
+    shader = n.add("BsdfPrincipled", Roughness=0.45, Coat_Weight=0.2, Coat_Roughness=0.2)
     shader.inputs["Base Color"].default_value = (0.60 * dark, 0.29 * dark, 0.245 * dark, 1)
     shader.inputs["Subsurface Weight"].default_value = 0.8
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.35, 0.25)

@@ -2,7 +2,7 @@
 
 Usage: python cycles_face_worker.py SETTINGS.json (what renderer.py writes). The scene is built once; jobs
 arrive as JSON lines on stdin:
-{"pose": FILE.npz, "out": FILE.npz, "samples": N, "boxes": {NAME: [x, y, width, height], ...}}.
+{"pose": FILE.npz, "out": FILE.npz, "samples": {NAME: N, ...}, "boxes": {NAME: [x, y, width, height], ...}}.
 Each is answered by one JSON line on stdout, {"out": FILE, "seconds": S} or {"error": TEXT}; the first line
 answers the start: {"device": NAME} or {"error": TEXT}. Blender's own chatter goes to stderr.
 """
@@ -198,10 +198,12 @@ def render_box(box: list[int], size: list[int], draft: Path) -> Any:
 def render_job(job: dict[str, Any], settings: dict[str, Any], things: Things) -> None:
     """Write every box of a job to the .npz job["out"], whole or not at all."""
     pose(things, job["pose"])
-    bpy.context.scene.cycles.samples = job["samples"]
     out = Path(job["out"])
     draft = out.with_name(f".{out.name}.{os.getpid()}.exr")
-    boxes = {name: render_box(box, settings["size_px"], draft) for name, box in job["boxes"].items()}
+    boxes = {}
+    for name, box in job["boxes"].items():
+        bpy.context.scene.cycles.samples = job["samples"][name]
+        boxes[name] = render_box(box, settings["size_px"], draft)
     part = draft.with_suffix(".npz")
     try:
         np.savez(part, **boxes)

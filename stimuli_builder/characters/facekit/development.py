@@ -24,5 +24,26 @@ def to_8_bit(code: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 def psnr_db(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
     """Peak signal-to-noise ratio of two 8-bit pictures in dB; infinite where they are equal."""
-    error = np.mean((a.astype(np.float64) - b.astype(np.float64)) ** 2)
-    return float("inf") if error == 0 else float(10 * np.log10(255**2 / error))
+    return error_db(float(np.mean((a.astype(np.float64) - b.astype(np.float64)) ** 2)))
+
+
+def error_db(square: float) -> float:
+    """Peak signal-to-noise ratio in dB of a mean square error in code values; infinite where it is none."""
+    return float("inf") if square <= 0 else float(10 * np.log10(255**2 / square))
+
+
+def error_and_noise(
+    shown: NDArray[np.uint8], first: NDArray[np.uint8], second: NDArray[np.uint8]
+) -> tuple[float, float]:
+    """Mean square error of a picture against truth, and that of the mean of two references, code values.
+
+    Parameters
+    ----------
+    shown : uint8 array (h, w, 3)
+        The picture that is judged.
+    first, second : uint8 arrays (h, w, 3)
+        Renders of the truth, each with noise of its own.
+    """
+    a, b = first.astype(np.float64), second.astype(np.float64)
+    noise = float(np.mean((a - b) ** 2)) / 4
+    return float(np.mean((shown.astype(np.float64) - (a + b) / 2) ** 2)) - noise, noise

@@ -39,7 +39,8 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
 
     mesh, angle = _dome(path, side, stroke, profile, 1.45, (150, 96))
     sclera = smooth(limbus - 0.01, limbus + 0.05, angle)
-    shade = _lid_shade(path, posed, side, mesh.vertices)
+    # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.
+    shade = 1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.5 * stroke)
     return Mesh(mesh.vertices, mesh.quads, mesh.uv, {"sclera": sclera, "shade": shade})
 
 

@@ -197,7 +197,7 @@ class Brow:
         self._points, self._root = self._laid(
             along_lid, lean, length, rng.normal(26, 9, n), rng.uniform(0.012, 0.045, n), side
         )
-        self._radii = np.where(fine, 0.0024, 0.0042) * np.clip(rng.normal(1, 0.2, n), 0.5, 1.6)
+        self._radii = np.where(fine, 0.0022, 0.0042) * np.clip(rng.normal(1, 0.35, n), 0.4, 1.9)
 
     def _laid(
         self, along_lid: Array, lean: Array, length: Array, bend: Array, rise: Array, side: int

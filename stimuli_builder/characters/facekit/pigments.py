@@ -141,7 +141,8 @@ class Pigments:
         """Freckles and a few small moles as added melanin."""
         rng = np.random.default_rng([self.seed, 15])
         out = np.zeros(len(self.rest))
-        places = np.flatnonzero((self.rest[:, 2] > 5) & (self.skin.coordinates.loop > 6))
+        loop = self.skin.coordinates.loop
+        places = np.flatnonzero((self.rest[:, 2] > 5) & (loop > 6))
         tree = cKDTree(self.rest)
         for point in rng.choice(places, SPOTS):
             mole = rng.random() < 0.04
@@ -149,7 +150,9 @@ class Pigments:
             strength = (0.25 if mole else 0.13) * rng.uniform(0.3, 1)
             near = tree.query_ball_point(self.rest[point], 0.22)
             distance2 = ((self.rest[near] - self.rest[point]) ** 2).sum(1)
-            out[near] += strength * np.exp(-distance2 / size**2)
+            # A blink draws the skin of the lids to several times its height, and a mole with it to a streak.
+            stays = smooth(8.0, 13.0, loop[point]) if mole else 0.3 + 0.7 * smooth(7.0, 12.0, loop[point])
+            out[near] += stays * strength * np.exp(-distance2 / size**2)
         return self.look.freckles * out * (1.0 + self.look.melanin)
 
 

@@ -16,10 +16,14 @@ LOWER_LID_AFTER = 10
 
 @dataclass(frozen=True)
 class Samples:
-    """Cycles samples per pixel of the moving boxes and of the still frame."""
+    """Cycles samples per pixel of the moving boxes, of the still frame, and of where lids and lashes pass.
+
+    `lids` 0 renders the boxes alone, as before there were lids' boxes in them.
+    """
 
     boxes: int
     frame: int
+    lids: int = 0
 
 
 def closures_of(levels: int) -> list[float]:
@@ -44,21 +48,30 @@ def denser_ends(levels: int) -> list[float]:
 
 
 def level_shots(
-    work: Path, boxes: dict[str, Box], samples: Samples, levels: int, ends: bool = False
+    work: Path,
+    boxes: dict[str, Box],
+    samples: Samples,
+    levels: int,
+    ends: bool = False,
+    lid_boxes: dict[str, Box] | None = None,
 ) -> list[Shot]:
     """Both eyes at each closure: both ends, then closures halfway between those before; last, denser ends."""
+    lids = {f"{name}_lids": box for name, box in (lid_boxes or {}).items() if samples.lids}
     plan: list[Shot] = []
     planned: set[float] = set()
     for count in LEVEL_COUNTS[: LEVEL_COUNTS.index(levels) + 1]:
         fresh = [closure for closure in closures_of(count) if closure not in planned]
         planned |= set(fresh)
-        plan += [_level_shot(work, closure, boxes, samples) for closure in fresh]
+        plan += [_level_shot(work, closure, boxes, lids, samples) for closure in fresh]
     further = [closure for closure in denser_ends(levels) if ends]
-    return plan + [_level_shot(work, closure, boxes, samples) for closure in further]
+    return plan + [_level_shot(work, closure, boxes, lids, samples) for closure in further]
 
 
-def _level_shot(work: Path, closure: float, boxes: dict[str, Box], samples: Samples) -> Shot:
-    return Shot(work / f"level_{closure:.6f}.npz", LidPose(closure), boxes, samples.boxes)
+def _level_shot(
+    work: Path, closure: float, boxes: dict[str, Box], lids: dict[str, Box], samples: Samples
+) -> Shot:
+    finer = dict.fromkeys(lids, samples.lids)
+    return Shot(work / f"level_{closure:.6f}.npz", LidPose(closure), boxes | lids, samples.boxes, finer)
 
 
 def lower_lid_shots(work: Path, boxes: dict[str, Box], samples: Samples) -> list[Shot]:

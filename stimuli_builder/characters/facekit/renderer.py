@@ -5,7 +5,7 @@ import subprocess
 import tempfile
 import tomllib
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -27,12 +27,13 @@ DEVICES = ("auto", "cpu", "gpu")
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture to render: a pose, which boxes of the frame, and where to."""
+    """One picture to render: a pose, which boxes of the frame, and where to; `finer` boxes' own samples."""
 
     file: Path
     pose: LidPose
     boxes: dict[str, Box]
     samples: int
+    finer: dict[str, int] = field(default_factory=dict)
 
     def read(self) -> dict[str, NDArray[np.float16]]:
         """(h, w, 3) scene-linear light of each box; InputError where it is damaged or another bake's."""
@@ -49,13 +50,15 @@ class Shot:
 
 @dataclass(frozen=True)
 class Setup:
-    """How a face is rendered: Blender's Python, light preset, device, threads, and where chatter goes."""
+    """How a face is rendered: Blender's Python, light preset, device, threads, where chatter goes, seed."""
 
     python: Path
     light: str
     device: str
     threads: int
     log: Path
+    seed: int = 1
+    """Of the noise: one for all that a character is made of."""
 
 
 class Renderer:
@@ -109,8 +112,8 @@ class Renderer:
         """
         pose = Path(self._folder.name) / "pose.npz"
         self._scene.write_pose(pose, shot.pose)
-        job = {"pose": str(pose), "out": str(shot.file.resolve())}
-        job |= {"samples": shot.samples, "boxes": shot.boxes}  # type: ignore[dict-item]
+        samples = {name: shot.finer.get(name, shot.samples) for name in shot.boxes}
+        job = {"pose": str(pose), "out": str(shot.file.resolve()), "samples": samples, "boxes": shot.boxes}
         # A process that ended breaks the pipe; its answer below says what happened.
         with suppress(BrokenPipeError):
             if self._process.stdin is not None:
@@ -156,5 +159,5 @@ def _settings(scene: FaceScene, setup: Setup, folder: Path) -> dict[str, Any]:
         "lights": load_light(setup.light),
         "device": setup.device,
         "threads": setup.threads,
-        "seed": 1,
+        "seed": setup.seed,
     }

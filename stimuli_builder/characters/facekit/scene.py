@@ -28,6 +28,8 @@ from stimuli_builder.characters.facekit.subdivision import subdivide
 
 SIDE_NAMES = {1: "left", -1: "right"}
 MOVES_CM = 0.004
+LIDS_MOVE_CM = 0.10
+"""What moves farther is lid or lash: there noise is not the open eye's, and takes samples of its own."""
 SMALL_WIDTH_PX = 480
 """Below this width a pixel is larger than the quads of one subdivision less."""
 TEXTURE_SHARE = 1400 / 960
@@ -163,14 +165,20 @@ class FaceScene:
         between = self._boxes_between(LidPose(0.0, VERTICAL_MM[-1], HORIZONTAL_MM[-1]))
         return {name: _overlap(box, self.boxes[name]) for name, box in between.items()}
 
-    def _boxes_between(self, pose: LidPose) -> dict[str, Box]:
+    @cached_property
+    def lid_boxes(self) -> dict[str, Box]:
+        """What of `boxes` the lids and lashes pass over, by side of the person."""
+        between = self._boxes_between(SHUT, LIDS_MOVE_CM)
+        return {name: _overlap(box, self.boxes[name]) for name, box in between.items()}
+
+    def _boxes_between(self, pose: LidPose, moves_cm: float = MOVES_CM) -> dict[str, Box]:
         before, after = self.shapes(OPEN), self.shapes(pose)
         out = {}
         for side, name in SIDE_NAMES.items():
             points = []
             for a, b in zip(before, after, strict=True):
                 if a.material == "skin" or (a.material in ("lash", "brow") and a.name.endswith(name)):
-                    points.append(_moved_points(a, b, side))
+                    points.append(_moved_points(a, b, side, moves_cm))
             out[name] = self.view.box_round(np.concatenate(points))
         return out
 
@@ -202,10 +210,10 @@ def _overlap(box: Box, other: Box) -> Box:
     return left, top, right - left, bottom - top
 
 
-def _moved_points(opened: Part, shut: Part, side: int) -> Array:
+def _moved_points(opened: Part, shut: Part, side: int, moves_cm: float) -> Array:
     key = "points" if isinstance(opened.shape, Strands) else "vertices"
     a, b = (part.arrays()[key].reshape(-1, 3).astype(np.float64) for part in (opened, shut))
-    moved = (np.abs(a - b).max(1) > MOVES_CM) & (a[:, 0] * side > 0)
+    moved = (np.abs(a - b).max(1) > moves_cm) & (a[:, 0] * side > 0)
     return np.concatenate([a[moved], b[moved]])
 
 

@@ -1,6 +1,7 @@
 """Planning, resuming and assembling a bake of a face, its faults, and Blender where there is one."""
 
 import errno
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from stimuli_builder.characters.facekit.identity import (
 from stimuli_builder.characters.facekit.kit import FaceKit
 from stimuli_builder.characters.facekit.lid_pose import LidPose
 from stimuli_builder.characters.facekit.plan import Samples, closures_of
-from stimuli_builder.characters.facekit.renderer import Renderer, Setup, load_light
+from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
 from stimuli_builder.cli import app
 
@@ -113,6 +114,71 @@ def test_boxes_hold_all_that_moves(scene: FaceScene) -> None:
             inside |= (at[:, 0] > x) & (at[:, 0] < x + width) & (at[:, 1] > y) & (at[:, 1] < y + height)
         assert inside.all()
     assert all(width < 0.4 * SIZE[0] for _, _, width, _ in scene.boxes.values())
+
+
+def test_lids_have_boxes_and_samples_of_their_own(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
+    bake = bake_of(kit, scene, replace(order(tmp_path), samples=Samples(1, 2, 4)))
+    for shot in bake.levels:
+        assert list(shot.boxes) == ["left", "right", "left_lids", "right_lids"]
+        assert shot.finer == {"left_lids": 4, "right_lids": 4}
+        assert shot.samples == 1
+    for name, (x, y, width, height) in scene.boxes.items():
+        lids = scene.lid_boxes[name]
+        assert lids[0] >= x
+        assert lids[0] + lids[2] <= x + width
+        assert lids[1] >= y
+        assert lids[1] + lids[3] <= y + height
+        assert lids[2] * lids[3] < 0.75 * width * height
+    assert "lids" not in "".join(bake_of(kit, scene, order(tmp_path)).levels[0].boxes)
+
+
+def test_lids_boxes_hold_the_eyes_and_all_lashes(scene: FaceScene) -> None:
+    for closure in (0.0, 0.5, 1.0):
+        for part in scene.shapes(LidPose(closure)):
+            if part.material != "lash":
+                continue
+            at = scene.view.project(part.arrays()["points"].reshape(-1, 3).astype(float))
+            x, y, width, height = scene.lid_boxes[part.name.rsplit("_", 1)[1]]
+            low, high = np.array([x, y]), np.array([x + width, y + height])
+            assert ((at > low - 1) & (at < high + 1)).all()
+
+
+def test_skin_round_the_lids_keeps_the_still_frame(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
+    bake = bake_of(kit, scene, replace(order(tmp_path, 3, 3), samples=Samples(1, 2, 4)))
+    pretend_rendered(bake, 4)
+    rng = np.random.default_rng(5)
+    noise = {name: rng.uniform(0.28, 0.3, (box[3], box[2], 3)) for name, box in scene.boxes.items()}
+    for shot in bake.levels:
+        lids = {
+            f"{name}_lids": np.full((box[3], box[2], 3), 0.3 - 0.2 * shot.pose.closure)
+            for name, box in scene.lid_boxes.items()
+        }
+        np.savez(shot.file, **{k: v.astype(np.float16) for k, v in (noise | lids).items()})
+    bake.write()
+    atlas = load_atlas(tmp_path / "out")
+    assert "--frame-samples 2 --lid-samples 4" in atlas.declaration.provenance["command"]
+    levels = np.stack([atlas.level_srgb(k).astype(int) for k in range(3)])
+    x0, y0 = atlas.declaration.crop[:2]
+    around = np.ones(levels.shape[1:3], bool)
+    for x, y, width, height in scene.lid_boxes.values():
+        around[y - y0 : y - y0 + height, x - x0 : x - x0 + width] = False
+    # One seed, one noise: it cancels, and of the coarse boxes nothing is left but the still frame.
+    assert np.ptp(levels[:, around], axis=0).max() <= 2
+    assert np.std(levels[0][around]) < 1
+    assert levels[0][~around].mean() > levels[2][~around].mean() + 20
+
+
+def test_each_box_is_rendered_with_its_own_samples(scene: FaceScene, tmp_path: Path) -> None:
+    answer = (
+        "print(json.dumps({'device': 'CPU'}), flush=True)\n"
+        f"for line in sys.stdin: open({str(tmp_path / 'job')!r}, 'w').write(line); "
+        "print(json.dumps({'seconds': 1}), flush=True)"
+    )
+    shot = Shot(tmp_path / "x.npz", LidPose(0.0), {"left": (0, 0, 2, 2), "left_lids": (0, 0, 1, 1)}, 3)
+    shot = replace(shot, finer={"left_lids": 8})
+    with Renderer(scene, Setup(program(tmp_path, answer), "studio", "cpu", 1, tmp_path / "log")) as renderer:
+        renderer.render(shot)
+    assert json.loads((tmp_path / "job").read_text())["samples"] == {"left": 3, "left_lids": 8}
 
 
 def test_the_eyes_lie_60_mm_apart_and_the_rest_holds_still(scene: FaceScene) -> None:
@@ -207,10 +273,11 @@ def test_another_face_size_quality_or_light_is_other_work(kit: FaceKit, tmp_path
         {"identity": identity_of_seed(8)},
         {"size_px": (480, 180)},
         {"samples": Samples(2, 1)},
+        {"samples": Samples(1, 1, 2)},
         {"light": "window"},
     ):
         places.add(FaceOrder(**(first.__dict__ | change)).work_folder(kit))
-    assert len(places) == 5
+    assert len(places) == 6
 
 
 def test_a_full_disk_is_said_in_one_line(
@@ -269,6 +336,28 @@ def test_blender_renders_a_shot_that_darkens_the_iris_behind_the_lid(
     opened, shut = (shot.read()["left"].astype(float) for shot in bake.shots[1:])
     centre = tuple(slice(n // 2 - 2, n // 2 + 3) for n in opened.shape[:2])
     assert shut[centre].mean() > 1.5 * opened[centre].mean()
+
+
+@pytest.mark.skipif(not BLENDER.exists(), reason="Blender's environment .venv-bake is not made here")
+def test_the_catchlight_is_no_matter_of_chance(scene: FaceScene, tmp_path: Path) -> None:
+    bright = []
+    for seed in (1, 2):
+        shot = Shot(tmp_path / f"{seed}.npz", LidPose(0.0), {"left": scene.lid_boxes["left"]}, 8)
+        with Renderer(scene, Setup(BLENDER, "studio", "cpu", 2, tmp_path / "log", seed)) as renderer:
+            renderer.render(shot)
+        bright.append(_catchlight(scene, shot))
+    assert bright[0] > 1
+    assert bright[1] == pytest.approx(bright[0], rel=0.1)
+
+
+def _catchlight(scene: FaceScene, shot: Shot) -> float:
+    """Light of the brightest pixels within 3 mm of the left eye's middle: pupil and iris are dark."""
+    x, y, _, _ = shot.boxes["left"]
+    middle = scene.view.project(scene.path.globes[1].centre + np.array([0, 0, 1.3])) - (x, y)
+    reach = round(3 * scene.view.px_per_mm)
+    column, row = middle.round().astype(int)
+    seen = shot.read()["left"][row - reach : row + reach, column - reach : column + reach]
+    return float(np.sort(seen.astype(float).mean(-1), axis=None)[-4:].sum())
 
 
 @pytest.mark.parametrize("name", ["alder", "birch", "cedar", "hazel"])

@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from stimuli_builder.characters.facekit.development import develop, psnr_db
+from stimuli_builder.characters.facekit.assembly import steadied
+from stimuli_builder.characters.facekit.development import develop, error_and_noise, psnr_db
 from stimuli_builder.characters.facekit.inbetween import flow_mix
 
 
@@ -23,6 +24,16 @@ def test_psnr_of_known_pictures() -> None:
     assert psnr_db(a, a + np.uint8(1)) == pytest.approx(48.13, abs=0.01)
 
 
+def test_the_references_own_noise_is_not_the_pictures_error() -> None:
+    rng = np.random.default_rng(9)
+    truth = np.full((200, 300, 3), 120.0)
+    shown, a, b = (np.round(truth + rng.normal(0, s, truth.shape)).astype(np.uint8) for s in (3, 6, 6))
+    error, noise = error_and_noise(shown, a, b)
+    assert error == pytest.approx(9, rel=0.03)
+    assert noise == pytest.approx(18, rel=0.03)
+    assert error_and_noise(a, a, b)[0] == pytest.approx(0, abs=0.2)  # a shown reference is no independent one
+
+
 def test_flow_carries_a_shifted_picture_half_way() -> None:
     rng = np.random.default_rng(4)
     blobs = cv2.GaussianBlur(rng.random((80, 120, 3), np.float32), (0, 0), 4)
@@ -37,3 +48,20 @@ def test_flow_carries_a_shifted_picture_half_way() -> None:
 def test_in_between_of_equal_levels_is_that_level() -> None:
     flat = np.full((90, 200, 3), 0.25, np.float32)
     np.testing.assert_allclose(flow_mix(flat, flat, 0.5), flat, atol=1e-5)
+
+
+def test_still_skin_keeps_the_noise_of_many_samples_and_its_change_of_light() -> None:
+    rng = np.random.default_rng(6)
+    skin = np.full((60, 90, 3), 0.5, np.float32)
+    few, many = (skin + rng.normal(0, s, skin.shape).astype(np.float32) for s in (0.02, 0.004))
+    darker = few - np.float32(0.008)
+    assert np.std(steadied(darker, few, many) - (skin - 0.008)) < 1.3 * np.std(many - skin)
+
+
+def test_what_moves_is_taken_as_it_was_rendered() -> None:
+    opened = np.full((60, 90, 3), 0.5, np.float32)
+    lid, many = opened.copy(), opened + np.float32(0.01)
+    lid[20:40] = 0.2
+    laid = steadied(lid, opened, many)
+    np.testing.assert_allclose(laid[25:35], lid[25:35], atol=1e-4)
+    np.testing.assert_allclose(laid[:10], many[:10], atol=1e-6)
