@@ -128,7 +128,7 @@ def mixed(
 
     groups, numbers, further = names_in(between), names_in(covariate), names_in(random)
     data = _read(file, participant, rating, within, item, groups, numbers, further)
-    with saying("fitting"):
+    with saying("fitting") as say:
         result = fit_mixed(
             data.rows,
             participant,
@@ -141,6 +141,7 @@ def mixed(
             further,
             df_method=df.value,
             intervals=intervals,
+            progress=say,
         )
     _show(file, data, mixed_text(result))
     named = (result, file.stem, data.synthetic)

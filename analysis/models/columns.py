@@ -1,16 +1,13 @@
 """Columns of a long table as ratings, groupings and covariates of a mixed model."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.models.roles import ModelTerms
 from experiments.errors import InputError, did_you_mean
-
-if TYPE_CHECKING:
-    from analysis.models.design import ModelTerms
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,7 +22,7 @@ class Grouping:
     codes: Integers = field(repr=False)
 
 
-def refuse_unknown_columns(rows: pd.DataFrame, terms: "ModelTerms") -> None:
+def refuse_unknown_columns(rows: pd.DataFrame, terms: ModelTerms) -> None:
     """Refuse a column that the table lacks, and a table without rows."""
     nested = [part for name in terms.random for part in name.split("/")]
     named = (terms.participant, terms.rating, *terms.within, *terms.between, *terms.item, *terms.covariates)
@@ -53,7 +50,7 @@ def numbers(rows: pd.DataFrame, name: str) -> Floats:
     return values
 
 
-def groupings(rows: pd.DataFrame, terms: "ModelTerms") -> tuple[Grouping, ...]:
+def groupings(rows: pd.DataFrame, terms: ModelTerms) -> tuple[Grouping, ...]:
     """Participants, items (if any), and the further groupings.
 
     Several columns of items together name them where one is not unique (exemplars numbered afresh within a
@@ -98,7 +95,7 @@ def _refuse_same(group: Grouping, before: list[Grouping]) -> None:
 
 
 def covariate_columns(
-    rows: pd.DataFrame, terms: "ModelTerms", people: Integers
+    rows: pd.DataFrame, terms: ModelTerms, people: Integers
 ) -> tuple[Floats, tuple[str, ...]]:
     """Covariates (n, k) centred, and what was done.
 

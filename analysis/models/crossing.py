@@ -13,7 +13,10 @@ from scipy import sparse
 Floats = NDArray[np.float64]
 
 SPARSE_BELOW = 0.15
-"""Share of cross-products other than zero below which they are kept sparse."""
+"""Share of cross-products other than zero below which they are kept sparse, where they are many."""
+
+MANY = 100_000
+"""N p J^2 / p^2 from which sparse products, p^2 of which are waited for, may be faster than dense ones."""
 
 
 class Eliminated(Protocol):
@@ -46,7 +49,8 @@ def crossing(first: sparse.csr_matrix, rest: sparse.csr_matrix, p: int) -> Cross
     """Cross-products of `first` (n, N p), the p columns of a level side by side, with `rest` (n, J)."""
     sums = sparse.csr_matrix(first.T @ rest)
     rows, columns = sums.shape
-    if sums.nnz < SPARSE_BELOW * rows * columns:  # without a rest it is dense
+    many = rows * columns**2 > MANY * p**2
+    if many and sums.nnz < SPARSE_BELOW * rows * columns:  # without a rest it is dense
         return SparseCrossing(sums, p)
     return DenseCrossing(np.asarray(sums.toarray(), dtype=np.float64).reshape(rows // p, p, columns))
 

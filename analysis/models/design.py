@@ -3,40 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.models.coding import coded_cells
 from analysis.models.columns import Grouping, covariate_columns, groupings, ratings, refuse_unknown_columns
+from analysis.models.roles import ModelTerms, RandomSlopes, Slopes
 from analysis.models.terms import Term, intercept_term
-from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from analysis.within.level_codes import level_codes
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Slopes = Literal["none", "main", "all", "correlated"]
-RandomSlopes = Literal["none", "main", "all"]
-
-
-@dataclass(frozen=True)
-class ModelTerms:
-    """What a model is of: columns by their role.
-
-    `within` vary within participants, `between` do not; `item` (several columns together) names what was
-    rated; `covariates` are numbers, centred; `random` are further groupings with an intercept each, `a/b` for
-    b nested in a.
-    """
-
-    participant: str
-    rating: str
-    within: tuple[str, ...]
-    item: tuple[str, ...] = ()
-    between: tuple[str, ...] = ()
-    covariates: tuple[str, ...] = ()
-    random: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -195,7 +175,7 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     if factors:
         cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape).astype(np.int64)
     _refuse_empty_cells(cell, factors, levels)
-    fixed, spread, effect_of, names = _design(list(factors), levels)
+    fixed, spread, effect_of, names = coded_cells(list(factors), levels)
     numbers, centred = covariate_columns(rows, terms, groups[0].codes)
     data = ModelData(
         terms,
@@ -213,35 +193,6 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     )
     _refuse_collinear(data)
     return data
-
-
-def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
-    """Effects with a by-participant slope (`intercept` first), and what had to be left out."""
-    if slopes == "none":
-        return ["intercept"], []
-    if slopes != "all":
-        effects = ["intercept", *data.terms.within]
-        if slopes == "correlated":
-            _refuse_too_few(data, effects)
-        return effects, []
-    inside = data.slope_effects
-    cells, people = len(data.fixed), data.participants
-    counts = np.bincount(people.codes * cells + data.cell, minlength=len(people.names) * cells)
-    if counts.max() > 1 or not inside:
-        return ["intercept", *inside], []
-    kept = ["intercept", *inside[:-1]]
-    return kept, [f"no slope of {inside[-1]}: with one rating a cell it is the residual"]
-
-
-def _refuse_too_few(data: ModelData, effects: Sequence[str]) -> None:
-    """As many correlated random coefficients as ratings leave no residual."""
-    own = sum(len(data.columns(effect)) for effect in effects)
-    people, ratings = len(data.participants.names), len(data.rating)
-    if own * people >= ratings:
-        raise InputError(
-            f"expected more than {own * people} ratings for {own} correlated coefficients of each of "
-            f"{people} participants, got {ratings}; with one rating a cell use --slopes none or all"
-        )
 
 
 def _by_participant(
@@ -293,35 +244,3 @@ def _refuse_collinear(data: ModelData) -> None:
             f"the covariates {', '.join(data.terms.covariates)} are determined by the factors or by one "
             "another; leave one out"
         )
-
-
-def _sum_coding(levels: int) -> Floats:
-    """Contrasts of R's contr.sum with a column of ones before them, (levels, levels)."""
-    coding = np.eye(levels)[:, :-1]
-    coding[-1] = -1.0
-    return np.hstack([np.ones((levels, 1)), coding])
-
-
-def _design(
-    factors: list[str], levels: Sequence[Sequence[str]]
-) -> tuple[Floats, Floats, tuple[str, ...], tuple[str, ...]]:
-    sizes = [len(names) for names in levels]
-    fixed, spread = [np.ones((int(np.prod(sizes)), 1))], [np.ones((int(np.prod(sizes)), 1))]
-    effect_of, names = ["intercept"], ["intercept"]
-    for members in effect_members(len(factors)):
-        codings: Floats = np.ones((1, 1))
-        bases: Floats = np.ones((1, 1))
-        for axis, size in enumerate(sizes):
-            inside = axis in members
-            codings = np.asarray(np.kron(codings, _sum_coding(size)[:, 1:] if inside else np.ones((size, 1))))
-            basis = orthonormal_basis(size) * np.sqrt(size)
-            bases = np.asarray(np.kron(bases, basis[:, 1:] if inside else np.ones((size, 1))))
-        fixed.append(codings)
-        spread.append(bases)
-        effect = effect_name([factors[m] for m in members])
-        effect_of += [effect] * codings.shape[1]
-        inner = product(*[levels[m][:-1] for m in members])
-        names += [
-            ":".join(f"{factors[m]}[{lv}]" for m, lv in zip(members, row, strict=True)) for row in inner
-        ]
-    return np.hstack(fixed), np.hstack(spread), tuple(effect_of), tuple(names)

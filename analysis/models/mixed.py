@@ -1,8 +1,7 @@
 """Linear mixed models: crossed and nested groupings, by-participant slopes, Satterthwaite tests."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -10,10 +9,11 @@ from numpy.typing import NDArray
 from scipy import special
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.models.design import ModelData, ModelTerms, RandomSlopes, Slopes, model_data, slope_groups
+from analysis.models.design import ModelData, model_data
 from analysis.models.exact import refused_where_exact
+from analysis.models.intervals import with_intervals
 from analysis.models.kenward_roger import KenwardRoger, kenward_roger
-from analysis.models.profile import Profile
+from analysis.models.mixed_result import Coefficient, DfMethod, MixedEffect, MixedResult
 from analysis.models.random_part import (
     Component,
     components_of_people,
@@ -24,69 +24,15 @@ from analysis.models.random_part import (
     untold,
 )
 from analysis.models.reml import CrossProducts, criterion, cross_products
+from analysis.models.roles import ModelTerms, RandomSlopes, Slopes
 from analysis.models.satterthwaite import Uncertainty, uncertainty
+from analysis.models.slopes import slope_groups
 from analysis.models.terms import Term
 from analysis.models.units import Units, units_of
 from analysis.models.variances import fit_theta
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
-DfMethod = Literal["satterthwaite", "kenward-roger"]
-
-
-@dataclass(frozen=True)
-class MixedEffect:
-    """Type III test of a fixed effect; `df_error` is Satterthwaite's, or Kenward and Roger's."""
-
-    effect: str
-    f_value: float
-    df_effect: int
-    df_error: float
-    p_value: float
-
-
-@dataclass(frozen=True)
-class Coefficient:
-    """A sum-coded fixed coefficient with its t test; Kenward and Roger adjust `se` too.
-
-    `ci` is its profile likelihood interval, where asked for.
-    """
-
-    name: str
-    estimate: float
-    se: float
-    df: float
-    t: float
-    p_value: float
-    ci: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class MixedResult:
-    """A fitted mixed model.
-
-    Attributes
-    ----------
-    singular : bool
-        Some variance is estimated as zero.
-    """
-
-    formula: str
-    slopes: Slopes
-    effects: tuple[MixedEffect, ...]
-    coefficients: tuple[Coefficient, ...]
-    components: tuple[Component, ...]
-    reml_criterion: float
-    sigma: float
-    theta: tuple[float, ...]
-    n_ratings: int
-    n_participants: int
-    n_items: int
-    n_groups: dict[str, int]
-    singular: bool
-    notes: tuple[str, ...] = ()
-    factors: tuple[str, ...] = field(default=())
-    df_method: DfMethod = "satterthwaite"
 
 
 def fit_mixed(
@@ -102,6 +48,7 @@ def fit_mixed(
     random_slopes: RandomSlopes = "none",
     df_method: DfMethod = "satterthwaite",
     intervals: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> MixedResult:
     """Fit rating ~ full factorial of the factors + covariates with crossed random groupings by REML.
 
@@ -134,6 +81,8 @@ def fit_mixed(
         coefficients.
     intervals : bool, optional
         Add 95% profile likelihood intervals of coefficients and standard deviations.
+    progress : callable, optional
+        Takes a word on every interval before it is computed.
 
     Raises
     ------
@@ -159,7 +108,7 @@ def fit_mixed(
             theta = fit_theta(c)
         fitted = _Fitted(data, random_terms, c, theta, units)
         result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes))
-        return _with_intervals(result, c, theta, units) if intervals else result
+        return with_intervals(result, c, theta, units, progress) if intervals else result
 
 
 @dataclass(frozen=True)
@@ -218,32 +167,6 @@ def _result(
         factors=data.factors,
         df_method=df_method,
     )
-
-
-def _with_intervals(result: MixedResult, c: CrossProducts, theta: Floats, units: Units) -> MixedResult:
-    """Add profile intervals; standard deviations of correlated slopes are no parameters and have none."""
-    profile = Profile(c, theta)
-    without = len(c.blocks[0].patterns[0]) if result.slopes == "correlated" else 0
-    first = c.blocks[0].theta.stop if result.slopes == "correlated" else 0
-    ends: list[tuple[float, float] | None] = [None] * without
-    ends += [profile.sd(k) for k in range(first, len(theta))]
-    ends.append(profile.sigma())
-    coefficients = tuple(
-        replace(row, ci=units.interval(profile.coefficient(column), intercept=column == 0))
-        for column, row in enumerate(result.coefficients)
-    )
-    components = tuple(
-        replace(row, ci=ci and units.interval(ci)) for row, ci in zip(result.components, ends, strict=True)
-    )
-    named = [(row.name, row.ci) for row in coefficients]
-    named += [(f"{row.group} {row.term}".strip(), row.ci) for row in components]
-    open_ended = [name for name, ci in named if ci and not np.isfinite(ci).all()]
-    notes = result.notes
-    if open_ended:
-        notes += (
-            f"the likelihood bounds no profile interval of {', '.join(open_ended)} on at least one side",
-        )
-    return replace(result, coefficients=coefficients, components=components, notes=notes)
 
 
 def _coefficients(

@@ -7,13 +7,15 @@ import pandas as pd
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.models.design import ModelData, ModelTerms, Slopes, model_data, slope_groups
+from analysis.models.design import ModelData, model_data
 from analysis.models.laplace import LaplaceLikelihood
 from analysis.models.ordinal_data import OrdinalData
 from analysis.models.ordinal_maximum import maximise, pooled_start
 from analysis.models.ordinal_result import OrdinalResult, RandomTerms, ordinal_result
 from analysis.models.quadrature import QuadratureLikelihood
+from analysis.models.roles import ModelTerms, Slopes
 from analysis.models.separation import refuse_separation
+from analysis.models.slopes import slope_groups
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]

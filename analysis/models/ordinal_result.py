@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from analysis.models.design import ModelData, Slopes
+from analysis.models.design import ModelData
 from analysis.models.ordinal_data import Parameters
 from analysis.models.ordinal_maximum import SD_MAX, Maximum
+from analysis.models.roles import Slopes
 
 Floats = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ As lme4's `confint(method = "profile")`: maximum likelihood, every other paramet
 (Bates et al. 2015, doi:10.18637/jss.v067.i01, section 5.1); the ends are solved for, where lme4 interpolates.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +16,10 @@ from analysis.models.reml import Criterion, CrossProducts, criterion
 
 Floats = NDArray[np.float64]
 Bound = tuple[float | None, float | None]
+Fit = tuple[Floats, float]
+"""Where a deviance is least, and how much it is there."""
+FitAt = Callable[[float, Sequence[Floats]], Fit]
+"""The fit with the profiled parameter at a value, from the best of some starts."""
 
 TOLERANCE = 1e-6
 """Relative precision of an end, in units of the distance from the estimate."""
@@ -29,6 +33,9 @@ LIFT = 0.05
 
 START_APART = 0.5
 """Relative standard deviation of the second start of every minimum: the deviance may have two."""
+
+SLACK = 1e-5
+"""By how much less the deviance may have risen at an end from other starts."""
 
 MAX_DOUBLINGS = 12
 """How often the bracket of an end is widened before the end counts as not there."""
@@ -63,7 +70,7 @@ class Profile:
         ]
         self._rise = float(special.chdtri(1, 1 - confidence))
         self._reach = float(np.sqrt(self._rise))
-        self._theta, self._least = self._fitted(c, start)
+        self._theta, self._least = self._fitted(c, (start, self._apart()))
         self._best = criterion(c, self._theta, reml=False)
 
     def coefficient(self, column: int) -> tuple[float, float]:
@@ -71,36 +78,44 @@ class Profile:
         estimate = float(self._best.beta[column])
         se = self._best.sigma * float(np.sqrt(self._best.unscaled[column, column]))
 
-        def deviance(value: float) -> float:
-            return self._fitted(_without(self._c, column, value), self._theta)[1]
+        def fit(value: float, starts: Sequence[Floats]) -> Fit:
+            return self._fitted(_without(self._c, column, value), starts)
 
-        return self._end(deviance, estimate, -se), self._end(deviance, estimate, se)
+        starts = (self._theta, self._apart())
+        return self._end(fit, starts, estimate, -se), self._end(fit, starts, estimate, se)
 
     def sigma(self) -> tuple[float, float]:
         """Interval of the residual standard deviation."""
         estimate = self._best.sigma
         se = estimate / np.sqrt(2 * self._c.n)
 
-        def deviance(value: float) -> float:
+        def fit(value: float, starts: Sequence[Floats]) -> Fit:
             return self._minimised(
-                self._theta,
+                self._c,
+                starts,
                 lambda at: _deviance(self._c.n, at, value),
                 lambda at: at.grad_h + at.grad_r2 / value**2,
-            )[1]
+            )
 
-        return self._end(deviance, estimate, -se, floor=0.0), self._end(deviance, estimate, se)
+        starts = (self._theta, self._apart())
+        return self._end(fit, starts, estimate, -se, floor=0.0), self._end(fit, starts, estimate, se)
 
     def sd(self, k: int) -> tuple[float, float]:
         """Interval of the standard deviation of the random term of theta k; its low end may be zero."""
         estimate = self._best.sigma * float(self._theta[k])
         step = max(estimate / 4, self._best.sigma / 50)
-        low = 0.0
-        if estimate > 0 and self._held(k, 0.0) - self._least > self._rise:
-            low = self._end(lambda value: self._held(k, value), estimate, -min(step, estimate / 2), floor=0.0)
-        return low, self._end(lambda value: self._held(k, value), estimate, step)
+        low, log_sigma = 0.0, np.log(self._best.sigma)
+        starts = [np.r_[log_sigma, np.delete(one, k)] for one in (self._theta, self._apart())]
 
-    def _held(self, k: int, value: float) -> float:
-        """Least deviance with the standard deviation of theta k at `value`, over all other parameters."""
+        def fit(value: float, starts: Sequence[Floats]) -> Fit:
+            return self._held(k, value, starts)
+
+        if estimate > 0 and fit(0.0, starts)[1] - self._least > self._rise:
+            low = self._end(fit, starts, estimate, -min(step, estimate / 2), floor=0.0)
+        return low, self._end(fit, starts, estimate, step)
+
+    def _held(self, k: int, value: float, starts: Sequence[Floats]) -> Fit:
+        """Least deviance with the standard deviation of theta k at `value`, over log sigma and all others."""
         others = np.delete(np.arange(len(self._theta)), k)
         n = self._c.n
 
@@ -113,36 +128,51 @@ class Profile:
             return _deviance(n, at, sigma), np.concatenate([[by_sigma], by_theta[others]])
 
         bounds: list[Bound] = [(None, None), *(self._bounds[other] for other in others)]
-        fitted = np.concatenate([[np.log(self._best.sigma)], self._theta[others]])
-        apart = np.concatenate([[np.log(self._best.sigma)], self._apart()[others]])
-        return min(_minimum(objective, start, bounds)[1] for start in (fitted, apart))
+        return _least_of(_minimum(objective, start, bounds) for start in starts)
 
-    def _fitted(self, c: CrossProducts, start: Floats) -> tuple[Floats, float]:
-        return self._minimised(start, lambda at: at.value, lambda at: at.gradient, c)
+    def _fitted(self, c: CrossProducts, starts: Sequence[Floats]) -> Fit:
+        return self._minimised(c, starts, lambda at: at.value, lambda at: at.gradient)
 
     def _minimised(
         self,
-        start: Floats,
+        c: CrossProducts,
+        starts: Sequence[Floats],
         value: Callable[[Criterion], float],
         gradient: Callable[[Criterion], Floats],
-        c: CrossProducts | None = None,
-    ) -> tuple[Floats, float]:
+    ) -> Fit:
         def objective(theta: Floats) -> tuple[float, Floats]:
-            at = criterion(c or self._c, theta, reml=False)
+            at = criterion(c, theta, reml=False)
             return value(at), gradient(at)
 
-        starts = (start, self._apart())
-        return min((_minimum(objective, one, self._bounds) for one in starts), key=lambda fit: fit[1])
+        return _least_of(_minimum(objective, start, self._bounds) for start in starts)
 
     def _apart(self) -> Floats:
         """A start whose random terms all have a variance."""
-        return np.array([START_APART if bound[0] == 0.0 else 0.0 for bound in self._bounds])
+        return np.array([START_APART * (bound[0] == 0.0) for bound in self._bounds])
 
     def _end(
-        self, deviance: Callable[[float], float], estimate: float, step: float, floor: float = -np.inf
+        self,
+        fit: FitAt,
+        starts: Sequence[Floats],
+        estimate: float,
+        step: float,
+        floor: float = -np.inf,
     ) -> float:
-        """Where the deviance has risen by chi-squared, on the side of `step`; NaN where it never does."""
+        """Where the deviance has risen by chi-squared, on the side of `step`; NaN where it never does.
 
+        Every fit goes on from those before it, which may lead into a minimum that is not the least: the end
+        is fitted once more from `starts`, and where that is lower everything is. Without an end there, there
+        is none.
+        """
+        path = _Path(fit, estimate, starts[0])
+        end = self._solved(path.least, estimate, step, floor)
+        if np.isnan(end) or fit(end, starts)[1] - self._least > self._rise - SLACK:
+            return end
+        return self._solved(lambda value: fit(value, starts)[1], estimate, step, floor)
+
+    def _solved(
+        self, deviance: Callable[[float], float], estimate: float, step: float, floor: float
+    ) -> float:
         @cache
         def lacking(distance: float) -> float:
             if not distance:
@@ -154,16 +184,33 @@ class Profile:
         for _ in range(MAX_DOUBLINGS):
             far = max(far, (floor - estimate) * (1 - 1e-6)) if step < 0 else far
             if lacking(far) > 0:
-                distance = optimize.brentq(
-                    lacking,
-                    near,
-                    far,
-                    xtol=TOLERANCE * abs(far),
-                    rtol=1e-12,
-                )
-                return estimate + float(distance)
+                root = optimize.brentq(lacking, near, far, xtol=TOLERANCE * abs(far), rtol=1e-12)
+                return estimate + float(root)
             near, far = far, 2 * far
         return float("nan")
+
+
+class _Path:
+    """Fits along one parameter, each begun where those before it point to."""
+
+    def __init__(self, fit: FitAt, estimate: float, optimum: Floats) -> None:
+        self._fit = fit
+        self._known = [(estimate, optimum)]
+
+    def least(self, value: float) -> float:
+        """The deviance at `value`."""
+        self._known.sort(key=lambda one: abs(one[0] - value))
+        (at, start), *further = self._known
+        if further and further[0][0] != at:
+            behind, other = further[0]
+            start = start + (start - other) * (value - at) / (at - behind)
+        optimum, least = self._fit(value, [start])
+        self._known.append((value, optimum))
+        return least
+
+
+def _least_of(fits: Iterable[Fit]) -> Fit:
+    return min(fits, key=lambda fit: fit[1])
 
 
 def _deviance(n: int, at: Criterion, sigma: float) -> float:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.columns import Grouping
-from analysis.models.design import ModelData, RandomSlopes, Slopes
+from analysis.models.design import ModelData
+from analysis.models.roles import RandomSlopes, Slopes
 from analysis.models.satterthwaite import Uncertainty
 from analysis.models.variances import SINGULAR_THETA
 from experiments.errors import InputError

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from analysis.models.design import RandomSlopes
-    from analysis.models.mixed import MixedResult
+    from analysis.models.mixed_result import MixedResult
+    from analysis.models.roles import RandomSlopes
 
 MAX_SLOPES = 500
 """With more coefficients of levels than this the model would keep the report waiting."""

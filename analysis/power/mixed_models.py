@@ -10,8 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.models.design import ModelData, ModelTerms, RandomSlopes, model_data
+from analysis.models.design import ModelData, model_data
 from analysis.models.reml import criterion, cross_products
+from analysis.models.roles import ModelTerms, RandomSlopes
 from analysis.models.satterthwaite import uncertainty
 from analysis.models.terms import Term
 from analysis.models.variances import fit_theta

@@ -1,6 +1,6 @@
 """Mixed and ordinal models as tables."""
 
-from analysis.models.mixed import MixedResult
+from analysis.models.mixed_result import MixedResult
 from analysis.models.ordinal_result import OrdinalResult
 from analysis.report.captions import caption
 from analysis.report.formats import Table

@@ -11,7 +11,7 @@ from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
 
 if TYPE_CHECKING:
-    from analysis.models.mixed import MixedResult
+    from analysis.models.mixed_result import MixedResult
     from analysis.models.ordinal_result import OrdinalResult
 
 Rows = list[list[Any]]
@@ -28,7 +28,7 @@ def model_files(
     No file for an ordinal model with slopes of a factor of three levels or more, whose contrasts share one
     variance here: clmm has no such model. lme4 has, by its own deviance function.
     """
-    from analysis.models.mixed import MixedResult
+    from analysis.models.mixed_result import MixedResult
 
     is_mixed = isinstance(model, MixedResult)
     kind = "mixed" if is_mixed else "ordinal"

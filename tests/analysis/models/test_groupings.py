@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.models.mixed import MixedResult, fit_mixed
+from analysis.models.mixed import fit_mixed
+from analysis.models.mixed_result import MixedResult
 from analysis.models.ordinal import fit_ordinal
 from experiments.errors import InputError
 

@@ -9,7 +9,9 @@ import pytest
 from scipy import optimize
 
 from analysis.models.kenward_roger import _df_and_scale
-from analysis.models.mixed import MixedResult, fit_mixed
+from analysis.models.mixed import fit_mixed
+from analysis.models.mixed_result import MixedResult
+from analysis.models.profile import _Path
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r"
@@ -108,6 +110,32 @@ def test_a_variance_that_may_be_zero_begins_at_zero() -> None:
     low, high = result.components[0].ci or (np.nan, np.nan)
     assert low == 0.0
     assert 0 < high < 1.5
+
+
+def test_every_interval_is_told_before_it_is_computed() -> None:
+    told: list[str] = []
+    fit_mixed(few(8), "who", "y", ["A"], slopes="none", intervals=True, progress=told.append)
+    assert told == [
+        "interval 1 of 4, SD of who intercept",
+        "interval 3 of 4, intercept",
+        "interval 4 of 4, A[a0]",
+    ]
+
+
+def test_an_end_in_another_minimum_is_fitted_anew(monkeypatch) -> None:
+    """Fits that go on from one another may follow a minimum that is not the least."""
+    rows = few()
+    right = fit_mixed(rows, "who", "y", ["A"], slopes="none", intervals=True)
+    monkeypatch.setattr(_Path, "least", lambda self, value: self._fit(value, [])[1])
+    monkeypatch.setattr("analysis.models.profile._least_of", _misled)
+    misled = fit_mixed(rows, "who", "y", ["A"], slopes="none", intervals=True)
+    for one, other in zip(right.coefficients, misled.coefficients, strict=True):
+        assert one.ci == pytest.approx(other.ci, rel=1e-6)
+
+
+def _misled(fits):
+    """The least of the fits; of none a deviance far too high, as a minimum that is not the least has."""
+    return min(fits, key=lambda fit: fit[1], default=(np.zeros(1), 1e6))
 
 
 def test_correlated_slopes_have_no_interval_of_their_sd() -> None:

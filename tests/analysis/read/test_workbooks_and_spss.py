@@ -7,7 +7,8 @@ import pandas as pd
 import pyreadstat
 import pytest
 
-from analysis.models.design import ModelTerms, model_data
+from analysis.models.design import model_data
+from analysis.models.roles import ModelTerms
 from analysis.read.long_csv import LongData, read_long_table
 from analysis.read.model_csv import read_model_input
 from analysis.within.cell_means import cell_table
