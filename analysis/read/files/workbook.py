@@ -9,6 +9,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 from analysis.read.files.cells import Cells, cells_of
+from analysis.read.files.workbook_size import refuse_too_large
 from experiments.errors import InputError, did_you_mean
 
 Rows = list[list[Any]]
@@ -28,9 +29,9 @@ class Page:
 
 _UNREADABLE = (
     *(BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError),
-    *(AttributeError, TypeError, IndexError, SyntaxError),
+    *(AttributeError, TypeError, IndexError, SyntaxError, RuntimeError),
 )
-"""What openpyxl raises of damaged or unusual workbooks; broken XML is a SyntaxError."""
+"""What openpyxl raises of damaged workbooks: SyntaxError of broken XML, RuntimeError of a password."""
 
 
 def header(path: Path, sheet: str | None) -> list[str]:
@@ -115,6 +116,7 @@ def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
     from openpyxl import load_workbook
     from openpyxl.utils.exceptions import InvalidFileException
 
+    refuse_too_large(path)
     try:
         book = load_workbook(path, data_only=not formulas)
     except (*_UNREADABLE, InvalidFileException) as error:
