@@ -44,7 +44,7 @@ class TextTable:
         return "synthetic" in self.columns and bool((self.columns["synthetic"] == "1").any())
 
     def line(self, row: int) -> int:
-        """Line of the file on which data row `row` (from 0) stands, where no cell spans lines."""
+        """Line of the file on which data row `row` (from 0) begins."""
         return int(self.lines[row])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.read.files.cells import Cells
-from analysis.read.files.raggedness import refuse_ragged
+from analysis.read.files.raggedness import lines_of_rows
 from experiments.errors import InputError
 
 _MARKS = (
@@ -70,15 +70,16 @@ def delimited_header(path: Path) -> tuple[list[str], str]:
 def delimited_cells(path: Path, names: list[str]) -> Cells:
     """The columns `names` of a CSV file; rows of unequal length are refused."""
     header, separator = delimited_header(path)
+    with utf8(path) as file:
+        lines = lines_of_rows(file, separator, len(header), path.name)[1:]
     frame = _parse(path, separator, [header.index(name) for name in names], len(header))
     frame.columns = pd.Index(names)
-    lines = np.arange(len(frame), dtype=np.int64) + 2
+    if len(lines) != len(frame):  # a header of several lines, or cells of blanks in a table of one column
+        lines = np.arange(len(frame), dtype=np.int64) + 2
     return Cells(frame, tuple(header), lines)
 
 
 def _parse(path: Path, separator: str, positions: list[int], width: int) -> pd.DataFrame:
-    with utf8(path) as file:
-        refuse_ragged(file, separator, width, path.name)
     try:
         with warnings.catch_warnings(), utf8(path) as file:
             warnings.simplefilter("error")

@@ -8,10 +8,10 @@ from experiments.errors import InputError
 _QUOTED = re.compile(rb'"(?:[^"]|"")*(?P<close>"|\Z)')
 
 
-def refuse_damaged_quotes(data: bytes, separator: str, width: int, name: str) -> None:
-    """Go through the cells of a whole file one by one, as a parser does, with every doubt raised as one line.
+def lines_by_cells(data: bytes, separator: str, width: int, name: str) -> list[int]:
+    """The line on which every row begins, from the cells of a whole file one by one, as a parser takes them.
 
-    Quotes within a cell that does not begin with one are text. Blank lines are allowed.
+    Quotes within a cell that does not begin with one are text. Blank lines are no rows.
 
     Raises
     ------
@@ -20,16 +20,19 @@ def refuse_damaged_quotes(data: bytes, separator: str, width: int, name: str) ->
         `width` cells.
     """
     first, line = 1, 1
-    cells = 0
+    cells, begun = 0, []
     for cell, blank, ends_row in _cells(data, separator.encode(), name):
         cells += 1
         line += cell.count(b"\n")
         if not ends_row:
             continue
-        if cells != width and not (blank and cells == 1):
+        empty = blank and cells == 1
+        if cells != width and not empty:
             raise wrong_width(name, first, line, cells, width)
+        begun += [] if empty else [first]
         line += 1
         first, cells = line, 0
+    return begun
 
 
 def wrong_width(name: str, first: int, last: int, cells: int, width: int) -> InputError:

@@ -1,22 +1,23 @@
-"""Find the first line of a CSV file whose number of cells differs from the header's."""
+"""The lines on which the rows of a CSV file begin; a row that has not the header's width is refused."""
 
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.read.files.quotes import refuse_damaged_quotes, wrong_width
+from analysis.read.files.quotes import lines_by_cells, wrong_width
 
 Bytes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
+Lines = NDArray[np.int64]
 
 _BLOCK = 1 << 24
 _NEWLINE, _QUOTE, _RETURN = 10, 34, 13
 _MARK = b"\xef\xbb\xbf"
 
 
-def refuse_ragged(file: BinaryIO, separator: str, width: int, name: str) -> None:
-    """Raise InputError naming the first line that has not `width` cells; blank lines are allowed.
+def lines_of_rows(file: BinaryIO, separator: str, width: int, name: str) -> Lines:
+    """The line on which every row begins, the header's first; blank lines are no rows.
 
     Needed because a parser told which columns to read drops surplus cells without a word. Files whose double
     quotes do not enclose whole cells are gone through cell by cell, which takes longer.
@@ -25,8 +26,14 @@ def refuse_ragged(file: BinaryIO, separator: str, width: int, name: str) -> None
     ----------
     file : BinaryIO
         The file, UTF-8 with or without byte order mark, opened at its beginning.
+
+    Raises
+    ------
+    InputError
+        A row that has not `width` cells, or a damaged quote, with its line.
     """
     line, carry = 1, np.empty(0, np.uint8)
+    begun: list[Lines] = []
     if file.read(len(_MARK)) != _MARK:
         file.seek(0)
     while True:
@@ -36,12 +43,13 @@ def refuse_ragged(file: BinaryIO, separator: str, width: int, name: str) -> None
         outside = _outside_quotes(carry, ord(separator), end)
         if outside is None:
             file.seek(0)
-            refuse_damaged_quotes(file.read().removeprefix(_MARK), separator, width, name)
-            return
-        whole, lines = _check(carry, outside, ord(separator), width, line, name)
+            data = file.read().removeprefix(_MARK)
+            return np.array(lines_by_cells(data, separator, width, name), dtype=np.int64)
+        whole, lines, of_rows = _check(carry, outside, ord(separator), width, line, name)
+        begun.append(of_rows)
         line, carry = line + lines, carry[whole:]
         if end:
-            return
+            return np.concatenate(begun)
 
 
 def _outside_quotes(data: Bytes, separator: int, end: bool) -> Flags | None:
@@ -68,11 +76,11 @@ def _outside_quotes(data: Bytes, separator: int, end: bool) -> Flags | None:
 
 def _check(
     data: Bytes, outside: Flags, separator: int, width: int, first_line: int, name: str
-) -> tuple[int, int]:
-    """Check the whole lines of `data`; give back the bytes and the lines they took."""
+) -> tuple[int, int, Lines]:
+    """Check the whole lines of `data`; give back the bytes and the lines they took, and the rows' lines."""
     ends = np.flatnonzero((data == _NEWLINE) & outside)
     if ends.size == 0:
-        return 0, 0
+        return 0, 0, np.empty(0, np.int64)
     before = np.searchsorted(np.flatnonzero((data == separator) & outside), ends)
     cells = np.diff(before, prepend=0) + 1
     lengths = np.diff(ends, prepend=-1) - 1
@@ -85,4 +93,5 @@ def _check(
         last = first + int((data[starts[row] : ends[row]] == _NEWLINE).sum())
         raise wrong_width(name, first, last, int(cells[row]), width)
     whole = int(ends[-1]) + 1
-    return whole, int((data[:whole] == _NEWLINE).sum())
+    newlines = np.flatnonzero(data[:whole] == _NEWLINE)
+    return whole, len(newlines), first_line + np.searchsorted(newlines, starts[~blank]).astype(np.int64)

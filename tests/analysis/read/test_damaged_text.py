@@ -6,6 +6,7 @@ import pandas as pd
 import pyreadstat
 import pytest
 
+from analysis.read.files import raggedness
 from analysis.read.long_csv import read_long_table
 from analysis.read.text_table import _names_to_read
 from analysis.within.cell_means import cell_table
@@ -157,3 +158,30 @@ def test_text_of_a_workbook_may_have_two(tmp_path) -> None:
     written(tmp_path / "a.xlsx", ["1.003", 950])
     with pytest.raises(InputError, match=r"can be read as 1\.003 or as 1003"):
         ratings(tmp_path / "a.xlsx")
+
+
+@pytest.mark.parametrize(
+    ("body", "line"),
+    [
+        ("p1,a,3\n\n\np1,b,4\n\np2,a,x\n", 7),
+        ("\r\n\r\np1,a,3\r\np2,a,x\r\n", 5),
+        ('p1,"a\nb",3\n\np2,a,x\n', 5),
+        ('p1,5" a,3\n\np2,a,x\n', 4),
+        ("p1,a,3\n\np2,a,x", 4),
+    ],
+    ids=["LF", "CR LF", "a cell of two lines", "a quote in a cell", "no newline at the end"],
+)
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_lines_are_those_of_an_editor_where_blank_ones_are_skipped(tmp_path, body, line, mark) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(f"{mark}id,face,score\n{body}".encode())
+    with pytest.raises(InputError, match=f"got 'x' in line {line}$"):
+        ratings(path)
+
+
+def test_lines_stay_true_over_blocks(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(raggedness, "_BLOCK", 7)
+    path = tmp_path / "a.csv"
+    path.write_text("id,face,score\n" + "\np1,a,3\n" * 20 + "p2,a,x\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"got 'x' in line 42$"):
+        ratings(path)
