@@ -84,7 +84,7 @@ def fit_threshold(
     location = centre + unit * best[0]
     log_spread = best[1] + (0.0 if shape == "weibull" else float(np.log(unit)))
     lapsed = best[2] if lapse is None else lapse
-    notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None)
+    notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None) + _below(trials, guess)
     low, high = float(trials.x.min()), float(trials.x.max())
     if not low - 3 * (high - low) <= location <= high + 3 * (high - low):
         raise InputError(
@@ -189,3 +189,15 @@ def _doubts(
     if shape != "weibull" and np.exp(log_spread) > 10 * (trials.x.max() - trials.x.min()):
         notes.append("the answers hardly change over the levels shown")
     return notes
+
+
+def _below(trials: Trials, guess: float) -> list[str]:
+    """Say at which level fewer answers are yes than guessing alone gives, with p below .001 over levels."""
+    chance = np.asarray(stats.binom.cdf(trials.k, trials.n, guess))
+    if guess == 0 or chance.min() * trials.x.size > 0.001:
+        return []
+    at = int(chance.argmin())
+    return [
+        f"at {trials.x[at]:g} {trials.k[at]:g} of {trials.n[at]:g} answers are yes, fewer than a guess rate "
+        f"of {guess:g} gives: the threshold holds only if that is the guess rate"
+    ]

@@ -146,3 +146,12 @@ def test_people_without_a_threshold_of_their_own_are_counted_beside_the_mean(tmp
     assert "all: 1 of 5 people have no threshold of their own and are not in the mean" in said
     path.write_text("\n".join(["id,x,r", *rows[:160]]))
     assert "no threshold of their own" not in CliRunner().invoke(app, call).output
+
+
+def test_answers_rarer_than_guessing_gives_are_named() -> None:
+    x, n = np.array([20.0, 40, 60, 80]), np.full(4, 32.0)
+    trials = Trials(x, n, np.array([2.0, 10, 24, 31]))
+    (said,) = fit_threshold(trials, "normal", 0.5, 0.0).notes
+    assert said.startswith("at 20 2 of 32 answers are yes, fewer than a guess rate of 0.5 gives")
+    assert not fit_threshold(trials, "normal", 0.05, 0.0).notes
+    assert not fit_threshold(Trials(x, n, np.array([12.0, 18, 27, 31])), "normal", 0.5, 0.0).notes
