@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from rich.console import Console
 from rich.table import Table
 
+from tools.load_clips import clips
 from tools.load_measures import Row
 from tools.load_otree import peer
 from tools.load_scenarios import burst, export, starts, steady, under_fire
@@ -42,6 +43,7 @@ def scenarios(share: float, seconds: float, workers: int) -> dict[str, Callable[
         "postgres": lambda: steady("postgres", int(1000 * share), seconds, workers, 60, math.inf),
         "starts": lambda: starts("sqlite", int(300 * share), int(300 * share), seconds / 2, 1, 150),
         "snapshots": lambda: snapshots(int(300 * share), seconds, int(STORED_ROWS * share), 150),
+        "clips": lambda: clips(seconds / 4, 10),
         "burst": lambda: burst("sqlite", begin_at_once, 1) + burst("postgres", begin_at_once, workers),
         "many": lambda: steady("postgres", int(5000 * share), seconds, workers, math.inf, math.inf),
         "kill": lambda: under_fire(int(200 * share), seconds, workers),

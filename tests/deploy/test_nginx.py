@@ -1,0 +1,135 @@
+"""`deploy/nginx.conf`: as strict as the Caddyfile, and clips are asked of the server once."""
+
+import shutil
+import subprocess
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import REPOSITORY
+from tools.load_nginx import configuration, nginx, nginx_program
+
+CLIP = bytes(range(256)) * 1000
+ADDRESS = f"/clips/{'ab' * 32}.mp4"
+TEXT = (REPOSITORY / "deploy" / "nginx.conf").read_text(encoding="utf-8")
+
+
+class Upstream(BaseHTTPRequestHandler):
+    """Answers as the server does, and remembers what it was asked."""
+
+    protocol_version = "HTTP/1.1"
+    asked: list[tuple[str, str]]
+
+    def do_GET(self) -> None:
+        """Send the clip, whatever is asked for."""
+        self.asked.append((self.path, self.headers["x-forwarded-for"]))
+        self.send_response(200)
+        self.send_header("content-type", "video/mp4")
+        self.send_header("content-length", str(len(CLIP)))
+        self.send_header("accept-ranges", "bytes")
+        if self.path.startswith("/clips/"):
+            self.send_header("cache-control", "public, max-age=31536000, immutable")
+        self.end_headers()
+        self.wfile.write(CLIP)
+
+    def do_POST(self) -> None:
+        """Take what is sent."""
+        self.rfile.read(int(self.headers["content-length"]))
+        self.send_response(201)
+        self.send_header("content-length", "0")
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        """Nothing."""
+
+
+@contextmanager
+def upstream() -> Iterator[tuple[int, list[tuple[str, str]]]]:
+    asked: list[tuple[str, str]] = []
+    handler = type("Handler", (Upstream,), {"asked": asked})
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield server.server_address[1], asked
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.fixture
+def program() -> str:
+    found = nginx_program()
+    if found is None:
+        pytest.skip("nginx is not installed here")
+    return found
+
+
+def answer(port: int, path: str, **headers: str) -> tuple[int, bytes]:
+    request = urllib.request.Request(f"http://127.0.0.1:{port}{path}", headers=headers)
+    try:
+        with urllib.request.urlopen(request, timeout=30) as got:
+            return got.status, got.read()
+    except urllib.error.HTTPError as refused:
+        return refused.code, b""
+
+
+def test_a_clip_is_asked_of_the_server_once_and_sent_whole_or_in_parts(program: str, tmp_path: Path) -> None:
+    with upstream() as (behind, asked), nginx(program, tmp_path, behind) as proxy:
+        assert answer(proxy.port, ADDRESS) == (200, CLIP)
+        assert answer(proxy.port, ADDRESS) == (200, CLIP)
+        assert answer(proxy.port, ADDRESS, Range="bytes=10-19") == (206, CLIP[10:20])
+        assert asked == [(ADDRESS, "127.0.0.1")]
+        # By its own word a client is nobody else.
+        for _ in range(2):
+            assert answer(proxy.port, "/api/links/a", **{"x-forwarded-for": "9.9.9.9"})[0] == 200
+        assert asked[1:] == 2 * [("/api/links/a", "127.0.0.1")]
+
+
+def test_a_first_part_leaves_the_whole_clip_behind(program: str, tmp_path: Path) -> None:
+    with upstream() as (behind, asked), nginx(program, tmp_path, behind) as proxy:
+        assert answer(proxy.port, ADDRESS, Range="bytes=0-9") == (206, CLIP[:10])
+        assert answer(proxy.port, ADDRESS) == (200, CLIP)
+        assert len(asked) == 1
+
+
+def test_operations_are_not_for_the_world_and_bodies_are_bounded(program: str, tmp_path: Path) -> None:
+    with upstream() as (behind, _), nginx(program, tmp_path, behind) as proxy:
+        assert [answer(proxy.port, path)[0] for path in ("/metrics", "/readyz")] == [404, 404]
+        for path, bytes_at_most in (
+            ("/api/links/a/runs", 64 << 10),
+            ("/api/run/ratings/1", 512 << 10),
+            ("/api/admin/session", 64 << 10),
+            ("/api/admin/invitations/x", 64 << 10),
+            ("/api/admin/studies", 16 << 20),
+        ):
+            assert posted(proxy.port, path, bytes_at_most + 1) == 413, path
+            assert posted(proxy.port, path, bytes_at_most) == 201, path
+        assert posted(proxy.port, "/api/admin/uploads", 17 << 20) == 201
+
+
+def posted(port: int, path: str, size: int) -> int:
+    """The status of a POST that says it is so long; its body follows where it is asked for."""
+    done = subprocess.run(
+        [
+            shutil.which("curl") or pytest.skip("curl is not installed here"),
+            *("-s", "-o", "/dev/null", "-w", "%{http_code}", "--data-binary", "@-"),
+            f"http://127.0.0.1:{port}{path}",
+        ],
+        input=b"x" * size,
+        stdout=subprocess.PIPE,
+        check=False,
+    )
+    return int(done.stdout)
+
+
+def test_the_file_keeps_no_addresses_and_says_what_was_changed_for_loopback(tmp_path: Path) -> None:
+    assert "access_log off;" in TEXT
+    assert "listen 443 ssl" in TEXT
+    site = (configuration(tmp_path, 8123, 8124).parent / "site.conf").read_text(encoding="utf-8")
+    assert "server 127.0.0.1:8123;" in site
+    assert "listen 127.0.0.1:8124" in site
+    assert "ssl" not in site
