@@ -58,9 +58,11 @@ def link(
 
     Example: server admin link --role experimenter --label "Ada"
     """
-    settings = Settings()
-    _, token = invitations.invite(open_database(settings), one_of(ROLES, role, "the role"), label, None)
-    Console(soft_wrap=True).print(invitation_url(settings.public_url, token), highlight=False)
+    known = one_of(ROLES, role, "the role")
+    with migrated_services() as services:
+        _, token = invitations.invite(services.database, known, label, None)
+        address = invitation_url(services.settings.public_url, token)
+    Console(soft_wrap=True).print(address, highlight=False)
 
 
 @account_app.command("reset-password")

@@ -17,7 +17,7 @@ from server.models import Clip, Link, Study, StudyRun, StudyVersion
 from server.results.repository import Pool
 from server.settings import Settings
 from server.tallies.pools import pooled
-from tests.helpers.databases import run_server_command
+from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 from tests.helpers.tiny_clips import make_clip_folder
 
@@ -250,3 +250,12 @@ def test_a_draft_is_rehearsed_and_no_count_of_people_knows(
         counts = [pooled(session, pool.runs(), SCALE_NAME, ()).answers.total() for pool in pools]
     assert counts[:2] == [0, 0]
     assert counts[2] >= 15
+
+
+@pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
+def test_the_first_account_can_be_invited_before_the_server_ever_ran(
+    empty_database_url: str, tmp_path: Path
+) -> None:
+    settings = Settings(data_folder=tmp_path / "data", database_url=empty_database_url, secret_key="k")
+    called = run_server_command(settings, "admin", "link")
+    assert (called.returncode, "/admin/invitation#" in called.stdout) == (0, True), called.stderr
