@@ -24,6 +24,10 @@ COMMANDS = {
         "stimuli_builder.tracking.cli",
         "Propose labels for frames chosen for variety, with the eye detector, to be corrected by hand.",
     ),
+    "iris": (
+        "stimuli_builder.tracking.cli",
+        "Measure the irises of a tracked recording, and the millimetres in a pixel that follow.",
+    ),
     "blinks": (
         "stimuli_builder.blinks.cli",
         "Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.",

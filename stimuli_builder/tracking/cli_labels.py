@@ -1,4 +1,4 @@
-"""`stimuli label` and `stimuli accuracy`."""
+"""`stimuli label`, `stimuli accuracy` and `stimuli iris`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +10,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     app.command()(accuracy)
     app.command()(label)
+    app.command()(iris)
 
 
 def accuracy(
@@ -68,3 +69,38 @@ def label(
         seen = survey(info, one_eye=one_eye, advance=lambda now: progress.update(task, completed=now))
     labels = proposed_labels(info, seen, out, frames)
     print(f"{out}: {len(labels.frames)} frames proposed; review each one before training")
+
+
+def iris(
+    video: Annotated[Path, typer.Argument(help="Recording that was tracked.")],
+    track: Annotated[Path, typer.Argument(help="Its track (CSV of 'stimuli track').")],
+    out: Annotated[Path, typer.Option(help="Table of the irises to write (CSV).")],
+) -> None:
+    """Measure the irises of a tracked recording, and the millimetres in a pixel that follow.
+
+    Middle and diameter of each iris in pixels, empty where the eye is shut or doubtful, or no edge is seen.
+
+    Example:
+
+      stimuli iris face.mp4 track.csv --out iris.csv
+    """
+    from experiments.files import check_targets
+    from stimuli_builder.progress import frame_progress
+    from stimuli_builder.tracking.iris import IRIS_MM
+    from stimuli_builder.tracking.iris_table import write_irises
+    from stimuli_builder.tracking.learn import open_video
+
+    check_targets([out], [video, track])
+    info = open_video(video, accept_variable_rate=True)
+    with frame_progress() as progress:
+        task = progress.add_task("irises", total=info.frame_count)
+        summary = write_irises(info, track, out, lambda: progress.advance(task))
+    print(f"{out}: {summary.seen:,} irises seen in {summary.frames:,} frames")
+    if summary.diameter_px > 0:
+        print(
+            f"median diameter {summary.diameter_px:.2f} px (middle half within {summary.spread_px:.2f} px): "
+            f"{summary.mm_per_px:.4f} mm in a pixel if an iris is {IRIS_MM:g} mm wide\n"
+            f"use it with: stimuli blinks {track} --scale {summary.mm_per_px:.4f}"
+        )
+    else:
+        print("too few irises to tell how many millimetres a pixel is")
