@@ -14,6 +14,16 @@ from tests.browser.visit import Visit, axe_violations, fit_card
 from tests.helpers.studies import StudyInDatabase
 
 pytestmark = pytest.mark.browser
+LAST_SIGN_AFTER_FIRST = """() => {
+  const text = document.querySelector('h1').firstChild;
+  const left = (index) => {
+    const range = document.createRange();
+    range.setStart(text, index);
+    range.setEnd(text, index + 1);
+    return range.getBoundingClientRect().left;
+  };
+  return text.data.endsWith('?') && left(text.length - 1) > left(0);
+}"""
 MEASURED = (
     "SELECT px_per_mm, repeats, spread_percent, ruler_check, distance_method, distance_typed_mm, occasion "
     "FROM calibrations"
@@ -140,6 +150,7 @@ def test_arabic_is_spoken_and_runs_from_right_to_left(served: Served, page: Page
     server, studies = served
     visit = Visit(page, server.address).open(studies["arabic"].link_token)
     expect(page.locator("html")).to_have_attribute("dir", "rtl")
+    assert page.evaluate(LAST_SIGN_AFTER_FIRST), "the question mark of an English title stands at its end"
     page.click("text=بدء")
     page.check("input[type=checkbox]")
     assert axe_violations(page) == []
